@@ -23,8 +23,7 @@ from ..dynamics.motion.floater_effects import (
 from ..dynamics.motion.rates import Rates
 from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS, Mutual, brake_slope, rough_force
 from ..dynamics.motion.state import Parameter, Scales
-from ..fem.harmonics.interior import Ball
-from ..fem.harmonics.local import BallField
+from ..fem.harmonics.interior import Ball, BallField
 from ..fem.mutual.table import MutualTable
 from ..fem.rotor.table import FieldTable
 from ..fem.rotor_metal import RotorLosses, ball_losses, pieces_of, slow_error as metal_error

@@ -12,8 +12,7 @@ from functools import cached_property
 import heyoka as hy
 import numpy as np
 
-from ...fem.harmonics.interior import Ball
-from ...fem.harmonics.local import BallField
+from ...fem.harmonics.interior import Ball, BallField
 from ...fem.rotor.table import FieldTable, RangeError
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene

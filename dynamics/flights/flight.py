@@ -23,7 +23,7 @@ import numpy as np
 
 from ...fem.compiled_code import compiled
 from ...fem.files import seal, unsealed, write_whole
-from ...fem.harmonics.local import BallField
+from ...fem.harmonics.interior import BallField
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array, ComputationError, InputError
 from ...geometry.scene.contents import AbsoluteStart, Scene

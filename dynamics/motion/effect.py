@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...fem.harmonics.expressions import FieldExpressions
-from ...fem.harmonics.interior import Ball
-from ...fem.harmonics.local import BallField
+from ...fem.harmonics.interior import Ball, BallField
 from ...fem.rotor.table import FieldFormula, FieldTable
 from ...geometry.common import Array
 from .state import Parameter, Vector

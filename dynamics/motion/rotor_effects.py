@@ -28,8 +28,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.harmonics.interior import Ball
-from ...fem.harmonics.local import BallField
+from ...fem.harmonics.interior import Ball, BallField
 from ...fem.mutual.table import MutualTable
 from ...fem.plate.multipoles import weighted
 from ...fem.rotor.table import FieldTable, RangeError

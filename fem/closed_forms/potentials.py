@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ...geometry.common import MU_0, Array, frozen_array
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box
-from .cuboid import attraction, newton_potential
+from .uniform import attraction, newton_potential
 
 
 @dataclass(frozen=True, eq=False)

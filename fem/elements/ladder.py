@@ -179,7 +179,6 @@ class RotorSolution:
     layers : of elements at the edges; fewer than asked for where the mesher cannot match more
     symmetry : the frame of the mesh and its mirror planes
     parts : the potentials of every parity
-    shifts : (n, 3) m by which the magnets were moved to close narrow gaps
     """
 
     coefficients: tuple[Coefficients, ...]
@@ -189,7 +188,6 @@ class RotorSolution:
     layers: int
     symmetry: Symmetry
     parts: tuple[Solution, ...]
-    shifts: Array
 
     def expansions(self, coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
         """Expansions about the same spheres with other coefficients."""
@@ -226,6 +224,7 @@ def solve_rotor(
     """
     cut = pieces or [(magnet,) for magnet in magnets]
     shifts = closing_shifts(magnets)
+    # only the mesh has closed gaps: expansions stay about the true places
     closed = [shifted_magnet(magnet, shift) for magnet, shift in zip(magnets, shifts, strict=True)]
     symmetry = find_symmetry(closed)
     planes = symmetry.planes if use_symmetry else ()
@@ -253,9 +252,8 @@ def solve_rotor(
     if formulation == "direct":
         spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
     nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
-    return RotorSolution(
-        tuple(total or nothing), spheres, mesh, system.unknowns, layers, symmetry, tuple(solutions), shifts
-    )
+    coefficients = tuple(total or nothing)
+    return RotorSolution(coefficients, spheres, mesh, system.unknowns, layers, symmetry, tuple(solutions))
 
 
 def _of_cells(

@@ -24,8 +24,7 @@ from ...geometry.common import Array, MeshError
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MagnetMesh
 from ..closed_forms.uniform import remanent_field
-from .condensed import OpenFactor, TooLargeError, require_memory, solve_open
-from .open_boundary import OpenBoundary
+from .condensed import OpenBoundary, OpenFactor, TooLargeError, require_memory, solve_open
 from .spaces import volume_points
 
 BOUNDARY_DEGREE = 8  # harmonics up to this degree see an exactly open boundary; higher ones reach the bodies below 1e-8

@@ -12,7 +12,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.shapes import Box, Cylinder, Ring, Sphere
 from ...geometry.solids import Part as SolidPart, Solid
-from .expressions import FieldExpressions, Number, harmonic_sums
+from .expressions import UPPER, FieldExpressions, Number, harmonic_sums
 from .interior import Ball, moment
 from .solid import (
     FOUR_PI,
@@ -89,8 +89,6 @@ def round_rule(
 
 
 TURNED = 1e-14  # of the largest term: what turning there and back leaves at most
-# Entries of the gradient that determine the rest: it is symmetric and traceless
-UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,9 @@ Number = Callable[[float], Any]  # what a number of a formula is written as: `fl
 # B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric
 FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 
+# Entries of the gradient that determine the rest: it is symmetric and traceless
+UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
+
 
 def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], number: Number) -> list[hy.expression]:
     """Σ weight Re Θ_lm or Im Θ_lm, one expression for each of `sums`.

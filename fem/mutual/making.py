@@ -3,8 +3,10 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import combinations, permutations
 
 import numpy as np
+import scipy
 
 from ...geometry.common import Array, InputError, Watch, unwatched, watched
 from ...geometry.magnets import Magnet
@@ -13,12 +15,13 @@ from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import canonical
-from .grid import POWERS, RETURNED, AnswerGrid, answer_box, image_weights, point_counts
 from .response import RotorResponse, enough_degree, rotor_ladder, two_body
 from .samples import (
     NEAR_GAPS,
     ROTOR_GAPS,
     SPHERE_GAPS,
+    ReturnedSamples,
+    SphereSamples,
     places_around,
     places_facing,
     response_products,
@@ -26,8 +29,27 @@ from .samples import (
     sphere_samples,
     unit_dipole_fields,
 )
-from .table import MANY, PARALLEL, MutualTable, classes, least_squares, returned_fit, sphere_fit
+from .table import (
+    OF_RETURN,
+    OF_SPHERE,
+    POWERS,
+    RETURNED,
+    AnswerGrid,
+    EnergySum,
+    MutualTable,
+    answer_box,
+    image_weights,
+    mixed_sum,
+    pair_sum,
+    point_counts,
+)
 
+SMALL = 1e-9  # relative size of a singular value that is none
+# From so many magnets on, points of a class have one weight and magnets respond to each other by their centres
+MANY = 4
+# What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
+HELD, FREE = 1e-3, 1e-6
+PARALLEL = 1e-9
 # Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole
 GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
 DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end
@@ -240,3 +262,117 @@ def cached_mutual_table(
     turn = np.kron(np.eye(len(table.coupling) // 3), magnet.box.rotation)
     grids = (replace(grid, box=answer_box(magnet.body)),)
     return replace(table, magnets=magnets, grids=grids, coupling=turn @ table.coupling @ turn.T), found
+
+
+def sphere_fit(grids: Sequence[AnswerGrid], images: Array, samples: SphereSamples) -> tuple[list[AnswerGrid], Array]:
+    """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
+
+    Parameters
+    ----------
+    grids : whose `degrees` are sought
+    images : weights of the sphere's images
+    samples : the response of degree 2 and more
+    """
+
+    def scaled(energy: Array, slope: Array, _: Array) -> Array:
+        by_place = np.moveaxis(slope[..., :3], -1, 0)
+        return np.concatenate([energy / samples.energy_size, *(by_place / samples.force_size)], axis=1)
+
+    pairs = list(combinations(range(len(grids)), 2))
+    sums = [pair_sum(grids[a], grids[b], images) for a, b in pairs]
+    right = scaled(samples.energy[None], -samples.force[None], samples.force)[0]
+    found, weights = _fitted(grids, OF_SPHERE, sums, samples.places, scaled, right, HELD)
+    coupled = np.zeros((len(grids), len(grids)))
+    for (a, b), weight in zip(pairs, weights, strict=True):
+        coupled[a, b] = coupled[b, a] = weight
+    return [replace(grid, degrees=part) for grid, part in zip(grids, found, strict=True)], coupled
+
+
+def returned_fit(
+    grids: Sequence[AnswerGrid], inner: Sequence[Array], images: Array, samples: ReturnedSamples
+) -> tuple[list[AnswerGrid], Array]:
+    """Weights of the points' powers, and of pairs, that give V and its slopes.
+
+    Parameters
+    ----------
+    grids : whose `returned` are sought
+    inner : (k, 3) m of each magnet, points that respond for the whole of it
+    images : weights of the sphere's images
+    samples : the rotor's response to the sphere's
+    """
+    sizes = np.linalg.norm(samples.field, axis=1)[:, None], np.linalg.norm(samples.slope, axis=(1, 2))[:, None, None]
+
+    def scaled(_: Array, slope: Array, second: Array) -> Array:
+        parts = slope[..., 3:] / sizes[0], second[..., 3:, :3] / sizes[1]
+        return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
+
+    pairs = list(permutations(range(len(grids)), 2))
+    sums = [mixed_sum(grids[a], inner[b], images) for a, b in pairs]
+    # the energy is -M·V
+    right = -np.concatenate([(samples.field / sizes[0]).ravel(), (samples.slope / sizes[1]).ravel()])
+    found, weights = _fitted(grids, OF_RETURN, sums, samples.places, scaled, right, 10 * HELD)
+    mixed = np.zeros((len(grids), len(grids)))
+    for (a, b), weight in zip(pairs, weights, strict=True):
+        mixed[a, b] = weight
+    return [replace(grid, returned=part) for grid, part in zip(grids, found, strict=True)], mixed
+
+
+def _fitted(
+    grids: Sequence[AnswerGrid],
+    numbers: range,
+    sums: Sequence[EnergySum],
+    places: Array,
+    scaled: Callable[[Array, Array, Array], Array],
+    right: Array,
+    cost: float,
+) -> tuple[list[Array], Array]:
+    """Some `numbers` of the points (n, powers, 2) of each grid, and weights (k,) of sums.
+
+    `scaled` makes the equations' columns (g, rows) of the energies' derivatives, and `right` is what they shall give.
+    """
+    columns, held, kinds, still = list[Array](), list[Array](), list[Array](), np.zeros_like(places)
+    single = 1 < len(grids) < MANY  # beside other magnets each point has a weight of its own, too
+    for grid in grids:
+        kind = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
+        alone = np.eye(len(kind)) if single else kind[:, :0]
+        kinds.append(np.concatenate([kind, alone], axis=1)[:, : None if grid.axis.any() else 0])
+        for k in numbers:
+            columns.append(scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, kinds[-1])))
+            held.append(np.arange(kinds[-1].shape[1]) >= kind.shape[1])
+    for one in sums:
+        columns.append(scaled(*one.derivatives(places, still, np.ones((len(one.rows), 1)))))
+        held.append(np.zeros(1, bool))
+    found = least_squares(np.concatenate(columns).T, right, np.concatenate(held), cost)
+    parts = iter(np.split(found, np.cumsum([len(column) for column in columns])[:-1]))
+    each = [np.stack([kind @ next(parts) for _ in numbers], axis=1).reshape(len(kind), -1, 2) for kind in kinds]
+    return each, np.array([float(part[0]) for part in parts])
+
+
+def classes(grid: AnswerGrid, mirrored: bool) -> Array:
+    """(n, classes): which points are exchanged by mirrors at the body's planes, or else by its centre."""
+    key = np.round(grid.points * 1e9).astype(int)
+    if mirrored:
+        key = np.abs(key)
+    else:
+        first = np.array([next((v for v in row if v), 0) for row in key])
+        key = key * np.where(first < 0, -1, 1)[:, None]
+    number = np.unique(key, axis=0, return_inverse=True)[1].ravel()
+    return np.asarray(np.eye(number.max() + 1)[number])
+
+
+def least_squares(columns: Array, values: Array, held: Array, cost: float = HELD) -> Array:
+    """Weights (k,) of columns (n, k) of any sizes that give values (n,).
+
+    Parameters
+    ----------
+    held : (k,) which weights are kept small: by themselves they are hardly determined
+    cost : of a held one, by an error of the size of all values
+    """
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0] = 1.0
+    scaled = columns / size
+    if not held.any():
+        return np.asarray(np.linalg.lstsq(scaled, values, rcond=SMALL)[0] / size)
+    square = scaled.T @ scaled
+    square[np.diag_indices_from(square)] += np.where(held, cost, FREE) ** 2
+    return np.asarray(scipy.linalg.solve(square, scaled.T @ values, assume_a="pos") / size)

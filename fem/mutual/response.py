@@ -28,7 +28,7 @@ from ..harmonics.interior import (
 )
 from ..harmonics.solid import Coefficients, derivative, outer_sums
 from ..rotor.table import RotorTable
-from .grid import induced_sources, point_counts
+from .table import induced_sources, point_counts
 
 DEGREES = range(6, 41)
 

@@ -12,8 +12,8 @@ from ...geometry.scene.contents import Floater
 from ...geometry.solids import places_off
 from ..harmonics.interior import Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
 from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums
-from .grid import AnswerGrid, induced_sources, reflection
 from .response import RotorResponse, direct_rule, enough_degree
+from .table import AnswerGrid, induced_sources, reflection
 
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
 # Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets

@@ -1,37 +1,360 @@
-"""Mutual magnetisation of a rotor and a permeable sphere as one energy, and the fit of its weights to samples."""
+"""Energies of the mutual magnetisation of a rotor and a permeable sphere: sums of one formula over rows of numbers.
+
+Inside a sphere in any field B = μ0 μr H + J with uniform J. Continuity of the potential and of B_n at the surface gives
+for an incident potential of degree l the outer one -t_l (R/r)^(2l+1) times as large,
+
+    t_l = l (μr - 1) / (l (μr + 1) + 1),
+
+and for J the outer field of a dipole of moment (J V/μ0) 3/(μr + 2), with no field of another degree.
+The response to a charge at a (radii from the centre) has at a charge at b the energy Σ t_l P_l (ab)^-(l+1);
+with t_l = t (1 - Σ w β^l), nearly, these are images' 1/√(a²b² - 2β a·b + β²), the degrees 0 and 1 taken off.
+J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 4.4 and 5.11; W. R. Smythe, Static and Dynamic
+Electricity (3rd ed. 1968), section 5.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from itertools import combinations, permutations
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from itertools import permutations, product
+from typing import Any
 
 import heyoka as hy
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
-from ...geometry.common import Array
+from ...geometry.common import MU_0, Array
 from ...geometry.magnets import Magnet
-from .grid import (
-    CHARGES,
-    FEW_CHARGES,
-    OF_RETURN,
-    OF_SPHERE,
-    AnswerGrid,
-    EnergySum,
-    charge_sum,
-    coupled_sum,
-    mixed_energy,
-    pair_energy,
-)
-from .samples import ReturnedSamples, SphereSamples
+from ...geometry.shapes import Box, Sphere
+from ...geometry.solids import Solid
+from ..compiled_code import compiled
+from ..harmonics.solid import Coefficients, factorials
 
-SMALL = 1e-9  # relative size of a singular value that is none
-# From so many magnets on, points of a class have one weight and magnets respond to each other by their centres
-MANY = 4
-# What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
-HELD, FREE = 1e-3, 1e-6
-PARALLEL = 1e-9
+# β of the images, and the degree up to which their weights are fitted from 2 on: to 7e-4 of t_l
+IMAGES, FITTED = (0.95, 0.73, 0.3), 14
+UNIT = MU_0 / (4 * np.pi)
+# Edges of the boxes that stand for a sphere and for the section of a cylinder, in diameters
+IN_SPHERE, IN_CIRCLE = 0.64, 0.8
+# Along an edge of a face; the first meet what two magnets' fields do in the sphere to 1e-3 of all that is added
+CHARGES, FEW_CHARGES = 4, 2
+# p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2; and q, about that of three dipoles
+POWERS, RETURNED = (4, 5, 6), (5, 6)
+OF_SPHERE, OF_RETURN = range(3, 9), range(9, 13)  # among a point's `numbers`: v and w of each p; s and t of each q
+DIGITS = 7.2  # -ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3
+# Second derivatives over place and moment that are computed; they are symmetric
+ENTRIES = [(a, b) for a in range(6) for b in range(a, 6)]
+WHERE = np.array([[ENTRIES.index((min(a, b), max(a, b))) for b in range(6)] for a in range(6)])
+EVALUATIONS = 10_000  # of a formula at once, so that all numbers stay in the processor's cache
+
+# Energy (J times share²) of a place (3, m), a moment (3, A m² times share) and a row of numbers, and the share
+Formula = Callable[[Sequence[Any], Sequence[Any], Sequence[Any], Any], hy.expression]
+
+
+def reflection(permeability: float, degree: int) -> Array:
+    """t_l (degree + 1,) of a sphere: 0 for μr = 1, and 1 for l ≥ 1 and μr → ∞."""
+    l = np.arange(degree + 1)
+    return np.asarray(l * (permeability - 1) / (l * (permeability + 1) + 1))
+
+
+def induced_sources(incident: Coefficients, permeability: float) -> Coefficients:
+    """c_lm (T) of what the incident field a_lm (T) induces in a sphere that fills the ball."""
+    degree = len(incident) - 1
+    return np.asarray(-reflection(permeability, degree)[:, None] * np.conj(incident) / factorials(degree))
+
+
+def image_weights(permeability: float) -> Array:
+    """w (3,) of the images that stand for the degrees of a sphere's response; 0 for μr = 1."""
+    if permeability == 1:
+        return np.zeros(len(IMAGES))
+    l = np.arange(2, FITTED)
+    share = reflection(permeability, FITTED)[2:FITTED] * (permeability + 1) / (permeability - 1)
+    return np.asarray(np.linalg.lstsq(np.array([beta**l for beta in IMAGES]).T, share - 1, rcond=None)[0])
+
+
+def response_to_charge(a: Sequence[Any], b: Sequence[Any], weights: Sequence[Any]) -> hy.expression:
+    """Energy of a charge in a sphere's response to another: Σ_{l≥2} (t_l/t) P_l(cos) (ab)^-(l+1).
+
+    Parameters
+    ----------
+    a, b : places of the charges from the sphere's centre, in radii (three expressions each)
+    weights : of the images, see `image_weights`; t = (μr - 1)/(μr + 1)
+    """
+    square = hy.sum([x * x for x in a]) * hy.sum([x * x for x in b])
+    along = hy.sum([x * y for x, y in zip(a, b, strict=True)])
+    far = 1.0 / hy.sqrt(square)
+    parts = [1.0 / hy.sqrt(square - 2.0 * along + 1.0)]
+    for beta, weight in zip(IMAGES, weights, strict=True):
+        parts.append(weight / hy.sqrt(square - (2.0 * beta) * along + beta * beta))
+    # degrees 0 and 1 are no part of it: the energy of the moment has them
+    flat = sum(weights, start=1.0)
+    steep = sum((beta * weight for beta, weight in zip(IMAGES, weights, strict=True)), start=1.0)
+    return hy.sum(parts) - far * (flat + steep * along * (far * far))
+
+
+def point_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
+    """A magnet's point: -½ Σ λ b² of the moment's field b, less its part in u(x) + V(x)·M, see `MutualTable`.
+
+    With d from the point and ĵ along the remanence the parts are (R/d)^2p (v + w (ĵ·d)²/d²) of u, and
+    (R/d)^2q (s ĵ + t (ĵ·d) d/d²) of V.
+
+    Parameters
+    ----------
+    place, moment : m and A m² times share, along the body's axes
+    row : the point (3, m), its 13 `numbers`, ĵ (3) and R (m)
+    share : of the units, by which v, w, s and t become those of the energy, J times share²
+    """
+    strengths, axis, radius = row[3:6], row[16:19], row[19]
+    v4, w4, v5, w5, v6, w6 = (share * share * v for v in row[6:12])
+    s5, t5, s6, t6 = (share * s for s in row[12:16])
+    d = [x - t for x, t in zip(place, row[:3], strict=True)]
+    inverse = 1.0 / hy.sum([x * x for x in d])
+    along = hy.sum([m * x for m, x in zip(moment, d, strict=True)])
+    field = [3.0 * inverse * along * x - m for x, m in zip(d, moment, strict=True)]  # times 4π d³/μ0
+    square = hy.sum([s * (b * b) for s, b in zip(strengths, field, strict=True)])
+    answer = (0.5 * UNIT**2) * (inverse * inverse * inverse * square)
+    ratio, axial = radius * radius * inverse, hy.sum([j * x for j, x in zip(axis, d, strict=True)])
+    pointing = hy.sum([j * m for j, m in zip(axis, moment, strict=True)])
+    # Horner's scheme in (R/d)²: every operation of a flight's equations costs
+    flat = v4 + ratio * (v5 + s5 * pointing + ratio * (v6 + s6 * pointing))
+    steep = w4 * axial + ratio * (w5 * axial + t5 * along + ratio * (w6 * axial + t6 * along))
+    return -answer - ratio * ratio * ratio * ratio * (flat + inverse * axial * steep)
+
+
+def coupled_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
+    """Two points that respond together: -b·(C b') of the moment's fields b, b' at them.
+
+    Parameters
+    ----------
+    place, moment : m and A m² times share
+    row : the points (3 + 3, m) and C (9, A m²/T)
+    share : of the units; the moment has it already
+    """
+    one, other = (point_field([x - t for x, t in zip(place, p, strict=True)], moment) for p in (row[:3], row[3:6]))
+    return -hy.sum([row[6 + 3 * i + j] * (one[i] * other[j]) for i, j in np.ndindex(3, 3)])
+
+
+def pair_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
+    """Two magnets' charges by the sphere's response to one of them.
+
+    Parameters
+    ----------
+    place, moment : m and A m² times share; the moment does not count
+    row : places of the charges (3 + 3, m), the energy's factor (J), 1/R (1/m) and the weights of the images (3)
+    share : of the units
+    """
+    a, b = (_scaled(place, p, row[7]) for p in (row[:3], row[3:6]))
+    return share * share * (row[6] * response_to_charge(a, b, row[8:]))
+
+
+def mixed_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
+    """The moment in the field of a point that the sphere's response to a charge elsewhere magnetises.
+
+    Parameters
+    ----------
+    place, moment : m and A m² times share
+    row : places of charge and point (3 + 3, m), the factor (T), 1/R (1/m) and the weights of the images (3)
+    share : of the units
+    """
+    a, b = (_scaled(place, p, row[7]) for p in (row[:3], row[3:6]))
+    given = hy.make_vars("b_x", "b_y", "b_z")
+    slope = hy.diff_tensors([response_to_charge(a, given, row[8:])], diff_args=given, diff_order=1).gradient
+    field = [hy.subs(part, {str(v): value for v, value in zip(given, b, strict=True)}) for part in slope]
+    inverse = 1.0 / hy.sum([x * x for x in b])
+    along, pointing, both = (
+        hy.sum([x * y for x, y in zip(u, v, strict=True)]) for u, v in ((b, field), (b, moment), (moment, field))
+    )
+    return share * (row[6] * (inverse * hy.sqrt(inverse) * (3.0 * inverse * along * pointing - both)))
+
+
+def point_field(d: Sequence[Any], moment: Sequence[Any]) -> list[hy.expression]:
+    """Field (3) T of a moment (A m²) at a way d (3 expressions, m) from it or to it."""
+    inverse = 1.0 / hy.sum([t * t for t in d])
+    cube = UNIT * (inverse * hy.sqrt(inverse))
+    along = 3.0 * inverse * hy.sum([m * t for m, t in zip(moment, d, strict=True)])
+    return [cube * (along * t - m) for t, m in zip(d, moment, strict=True)]
+
+
+def _scaled(place: Sequence[Any], point: Sequence[Any], inverse: Any) -> list[Any]:
+    return [(x - t) * inverse for x, t in zip(place, point, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class EnergySum:
+    """Σ formula(place, moment, row) over rows: written out for equations of motion, or evaluated with derivatives.
+
+    Parameters
+    ----------
+    formula : of one row
+    rows : (n, k) numbers of the formula
+    origin, axes : (3,) m and (3, 3) by columns, of the frame in which the formula is written
+    """
+
+    formula: Formula
+    rows: Array
+    origin: Array = field(default_factory=lambda: np.zeros(3))
+    axes: Array = field(default_factory=lambda: np.eye(3))
+
+    def expression(self, position: Sequence[Any], moment: Sequence[Any], share: Any) -> hy.expression:
+        """The sum (J times share²) at a position (3 expressions, m) of a moment (A m² times `share`)."""
+        place = self._along([x - float(c) for x, c in zip(position, self.origin, strict=True)])
+        pointing = self._along(moment)
+        return hy.sum([self.formula(place, pointing, row, share) for row in self.rows.tolist()])
+
+    def _along(self, vector: Sequence[Any]) -> list[Any]:
+        """Components along the axes of a vector in the rotor's frame; what a turn leaves of a zero costs nothing."""
+        exact = np.where(np.abs(self.axes.T) < 1e-15, 0.0, self.axes.T)
+        return [hy.sum([float(r) * v for r, v in zip(row, vector, strict=True) if r]) for row in exact]
+
+    def derivatives(self, places: Array, moments: Array, groups: Array | None = None) -> tuple[Array, Array, Array]:
+        """The energy and its first and second derivatives by place (m) and moment (A m²), in this order.
+
+        Parameters
+        ----------
+        places, moments : (m, 3) m and A m², rotor's frame
+        groups : (n, g) weights of the rows in sums of their own; None: one sum of all
+
+        Returns
+        -------
+        J and its derivatives (g, m), (g, m, 6) and (g, m, 6, 6); without `groups` also without their axis
+        """
+        weights = np.ones((len(self.rows), 1)) if groups is None else groups
+        free = np.concatenate([(places - self.origin) @ self.axes, moments @ self.axes], axis=1)
+        kernel, (count, width) = _kernel(self.formula, self.rows.shape[1]), self.rows.shape
+        sums = np.zeros((weights.shape[1], 7 + len(ENTRIES), len(places)))
+        step = max(1, EVALUATIONS // max(count, 1))
+        for start in range(0, len(places) if count else 0, step):
+            some = free[start : start + step]
+            given = np.empty((6 + width, len(some), count))
+            given[:6], given[6:] = some.T[:, :, None], self.rows.T[:, None]
+            found = kernel(given.reshape(6 + width, -1)).reshape(-1, len(some), count)
+            sums[:, :, start : start + step] = np.moveaxis(found @ weights, 2, 0)
+        turn = np.kron(np.eye(2), self.axes)
+        slope = np.moveaxis(sums[:, 1:7], 1, 2) @ turn.T
+        second = turn @ np.moveaxis(sums[:, 7:], 1, 2)[..., WHERE] @ turn.T
+        found = sums[:, 0], slope, second
+        return found if groups is not None else (found[0][0], found[1][0], found[2][0])
+
+
+@cache
+def _kernel(formula: Formula, width: int) -> Any:
+    """Compiled formula with its derivatives: (28, n) for places, moments and rows (6 + width, n)."""
+    free = hy.make_vars("x", "y", "z", "m_x", "m_y", "m_z")
+    row = [hy.expression(f"n_{k}") for k in range(width)]
+    energy = formula(free[:3], free[3:], row, 1.0)
+    gradient = list(hy.diff_tensors([energy], diff_args=free, diff_order=1).gradient)
+    hessian = np.asarray(hy.diff_tensors(gradient, diff_args=free, diff_order=1).jacobian)
+    outputs = [energy, *gradient, *(hessian[a, b] for a, b in ENTRIES)]
+    return compiled(hy.cfunc, outputs, [*free, *row], fast_math=True)
+
+
+@dataclass(frozen=True, eq=False)
+class AnswerGrid:
+    """Points of one magnet with their energies, see `point_energy`.
+
+    Parameters
+    ----------
+    box : of the magnet, see `answer_box`
+    axis : (3,) direction of its remanence along the body's axes; zero: none
+    radius : of the floater, m
+    counts : points along each body axis
+    strengths : (n, 3) λ, A m²/T, along the body's axes
+    degrees : (n, 3, 2) v and w of each power, J
+    returned : (n, 2, 2) s and t of each power, T
+    """
+
+    box: Box
+    axis: Array
+    radius: float = field(metadata={"units": "m"})
+    counts: tuple[int, int, int]
+    strengths: Array = field(metadata={"units": "A m2/T"})
+    degrees: Array = field(metadata={"units": "J"})
+    returned: Array = field(metadata={"units": "T"})
+
+    @cached_property
+    def points(self) -> Array:
+        """(n, 3) m along the body's axes, from its centre: Gauss's in the box."""
+        nodes = [np.polynomial.legendre.leggauss(n)[0] for n in self.counts]
+        return np.asarray(self.box.half_edges * np.array(list(product(*nodes))))
+
+    @property
+    def places(self) -> Array:
+        """(n, 3) m of the points in the rotor's frame."""
+        return self.box.center + self.points @ self.box.rotation.T
+
+    def inner(self, number: int) -> Array:
+        """(number³, 3) m in the rotor's frame: Gauss's points for what the magnet is as a whole."""
+        nodes = np.polynomial.legendre.leggauss(number)[0]
+        return self.box.center + np.array(list(product(nodes, repeat=3))) * self.box.half_edges @ self.box.rotation.T
+
+    def charges(self, number: int) -> tuple[Array, Array]:
+        """Places (k, 3) m in the rotor's frame of charges on the faces that stand for the remanence, and these (k,).
+
+        At Gauss's points, `number` along an edge, in units of the charge of a face that the remanence leaves upright.
+        """
+        nodes, weights = np.polynomial.legendre.leggauss(number)
+        along, places, amounts = list(zip(nodes, weights / 2, strict=True)), [np.zeros((0, 3))], []
+        for k in np.flatnonzero(np.abs(self.axis) > 1e-9):
+            for side, (u, first), (v, second) in product((-1.0, 1.0), along, along):
+                places.append(np.roll([[side, u, v]], k, axis=1) * self.box.half_edges)
+                amounts.append(side * self.axis[k] * first * second)
+        return self.box.center + np.concatenate(places) @ self.box.rotation.T, np.array(amounts)
+
+    @property
+    def numbers(self) -> Array:
+        """(n, 13) of each point: λ (3), v and w of three powers, s and t of two."""
+        return np.concatenate([self.strengths, *(w.reshape(len(w), -1) for w in (self.degrees, self.returned))], axis=1)
+
+    def energy(self, numbers: Array) -> EnergySum:
+        """Of the points with some `numbers` (n, 13) or (13,)."""
+        each = [np.broadcast_to(part, (len(self.points), np.shape(part)[-1])) for part in (numbers, self.axis)]
+        rows = np.concatenate([self.points, *each, np.full((len(self.points), 1), self.radius)], axis=1)
+        return EnergySum(point_energy, rows, self.box.center, self.box.rotation)
+
+
+def coupled_sum(points: Array, coupling: Array) -> EnergySum:
+    """-½ bᵀ coupling b of the fields b at points (k, 3) m, with `coupling` (3k, 3k) A m²/T, symmetric."""
+    blocks = coupling.reshape(len(points), 3, len(points), 3)
+    first, second = np.triu_indices(len(points) if coupling.any() else 0)
+    factor = np.where(first == second, 0.5, 1.0)[:, None]
+    rows = [points[first], points[second], factor * blocks[first, :, second].reshape(-1, 9)]
+    return EnergySum(coupled_energy, np.concatenate(rows, axis=1))
+
+
+def charge_sum(
+    formula: Formula, charges: tuple[Array, Array], others: tuple[Array, Array], radius: float, images: Array
+) -> EnergySum:
+    """`pair_energy` or `mixed_energy` of each of one magnet's charges with each of another's charges or points.
+
+    Parameters
+    ----------
+    formula : one of both
+    charges, others : places (k, 3) m and amounts (k,), whose products are the factors of minus the energy
+    radius : of the sphere, m
+    images : (3,) weights of its images
+    """
+    (here, q), (there, p) = charges, others
+    count = len(q) * len(p)
+    ends = np.repeat(here, len(there), axis=0), np.tile(there, (len(here), 1))
+    same = np.broadcast_to([1 / radius, *images], (count, 1 + len(images)))
+    return EnergySum(formula, np.concatenate([*ends, -np.outer(q, p).reshape(-1, 1), same], axis=1))
+
+
+def answer_box(body: Solid) -> Box:
+    """The box in which a body's points lie: itself, or for round ones a box that hardly leaves it."""
+    if isinstance(body, Box):
+        return body
+    share = np.full(3, IN_SPHERE) if isinstance(body, Sphere) else np.array([IN_CIRCLE, IN_CIRCLE, 1.0])
+    return Box(body.size * share, body.center, body.rotation)
+
+
+def point_counts(box: Box, clearance: float, digits: float = DIGITS) -> tuple[int, int, int]:
+    """Gauss points along each edge of a `box` for fields with sources no nearer than a `clearance` (m) to the faces.
+
+    `digits` is -ln of the error. It falls as ρ^-2n, ρ the sum of the half axes of the ellipse about the edge that
+    reaches the source.
+    """
+    z = 1 + clearance / box.half_edges
+    nx, ny, nz = (int(n) for n in np.ceil(digits / np.log(z + np.sqrt(z * z - 1))))
+    return nx, ny, nz
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,117 +479,3 @@ def mixed_sum(source: AnswerGrid, points: Array, images: Array, weight: float = 
     places, amounts = source.charges(FEW_CHARGES)
     mean = points, np.full(len(points), 1 / len(points))
     return charge_sum(mixed_energy, (places, weight * amounts), mean, source.radius, images)
-
-
-def sphere_fit(grids: Sequence[AnswerGrid], images: Array, samples: SphereSamples) -> tuple[list[AnswerGrid], Array]:
-    """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
-
-    Parameters
-    ----------
-    grids : whose `degrees` are sought
-    images : weights of the sphere's images
-    samples : the response of degree 2 and more
-    """
-
-    def scaled(energy: Array, slope: Array, _: Array) -> Array:
-        by_place = np.moveaxis(slope[..., :3], -1, 0)
-        return np.concatenate([energy / samples.energy_size, *(by_place / samples.force_size)], axis=1)
-
-    pairs = list(combinations(range(len(grids)), 2))
-    sums = [pair_sum(grids[a], grids[b], images) for a, b in pairs]
-    right = scaled(samples.energy[None], -samples.force[None], samples.force)[0]
-    found, weights = _fitted(grids, OF_SPHERE, sums, samples.places, scaled, right, HELD)
-    coupled = np.zeros((len(grids), len(grids)))
-    for (a, b), weight in zip(pairs, weights, strict=True):
-        coupled[a, b] = coupled[b, a] = weight
-    return [replace(grid, degrees=part) for grid, part in zip(grids, found, strict=True)], coupled
-
-
-def returned_fit(
-    grids: Sequence[AnswerGrid], inner: Sequence[Array], images: Array, samples: ReturnedSamples
-) -> tuple[list[AnswerGrid], Array]:
-    """Weights of the points' powers, and of pairs, that give V and its slopes.
-
-    Parameters
-    ----------
-    grids : whose `returned` are sought
-    inner : (k, 3) m of each magnet, points that respond for the whole of it
-    images : weights of the sphere's images
-    samples : the rotor's response to the sphere's
-    """
-    sizes = np.linalg.norm(samples.field, axis=1)[:, None], np.linalg.norm(samples.slope, axis=(1, 2))[:, None, None]
-
-    def scaled(_: Array, slope: Array, second: Array) -> Array:
-        parts = slope[..., 3:] / sizes[0], second[..., 3:, :3] / sizes[1]
-        return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
-
-    pairs = list(permutations(range(len(grids)), 2))
-    sums = [mixed_sum(grids[a], inner[b], images) for a, b in pairs]
-    # the energy is -M·V
-    right = -np.concatenate([(samples.field / sizes[0]).ravel(), (samples.slope / sizes[1]).ravel()])
-    found, weights = _fitted(grids, OF_RETURN, sums, samples.places, scaled, right, 10 * HELD)
-    mixed = np.zeros((len(grids), len(grids)))
-    for (a, b), weight in zip(pairs, weights, strict=True):
-        mixed[a, b] = weight
-    return [replace(grid, returned=part) for grid, part in zip(grids, found, strict=True)], mixed
-
-
-def _fitted(
-    grids: Sequence[AnswerGrid],
-    numbers: range,
-    sums: Sequence[EnergySum],
-    places: Array,
-    scaled: Callable[[Array, Array, Array], Array],
-    right: Array,
-    cost: float,
-) -> tuple[list[Array], Array]:
-    """Some `numbers` of the points (n, powers, 2) of each grid, and weights (k,) of sums.
-
-    `scaled` makes the equations' columns (g, rows) of the energies' derivatives, and `right` is what they shall give.
-    """
-    columns, held, kinds, still = list[Array](), list[Array](), list[Array](), np.zeros_like(places)
-    single = 1 < len(grids) < MANY  # beside other magnets each point has a weight of its own, too
-    for grid in grids:
-        kind = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
-        alone = np.eye(len(kind)) if single else kind[:, :0]
-        kinds.append(np.concatenate([kind, alone], axis=1)[:, : None if grid.axis.any() else 0])
-        for k in numbers:
-            columns.append(scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, kinds[-1])))
-            held.append(np.arange(kinds[-1].shape[1]) >= kind.shape[1])
-    for one in sums:
-        columns.append(scaled(*one.derivatives(places, still, np.ones((len(one.rows), 1)))))
-        held.append(np.zeros(1, bool))
-    found = least_squares(np.concatenate(columns).T, right, np.concatenate(held), cost)
-    parts = iter(np.split(found, np.cumsum([len(column) for column in columns])[:-1]))
-    each = [np.stack([kind @ next(parts) for _ in numbers], axis=1).reshape(len(kind), -1, 2) for kind in kinds]
-    return each, np.array([float(part[0]) for part in parts])
-
-
-def classes(grid: AnswerGrid, mirrored: bool) -> Array:
-    """(n, classes): which points are exchanged by mirrors at the body's planes, or else by its centre."""
-    key = np.round(grid.points * 1e9).astype(int)
-    if mirrored:
-        key = np.abs(key)
-    else:
-        first = np.array([next((v for v in row if v), 0) for row in key])
-        key = key * np.where(first < 0, -1, 1)[:, None]
-    number = np.unique(key, axis=0, return_inverse=True)[1].ravel()
-    return np.asarray(np.eye(number.max() + 1)[number])
-
-
-def least_squares(columns: Array, values: Array, held: Array, cost: float = HELD) -> Array:
-    """Weights (k,) of columns (n, k) of any sizes that give values (n,).
-
-    Parameters
-    ----------
-    held : (k,) which weights are kept small: by themselves they are hardly determined
-    cost : of a held one, by an error of the size of all values
-    """
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0] = 1.0
-    scaled = columns / size
-    if not held.any():
-        return np.asarray(np.linalg.lstsq(scaled, values, rcond=SMALL)[0] / size)
-    square = scaled.T @ scaled
-    square[np.diag_indices_from(square)] += np.where(held, cost, FREE) ** 2
-    return np.asarray(scipy.linalg.solve(square, scaled.T @ values, assume_a="pos") / size)

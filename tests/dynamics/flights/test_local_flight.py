@@ -12,8 +12,7 @@ from spinlev.dynamics.flights.flight import Checkpoint, Flight, initial_state, i
 from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.harmonics.expansion import uniform_moments
-from spinlev.fem.harmonics.interior import Ball
-from spinlev.fem.harmonics.local import BallField
+from spinlev.fem.harmonics.interior import Ball, BallField
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.table import RotorTable

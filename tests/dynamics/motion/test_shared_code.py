@@ -9,8 +9,7 @@ from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
-from spinlev.fem.mutual.grid import AnswerGrid, answer_box
-from spinlev.fem.mutual.table import MutualTable
+from spinlev.fem.mutual.table import AnswerGrid, MutualTable, answer_box
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Floater, Scene

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from spinlev.fem.closed_forms.cuboid import attraction, newton_potential
 from spinlev.fem.closed_forms.potentials import Dipole, HomogeneousField, PolarizedCuboid, Racetrack
+from spinlev.fem.closed_forms.uniform import attraction, newton_potential
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.shapes import Box
 

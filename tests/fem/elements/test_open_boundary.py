@@ -4,8 +4,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from spinlev.fem.elements.condensed import OpenFactor, solve_open
-from spinlev.fem.elements.open_boundary import OpenBoundary
+from spinlev.fem.elements.condensed import OpenBoundary, OpenFactor, solve_open
 from spinlev.fem.elements.spaces import volume_points
 from spinlev.geometry.meshes.magnets import mesh_magnets
 from spinlev.geometry.scene.files import load_scene

@@ -9,10 +9,10 @@ from article import PERMEABLE
 from numpy.polynomial import legendre
 
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center
-from spinlev.fem.mutual.grid import image_weights, reflection, response_to_charge
 from spinlev.fem.mutual.making import MUTUAL, cached_mutual_table, mutual_table
 from spinlev.fem.mutual.response import enough_degree, rotor_response, two_body
 from spinlev.fem.mutual.samples import places_around
+from spinlev.fem.mutual.table import image_weights, reflection, response_to_charge
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets

@@ -19,8 +19,8 @@ from spinlev.fem.harmonics.interior import (
     multipole_torque,
 )
 from spinlev.fem.harmonics.solid import derivative, outer_sums
-from spinlev.fem.mutual.grid import induced_sources
 from spinlev.fem.mutual.response import TwoBodyError, enough_degree, rotor_ladder, two_body, two_body_ladder
+from spinlev.fem.mutual.table import induced_sources
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.rotor import horizontal, vertical
