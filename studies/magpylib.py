@@ -15,8 +15,9 @@ from ..fem.files import write_whole
 from ..fem.rotor.table import RotorTable
 from ..geometry.common import MU_0, Array, InputError
 from ..geometry.meshes.solids import Body, Facets, Segment, lies_within, step_text
+from ..geometry.scene.files import pose_keys, shape_keys
 from ..geometry.scene.making import magnets
-from ..geometry.shapes import Box, Cylinder, Ring, Sphere, rotation_angles
+from ..geometry.shapes import Box, Cylinder, Ring, Sphere
 from ..geometry.solids import Part, Solid
 
 KINDS = (
@@ -75,13 +76,13 @@ def from_magpylib(
     parts = Path(folder) if folder else cache_folder() / "parts"
     tables = [
         {
-            **_shape(magnet, cavities, parts),
-            "center_mm": _listed(1e3 * magnet.body.center),
-            "rotation_deg": _listed(rotation_angles(magnet.body.rotation)),
-            "polarization_T": _listed(magnet.polarization),
+            # Of what has no keys, and of a body with a cavity, there is a file.
+            **(_file(magnet, holes, parts) if holes or not isinstance(magnet.body, Solid) else shape_keys(magnet.body)),
+            **pose_keys(magnet.body),  # type: ignore[arg-type]  # which asks for no more than a body has
+            "polarization_T": (magnet.polarization + 0.0).tolist(),
             "recoil_permeability": float(recoil_permeability),
         }
-        for magnet, cavities in _cavities(_joined([_magnet(source) for source in sources]))
+        for magnet, holes in _cavities(_joined([_magnet(source) for source in sources]))
     ]
     return dict(magnets(*tables))
 
@@ -257,26 +258,6 @@ def _file(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, 
     except OSError as error:
         raise InputError(f"Input folder must be one that files can be written to; instead: {error}.") from None
     return {"file": str(path)}
-
-
-def _shape(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, Any]:
-    """The keys of a shape, mm; of what has no keys, or a cavity, the file in a folder."""
-    body = magnet.body
-    if cavities or isinstance(body, Segment | Facets):
-        return _file(magnet, cavities, folder)
-    if isinstance(body, Sphere):
-        return {"shape": "sphere", "diameter_mm": 2e3 * body.radius}
-    if isinstance(body, Box):
-        return {"size_mm": _listed(1e3 * body.size)}
-    assert isinstance(body, Cylinder | Ring)
-    size = {"diameter_mm": 2e3 * body.radius, "height_mm": 1e3 * body.height}
-    if isinstance(body, Ring):
-        return {"shape": "ring", "inner_diameter_mm": 2e3 * body.inner_radius, **size}
-    return {"shape": "cylinder", **size}
-
-
-def _listed(values: Any) -> list[float]:
-    return [float(value) for value in np.asarray(values, float) + 0.0]
 
 
 def to_magpylib(table: RotorTable) -> Any:
