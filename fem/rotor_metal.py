@@ -347,7 +347,7 @@ def rotor_losses(
     fit = fit_multipoles(choice, places, values, np.ones(found.count), scale, FIT, lambda _: True)
     finer = [metal_of(group, conductivity, ORDER + 1) for group, conductivity in pieces]
     table = RotorLosses(fit.multipoles, sparse(fit.weights), nearest * np.array(CHECKED), np.zeros(len(CHECKED)))
-    distances = watched(table.distances, watch, "errors")
+    distances = watched(table.distances, watch, "error estimate")
     errors = [_error(table, finer, around(distance, seed=1)) for distance in distances]
     made: dict[str, str | float] = {
         "elements": sum(int(metal.mesh.mesh.ne) for metal in metals),

@@ -64,7 +64,7 @@ def plate_memory(
         detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
         return (made, share), found
 
-    made, share = (tables or SharedTables()).table(asked.key, "plate", "Plate's currents", make)
+    made, share = (tables or SharedTables()).table(asked.key, "plate", "Eddy currents in the plate", make)
     return PlateMemory(asked.plate, made, share, model, edges)
 
 
@@ -198,7 +198,7 @@ class Levitation(SceneTables):
         """
         if not self.absolute or not self._ahead:
             return None
-        note("Where the floater goes, by an infinite slab ...")
+        note("Trajectory over an infinite slab ...")
         slab = self.elsewhere(replace(self.models, plate_model="slab"))
         try:
             flown = slab.flight(min(self._ahead, AHEAD))

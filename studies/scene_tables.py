@@ -169,7 +169,7 @@ class SceneTables:
         if not self._metal():
             return None
         make = partial(cached_rotor_losses, scene, note)
-        return self._tables.table(losses_key(scene), "rotor losses", "Currents in the rotor's metal", make)
+        return self._tables.table(losses_key(scene), "rotor losses", "Eddy currents in the rotor", make)
 
     @cached_property
     def interaction(self) -> Interaction:

@@ -70,7 +70,7 @@ def mutual_errors(
     """
     generator = np.random.default_rng(4)
     errors = []
-    for gap in watched(GAPS, watch, "errors"):
+    for gap in watched(GAPS, watch, "error estimate"):
         worst = np.zeros(2)
         anywhere = places_around(rotor.magnets, floater.radius, (gap,), PLACES_EACH, 3)
         for place in (*anywhere, *_at_poles(rotor.magnets, (1 + gap) * floater.radius)):

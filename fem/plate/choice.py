@@ -78,7 +78,7 @@ def resolve_plate_model(
         error = edge_error(plate, place)
         if error <= rtol:
             return PlateChoice("slab", f"the plate's edges take at most {error:.1e} of its reaction", error)
-        report("What the plate's edges change ...")
+        report("Effect of the plate's edges ...")
         rotor = np.mean([magnet.box.center for magnet in scene.rotor], axis=0)
         error = cached_edge_error(plate, np.array([place, rotor]), scene.frequency, report)
         if error <= rtol:

@@ -330,13 +330,13 @@ def train(
     allowed : |ρ|² of a source relative to what it drives, and thus relative error of its coupling with itself
     watch : progress callback
     """
-    watch("potentials of sources", 0.0)
+    watch("vector potentials of the sources", 0.0)
     rows = FieldRows(space)
     omegas = 2 * np.pi * np.geomspace(*frequencies, FREQUENCIES)
     system = ShiftedSystem(space, SHIFT * omegas[-1])
     sources, tests = rows.of_sources(grid, others.training), rows.of_sources(probes, others.probes)
     for done, (part, other, parity_class) in enumerate(zip(sources, tests, space.parity.classes, strict=True)):
-        watch("potentials of sources", 0.3 + 0.7 * done / len(sources))
+        watch("vector potentials of the sources", 0.3 + 0.7 * done / len(sources))
         both = rows.without_gradients(np.concatenate([part, other]), parity_class)  # with one factor for all
         part[:], other[:] = both[: len(part)], both[len(part) :]
     scale = unit_power(np.einsum("csw,csw->s", sources, sources), len(others.training))
@@ -344,7 +344,7 @@ def train(
     couplings = np.zeros((len(omegas), *[tests.shape[1]] * 2), complex)
     residuals = np.zeros_like(couplings)
     classes = zip(space.parity.classes, sources, tests, strict=True)
-    for parity_class, driving, testing in watched(classes, watch, f"currents at order {space.order}"):
+    for parity_class, driving, testing in watched(classes, watch, f"eddy currents, order {space.order}"):
         solve, _ = system.solver(parity_class)
 
         def fields_of(starts: Array, solve: Callable[[Array], Array] = solve) -> tuple[Array, Array]:

@@ -214,7 +214,7 @@ def fit_multipoles(
     while True:
         least = max(tolerance, np.finfo(float).eps * left[0])  # progress goes by the orders of magnitude to it
         gone = 1.0 if left[-1] <= least else float(np.log(left[0] / left[-1]) / np.log(left[0] / least))
-        watch("field functions", gone)
+        watch("field functions of the plate", gone)
         error = rest.T.reshape(values.shape) / state_scale[:, None, None] / point_scale[:, None]
         stalled = len(left) > PATIENCE and left[-1] > STALLED * left[-1 - PATIENCE]
         if stalled or (left[-1] <= tolerance and enough(error)):

@@ -175,7 +175,7 @@ def rotor_share(
         places = [(float(depth), float(angle)) for depth in depths for angle in angles]
         new = [place for place in places if place not in cached]
         groups = [new[first : first + TOGETHER] for first in range(0, len(new), TOGETHER)]
-        for some in watched(groups, watch, f"signals of the rotor at {len(new)} places"):
+        for some in watched(groups, watch, f"rotor's field in the plate, {len(new)} positions"):
             sources = [posed_rotor(parts, plate, angle, depth) for depth, angle in some]
             cached.update(zip(some, network.couplings(sources), strict=True))
         return np.array([cached[place] for place in places])

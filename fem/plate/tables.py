@@ -88,12 +88,12 @@ def plate_and_rotor_table(
     boxes = [outer_box(region, half), outer_box(rotor_box(plate, rotor), half)]
     outer = outer_frequencies(frequencies)
     solution = solve(plate, boxes, outer, rtol, rule)
-    watch("network of the scene", 0.0)
+    watch("reduced plate model", 0.0)
     error = error_of(solution, others.probes)
     if error > OTHERS_SHARE * (NETWORK_SHARE * rtol - solution.mesh_error):
         solution = solve(plate, boxes, outer, rtol, rule, others)
         error = solution.space_error
-    watch("network of the scene", 0.5)
+    watch("reduced plate model", 0.5)
     missed = max(error, solution.space_error)
     reduced = from_elements(plate, solution, region, frequencies, rtol, others, missed)
     return _with_share(reduced, plate, rotor, rtol, CONDUCTOR, watch)
@@ -141,7 +141,7 @@ def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> 
     `watch` is a progress callback.
     """
     start = time.perf_counter()
-    watch("field functions", 0.0)
+    watch("field functions of the plate", 0.0)
     multipoles, weights, error = network.field_functions(rtol, watch)
     seconds = network.seconds + time.perf_counter() - start
     return PlateTable(

@@ -297,7 +297,7 @@ def _functions(
         part = COARSEST * tolerance / 2**halving
         fits = []
         for m, (choice, value, scale) in enumerate(zip(choices, values, scales, strict=True)):
-            watch("field functions", m / len(values))
+            watch("field functions of the plate", m / len(values))
             turn = _turn(m)
             fits.append(
                 fit_multipoles(choice, places @ turn.T, value @ turn.T, scale, point_scale, part, lambda _: True, 1)
