@@ -83,18 +83,11 @@ class BranchPoint:
 
 @dataclass(frozen=True, eq=False)
 class Family(BalanceCurve):
-    """The equilibria of a problem with one parameter, as a curve.
+    """The equilibria of a problem with one parameter, as a curve."""
 
-    Parameters
-    ----------
-    rates : compiled once for all values of the parameter
-    problem : what the parameter does
-    unit : of the parameter, a typical change over which the equilibrium moves by its radius
-    """
-
-    rates: Rates
-    problem: Problem
-    unit: float = 1.0
+    rates: Rates  # compiled once for all values of the parameter
+    problem: Problem  # what the parameter does
+    unit: float = 1.0  # of the parameter, a typical change over which the equilibrium moves by its radius
 
     def balance(self, parameter: float) -> Balance:
         """Forces and torques at one value of the parameter."""

@@ -243,7 +243,7 @@ def is_over(scene: Scene, point: BranchPoint) -> bool:
 
 
 def levitates(point: BranchPoint) -> bool:
-    """Whether no small motion grows faster than what is tolerated."""
+    """Whether no mode grows faster than what is tolerated."""
     return point.growth_per_s <= max(TOLERATED, point.doubt_per_s)
 
 

@@ -163,14 +163,14 @@ class EquilibriumMap:
     # position, moment: (k, 3) m and direction
     position: Array
     moment: Array
-    eigenvalues: NDArray[np.complex128]  # (k, 10) of the small motions, 1/s
+    eigenvalues: NDArray[np.complex128]  # (k, 10) of the modes, 1/s
     errors: Array  # (k,) what round-off may do to them, 1/s
-    stable: NDArray[np.bool_]  # (k,) whether every small motion stays small
+    stable: NDArray[np.bool_]  # (k,) whether no mode grows
     searches: int  # points of the map at which all was searched for
 
     @property
     def growth_per_s(self) -> Array:
-        """(k,) largest growth rate of a small motion."""
+        """(k,) largest growth rate of a mode."""
         return np.asarray(self.eigenvalues.real.max(axis=1))
 
     @property

@@ -92,7 +92,7 @@ class Drift:
     time: Array  # (n,) s
     spin: Array  # (n,) body spin s
     distance: Array  # (n,) from the rotor's origin, m
-    growth_per_s: Array  # (n,) largest growth of a small motion
+    growth_per_s: Array  # (n,) largest growth of a mode
     ended_by: str  # "balance", "fold", "instability", "contact" or "duration"
     balance_spin: float  # the spin s* at which the slow torques balance, if the branch reaches it, else NaN
     last_fall_s: float = 0.0  # time from the fold to the loss, s; 0 unless the flight ended by a fold
@@ -190,9 +190,9 @@ def drift(
     spin : body spin at the start
     duration : at most, s; may be infinite where there is a slow torque
     rates : `Rates` of the same table, to compile them once for many scenes
-    start : the equilibrium at `spin`, if it is known; else the one at which small motions grow the slowest
+    start : the equilibrium at `spin`, if it is known; else the one whose modes grow the slowest
     stokes : drag proportional to spin unless the scene's drag is that of real air, as in `simulate`
-    e_folds : growth of a small motion after which it has ended the flight
+    e_folds : growth of a mode after which it has ended the flight
 
     Raises
     ------
@@ -231,7 +231,7 @@ class Lasting:
     low: float = np.nan
     high: float = np.nan
     ended_by: str = ""  # what ends flights above `high`, see `Drift`; or "border" of what was looked at; "" without one
-    growth_per_s: float = np.nan  # largest growth of a small motion during the flight at `high`
+    growth_per_s: float = np.nan  # largest growth of a mode during the flight at `high`
 
 
 def lasting_frequencies(
@@ -246,7 +246,7 @@ def lasting_frequencies(
 ) -> Lasting:
     """Where a floater that is let go with body spin 0 stays up, by its averaged flights along a branch of equilibria.
 
-    A flight is over where a small motion has grown by `e_folds`: seven are 3 µm, what is left of a launch over a plate,
+    A flight is over where a mode has grown by `e_folds`: seven are 3 µm, what is left of a launch over a plate,
     to 3 mm.  Growth is added up along the drift of the body spin.
 
     Parameters

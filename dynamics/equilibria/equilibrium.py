@@ -21,8 +21,8 @@ IN_PLATE, IN_ROTOR = "in the plate", "in the rotor"
 FOLD, NOT_CONVERGED, PAST_TABLE = "fold", "not converged", "past the plate's table"
 
 
+# Growth rate (1/s) up to which an unstable equilibrium is marginal: e-folding in 250 s, the article's criterion.
 MARGINAL = 0.004
-"""Growth rate (1/s) up to which an unstable equilibrium is marginal: e-folding in 250 s, the article's criterion."""
 
 
 # The slower and the faster of each kind, in the rotor's frame.
@@ -158,41 +158,28 @@ class Equilibrium:
     """One synchronous equilibrium, along the rotor's axes.
 
     Where a plate or tilted gravity forces the floater once a turn it is a periodic motion, and `state` its mean.
-
-    Parameters
-    ----------
-    state : position m, velocity m/s, moment direction, spin rad/s
-    spin : body spin s = Ω·m̂/ω
-    residual : largest unbalanced acceleration, as a part of gravity (or of ω²R without gravity)
-    position_error : estimated error of the position, from round-off and from the table's own error, m
-    stable : whether every small motion stays small; with drag, whether it dies out
-    growth_per_s : largest growth rate of a small motion, 1/s
-    growth_error_per_s : what round-off may do to it, 1/s
-    frequencies_hz : (k,) frequencies of the small motions in the rotor's frame
-    modes : the small motions by name
-    turn : (n, 3) the motion at equal intervals of a turn, the first at t = 0; None where it is at rest in this frame
-    currents : (n, k) states of the plate then, √J; None where the plate's currents are not modelled
-    without : the fixed point that it would be without the plate and with gravity along the axis
-    slope : (5, 5) derivatives of the scaled balances, see `Balance`; NaN for a periodic motion
-    jacobian : (12, 12) derivatives of the scaled state's rates by the state; NaN for a periodic motion
-    steady_frame : whether the rotor is at rest, so that its frame is the laboratory's
     """
 
-    state: State
-    spin: float
-    residual: float
-    position_error: float
-    stable: bool
-    growth_per_s: float
-    growth_error_per_s: float
-    frequencies_hz: Array
-    modes: tuple[Mode, ...] = ()
+    state: State  # position m, velocity m/s, moment direction, spin rad/s
+    spin: float  # body spin s = Ω·m̂/ω
+    residual: float  # largest unbalanced acceleration, as a part of gravity (or of ω²R without gravity)
+    position_error: float  # estimated error of the position, from round-off and from the table's own error, m
+    stable: bool  # whether no mode grows; with drag, whether all decay
+    growth_per_s: float  # largest growth rate of a mode, 1/s
+    growth_error_per_s: float  # what round-off may do to it, 1/s
+    frequencies_hz: Array  # (k,) frequencies of the modes in the rotor's frame
+    modes: tuple[Mode, ...] = ()  # by name
+    # (n, 3) the motion at equal intervals of a turn, the first at t = 0; None where it is at rest in this frame
     turn: State | None = None
+    # (n, k) states of the plate then, √J; None where the plate's currents are not modelled
     currents: Array | None = None
+    # the fixed point that it would be without the plate and with gravity along the axis
     without: Equilibrium | None = None
+    # (5, 5) derivatives of the scaled balances, see `Balance`; NaN for a periodic motion
     slope: Array = field(default_factory=lambda: np.full((5, 5), np.nan))
+    # (12, 12) derivatives of the scaled state's rates by the state; NaN for a periodic motion
     jacobian: Array = field(default_factory=lambda: np.full((12, 12), np.nan))
-    steady_frame: bool = False
+    steady_frame: bool = False  # whether the rotor is at rest, so that its frame is the laboratory's
 
     @property
     def stability(self) -> str:
@@ -314,18 +301,11 @@ def _extremes(values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ForceCurve:
-    """Axial force where everything else is balanced: figure "force against distance".
+    """Axial force where everything else is balanced: figure "force against distance"."""
 
-    Parameters
-    ----------
-    position : (n, 3) m, rotor's frame
-    moment : (n, 3) direction
-    magnetic_force : (n,) along +z, N
-    """
-
-    position: Array = field(metadata={"units": "m"})
-    moment: Array
-    magnetic_force: Array = field(metadata={"units": "N"})
+    position: Array = field(metadata={"units": "m"})  # (n, 3) m, rotor's frame
+    moment: Array  # (n, 3) direction
+    magnetic_force: Array = field(metadata={"units": "N"})  # (n,) along +z, N
 
 
 @dataclass(frozen=True, eq=False)

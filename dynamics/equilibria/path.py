@@ -91,23 +91,16 @@ class BalanceCurve(AtRest, ABC):
 
 @dataclass(frozen=True)
 class Steps:
-    """Step control along a curve.
+    """Step control along a curve."""
 
-    Parameters
-    ----------
-    longest, shortest : steps along the curve, in floater radii, rad and units of the parameters
-    turn : largest angle between the tangents at the ends of a step, rad
-    most : how many steps are tried at most
-    first : the first step, as a part of the longest
-    far : where the first three unknowns are a position farther than this from the origin, in floater radii, the longest
-        step grows with the distance, as the scale of the field does
-    """
-
+    # longest, shortest: steps along the curve, in floater radii, rad and units of the parameters
     longest: float = 0.05
     shortest: float = 1e-7
-    turn: float = 0.1
-    most: int = 2000
-    first: float = 1 / 8
+    turn: float = 0.1  # largest angle between the tangents at the ends of a step, rad
+    most: int = 2000  # how many steps are tried at most
+    first: float = 1 / 8  # the first step, as a part of the longest
+    # where the first three unknowns are a position farther than this from the origin, in floater radii, the longest
+    # step grows with the distance, as the scale of the field does
     far: float = np.inf
 
     def limits(self, points: Array) -> Array:
