@@ -28,23 +28,14 @@ from .article import (
     MODELS,
     QUICK,
     WEIGHT,
-    article_scene,
     label_of,
-    levitation_of,
     polar_angle,
     stable_in_flight,
 )
 from .article_formulas import field, force, side_radius
-from .drawing import (
-    by_configuration,
-    by_rotor,
-    configuration_panels,
-    explain,
-    plot_branch,
-    rotor_panels,
-    span,
-    text_table,
-)
+from .drawing import by_configuration, by_rotor, configuration_panels, explain, plot_branch, rotor_panels
+from .scenes import article_scene, levitation_of
+from .tables import span, text_table
 
 # On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
 DISTANCES = (15e-3, 20e-3, 25e-3, 30e-3, 40e-3)

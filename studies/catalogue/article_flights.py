@@ -22,22 +22,11 @@ from ...geometry.scene.contents import Scene
 from ..figures.style import PALETTE, legend_below, styled
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
-from .article import (
-    CONFIGURATIONS,
-    FLIGHT,
-    HIGHEST,
-    LOWEST,
-    QUICK,
-    WEIGHT,
-    article_scene,
-    conducting,
-    levitation_of,
-    polar_angle,
-    rotor_label,
-    stable_in_flight,
-)
+from .article import CONFIGURATIONS, FLIGHT, HIGHEST, LOWEST, QUICK, WEIGHT, polar_angle, rotor_label, stable_in_flight
 from .article_formulas import analytic_distance, balanced
-from .drawing import by_configuration, by_rotor, explain, plot_branch, rotor_panels, small_multiples, span, text_table
+from .drawing import by_configuration, by_rotor, explain, plot_branch, rotor_panels, small_multiples
+from .scenes import article_scene, conducting, levitation_of
+from .tables import span, text_table
 
 # Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.
 #
@@ -78,18 +67,17 @@ def distance_points(quick: bool) -> list[Point]:
 def levitation_distance(point: Point) -> xr.Dataset:
     """Distances of one rotor by one formula, or in one field, at all frequencies, see `DISTANCE_COLUMNS`."""
     grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
-    found = _by_formula(point, grid) if point["model"] in FORMULAS else _in_field(point, grid)
+    rotor, formula = (point["configuration"], point["value"]), point["model"]
+    if formula == "semi-analytic":
+        found = {"distance": np.array([balanced(*rotor, frequency, WEIGHT) for frequency in grid])}
+    elif formula == "analytic":
+        near = analytic_distance(*rotor, grid)
+        found = {"distance": np.stack([near, np.full(near.shape, np.nan)], axis=1)}
+    else:
+        found = _in_field(point, grid)
     frequency = variable(("frequency",), grid, "Hz", "frequency of the rotor")
     axes, sizes = {"side": list(SIDES), "frequency": frequency}, {"frequency": len(grid), "side": len(SIDES)}
     return recorded(point, DISTANCE_COLUMNS, found, axes, **sizes, flight=point["flights"])
-
-
-def _by_formula(point: Point, grid: Array) -> dict[str, Array]:
-    rotor = point["configuration"], point["value"]
-    if point["model"] == "semi-analytic":
-        return {"distance": np.array([balanced(*rotor, frequency, WEIGHT) for frequency in grid])}
-    near = analytic_distance(*rotor, grid)
-    return {"distance": np.stack([near, np.full(near.shape, np.nan)], axis=1)}
 
 
 def _in_field(point: Point, grid: Array) -> dict[str, Array]:

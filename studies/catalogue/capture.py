@@ -30,18 +30,10 @@ from ...geometry.scene.contents import Lowering, Scene
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
-from .article import (
-    CONFIGURATIONS,
-    QUICK_ROTORS,
-    article_plate,
-    article_scene,
-    conducting,
-    label_of,
-    levitation_of,
-    rotor_label,
-    stable_frequencies,
-)
-from .drawing import by_rotor, configuration_panels, text_table
+from .article import CONFIGURATIONS, QUICK_ROTORS, label_of, rotor_label
+from .drawing import by_rotor, configuration_panels
+from .scenes import article_plate, article_scene, conducting, levitation_of, stable_frequencies
+from .tables import text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
 """From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m."""
@@ -203,7 +195,10 @@ def capture(point: Point) -> xr.Dataset:
     how, states = launches(place, count, seed_of(*rotor, point["batch"]))
     ended = _flown(place, states, SETTLED)
     found |= {"rotor_frequency": place.scene.frequency, "distance": place.distance, "low": place.low}
-    found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": _outcomes(place, ended).astype(float)}
+    low = ended.last.position[:, 2] < -(place.distance + BELOW) / 2
+    outcome = np.where(ended.ended_by == CONTACT, np.where(low, PLATE, ROTOR), LOST)
+    outcome[ended.ended_by == DURATION] = HELD
+    found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": outcome.astype(float)}
     found |= {**how, "left_plate_table": ended.left_plate_table.astype(float)}
     if point["checked"]:
         first = State(*(v[: point["checked"]] for v in states.vectors))
@@ -216,12 +211,6 @@ def capture(point: Point) -> xr.Dataset:
 def _flown(place: Place, states: State, seconds: float, lowered: bool = False) -> Endings:
     memory = plate_under(place, lowered)
     return launched(replace(place.scene, plate=memory.plate), field_of(place), memory, states, seconds)
-
-
-def _outcomes(place: Place, ended: Endings) -> NDArray[np.int_]:
-    low = ended.last.position[:, 2] < -(place.distance + BELOW) / 2
-    touched = np.where(ended.ended_by == CONTACT, np.where(low, PLATE, ROTOR), LOST)
-    return np.where(ended.ended_by == DURATION, HELD, touched)
 
 
 def share(hits: ArrayLike) -> tuple[float, float, float]:

@@ -21,7 +21,6 @@ from ...geometry.common import Array
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..result import columns, variable
 from ..study import Point, Study
-from .drawing import text_table, uncertain
 from .experiment_design import design_row
 from .experiment_model import (
     EVEN,
@@ -44,6 +43,7 @@ from .experiment_model import (
     fitted,
     log_likelihoods,
 )
+from .tables import text_table, uncertain
 
 KEPT = 1000  # Draws of the posterior that are kept
 TOGETHER = 500  # Draws that are evaluated in one call

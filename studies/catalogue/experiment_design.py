@@ -37,8 +37,9 @@ from ...geometry.solids import moved
 from ..cli.options import FieldModel
 from ..result import variable
 from ..study import Point
-from .article import EDGE, FLOATER, REMANENCE, levitation_of
+from .article import EDGE, FLOATER, REMANENCE
 from .regions import spacer
+from .scenes import levitation_of
 
 GRAVITY = 9.81
 PER_MILLIMETRE = 5.0  # Tilt, in degrees, that does about what a millimetre of displacement does
@@ -210,14 +211,14 @@ class Levitating:
         named = {mode.name: mode.frequency_hz for mode in named_modes(small, scales.time)}
         effects = [slopes[0], *brakes, slopes[1]]
         units = np.array([1 / (2 * np.pi), *[1.0] * len(effects)]) / scales.time
-        grown = [units * motion for motion in first_order(state[0], bare, effects)]
+        grown = [units * motion for motion in _first_order(state[0], bare, effects)]
         return np.array([
             frequency, *drift, scales.length * np.hypot(*state[0, :2]), named.get("bounce", np.nan),
             small.growth / scales.time, *grown[0], *grown[1],
         ])  # fmt: skip
 
 
-def first_order(state: Array, slope: Array, added: Sequence[Array]) -> tuple[Array, Array]:
+def _first_order(state: Array, slope: Array, added: Sequence[Array]) -> tuple[Array, Array]:
     """(Scaled, angular) frequency of two small motions, and what each of the effects (12, 12) adds to their growth.
 
     They are the two that the first two effects make grow most; the side motion is the one that moves the place more.

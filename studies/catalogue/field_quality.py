@@ -29,7 +29,8 @@ from ..figures.style import PALETTE, legend_below, styled
 from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE
-from .drawing import explain, last_crossing, small_multiples, text_table
+from .drawing import explain, small_multiples
+from .tables import last_crossing, text_table
 
 # Where the point dipole, and models between it and the field of the finite magnets, can be trusted.
 #

@@ -25,19 +25,10 @@ from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import Levitation
 from ..result import AXIS, columns, variable
 from ..study import Point, Study, one_case, study_of_one
-from .article import article_scene, levitated_rotors, levitation_of, polar_angle
-from .drawing import (
-    by_configuration,
-    by_rotor,
-    configuration_panels,
-    explain,
-    last_crossing,
-    range_text,
-    rotor_panels,
-    rotor_places,
-    text_table,
-    uncertain,
-)
+from .article import polar_angle
+from .drawing import by_configuration, by_rotor, configuration_panels, explain, rotor_panels, rotor_places
+from .scenes import article_scene, levitated_rotors, levitation_of
+from .tables import last_crossing, range_text, text_table, uncertain
 
 # How wrong is the dipole? Levitation of the article's rotors by dipoles and by finite magnets, cause by cause.
 MODELS = ("article", "dipole", "cuboid", "fem", "mutual")
@@ -202,11 +193,13 @@ def dipole_lines(result: xr.Dataset) -> list[str]:
         for cause, models in causes
     ]
     head = ("change by", "distance (mm)", "polar angle (°)", "lowest (Hz)", "highest (Hz)", "axial mode (%)")
-    limits = [
-        (f"{rotor}, {model}", *_limits(part.isel(case=0).sel(model=model)))
-        for rotor, part in by_rotor(result)
-        for model in ("article", "cuboid", "fem", "mutual")
-    ]
+    limits = []
+    for rotor, part in by_rotor(result):
+        for model in ("article", "cuboid", "fem", "mutual"):
+            one, cells = part.isel(case=0).sel(model=model), [f"{rotor}, {model}"]
+            for name, kind in (("lowest", "low_kind"), ("highest", "high_kind")):
+                cells += [uncertain(one[name], one[f"{name}_error"]), one[kind].item()]
+            limits.append(cells)
     ends = text_table(("stable frequencies", "lowest (Hz)", "", "highest (Hz)", ""), limits)
     return [*text_table(head, rows), *ends, sentence(result)]
 
@@ -218,11 +211,6 @@ def _changes(part: xr.Dataset, models: tuple[str, str]) -> list[str]:
     relative, bounce = 100 / part["mode_frequency"].sel(model=models[0]), {"mode": "bounce"}
     value, error = ((each * relative).sel(bounce) for each in change(part, "mode_frequency", models))
     return [*cells, range_text(value, error)]
-
-
-def _limits(one: xr.Dataset) -> list[str]:
-    ends = (("lowest", "low_kind"), ("highest", "high_kind"))
-    return [text for name, kind in ends for text in (uncertain(one[name], one[f"{name}_error"]), one[kind].item())]
 
 
 def sentence(result: xr.Dataset) -> str:

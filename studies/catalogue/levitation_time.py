@@ -23,8 +23,10 @@ from ..cli.options import FieldModel
 from ..figures.style import PALETTE, legend_below, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
-from .article import FLOATER, PERMEABILITY, REMANENCE, article_scene, conducting, levitation_of
-from .drawing import explain, small_multiples, span, text_table
+from .article import FLOATER, PERMEABILITY, REMANENCE
+from .drawing import explain, small_multiples
+from .scenes import article_scene, conducting, levitation_of
+from .tables import span, text_table
 
 
 class DriftCase(NamedTuple):

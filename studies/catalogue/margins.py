@@ -1,6 +1,7 @@
 """How exactly a rotor must be made, and which rotor leaves the largest margin."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -35,27 +36,10 @@ from ..cli.options import FieldModel
 from ..figures.style import PALETTE, legend_below, styled
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
-from .article import (
-    CONFIGURATIONS,
-    FLOATER,
-    REMANENCE,
-    article_scene,
-    levitated_rotors,
-    levitation_of,
-    polar_angle,
-    stable_frequencies,
-)
-from .drawing import (
-    TITLES,
-    by_rotor,
-    configuration_panels,
-    explain,
-    rotor_panels,
-    rotor_places,
-    small_multiples,
-    text_table,
-    uncertain,
-)
+from .article import CONFIGURATIONS, FLOATER, REMANENCE, polar_angle
+from .drawing import TITLES, by_rotor, configuration_panels, explain, rotor_panels, rotor_places, small_multiples
+from .scenes import article_scene, levitated_rotors, levitation_of, stable_frequencies
+from .tables import text_table, uncertain
 
 # Which parameter matters: derivatives by each, and what realistic tolerances of all make of a rotor.
 MODEL: FieldModel = "cuboid"
@@ -296,6 +280,7 @@ def band(part: xr.Dataset, quantity: str) -> Array:
 
 def sensitivity_lines(result: xr.Dataset) -> list[str]:
     slopes, bands, leading, leans = [], [], [], []
+    names = [known.words for known in PARAMETERS.values()]
     for head, rotor in by_rotor(result):
         one = rotor.isel(case=0)
         slope, doubt = (one[name].sel(parameter="measure") for name in ("derivative", "derivative_error"))
@@ -303,24 +288,18 @@ def sensitivity_lines(result: xr.Dataset) -> list[str]:
         unit = CONFIGURATIONS[str(one["configuration"].values)].unit
         slopes.append((f"{head}, per {unit}", *ends, *(1e3 * slope.values[2:])))
         bands.append((head, *("{:.2f} ({:.2f} to {:.2f})".format(*band(one, name)) for name in SCALES)))
-        leading.append((head, *(_leading(one, quantity) for quantity in SCALES)))
+        sizes = [np.nan_to_num(contributions(one, quantity)[0]) for quantity in SCALES]
+        leading.append((head, *(", ".join(f"{names[k]} {s[k]:.2g}" for k in np.argsort(-s)[:3]) for s in sizes)))
         distance, growth = 1e3 * one["leaning_distance"].values, one["leaning_growth"].values
         leans.append((head, *(f"{d:+.4f}" for d in distance[1:] - distance[0]), *(f"{g:.1e}" for g in growth[1:])))
-    names = [f"{quantity} ({unit})" for quantity, (_, unit) in SCALES.items()]
+    units = [f"{quantity} ({unit})" for quantity, (_, unit) in SCALES.items()]
     tilted = [f"{words}, {tilt:g}°" for words in ("distance (mm)", "growth (1/s)") for tilt in TILTS]
     return [
         *text_table(("derivative", "lowest (Hz)", "highest (Hz)", *(f"{q} (mm)" for q in QUANTITIES[2:])), slopes),
-        *text_table((f"within tolerance: median, {BANDS}", *names), bands),
-        *text_table(("leading tolerances, one standard deviation", *names), leading),
+        *text_table((f"within tolerance: median, {BANDS}", *units), bands),
+        *text_table(("leading tolerances, one standard deviation", *units), leading),
         *text_table(("change with the axis tilted from the vertical", *tilted), leans),
     ]
-
-
-def _leading(one: xr.Dataset, quantity: str) -> str:
-    """The three parameters whose tolerances matter most."""
-    parts = np.nan_to_num(contributions(one, quantity)[0])
-    words = [known.words for known in PARAMETERS.values()]
-    return ", ".join(f"{words[k]} {parts[k]:.2g}" for k in np.argsort(-parts)[:3])
 
 
 ONE = "by one standard deviation"
@@ -358,13 +337,8 @@ class Design:
         return min(frequency - self.low.parameter, self.high.parameter - frequency) / frequency
 
 
-def first_guess(configuration: str, edge: float, distance: float, frequency: float) -> tuple[float, float, float]:
+def _first_guess(configuration: str, edge: float, distance: float, frequency: float) -> tuple[float, float, float]:
     """Displacement (mm) or tilt (°), side orbit's radius (m) and polar angle (rad) by the article's formulas.
-
-    Parameters
-    ----------
-    configuration, edge : of the rotor; edge of its cubes, m
-    distance, frequency : that are wanted, m and Hz
 
     Balance of the axial force of point dipoles to first order in the polar angle, solved for the measure; gravity kept.
     """
@@ -389,7 +363,7 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
     ------
     EquilibriumError : there is none, or the bodies would overlap
     """
-    measure, radius, angle = first_guess(configuration, edge, distance, frequency)
+    measure, radius, angle = _first_guess(configuration, edge, distance, frequency)
     place, moment = np.array([radius, 0.0, -distance]), np.array([np.sin(angle), 0.0, np.cos(angle)])
     known: list[tuple[float, float]] = []
     for _ in range(30):
@@ -401,18 +375,14 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
         place, moment, force = _lateral(scene, rates, place * distance / np.linalg.norm(place), moment)
         if known and abs(measure - known[-1][0]) < 1e-9 * measure:
             return _judged(scene, rates, measure, place, moment)
+        after = 1.01 * measure
+        if known:  # the secant's root
+            before, missed = known[-1]
+            step = -force * (measure - before) / (force - missed)
+            after = measure + float(np.clip(step, -0.2 * measure, 0.2 * measure))
         known.append((measure, force))
-        measure = _secant(known)
+        measure = after
     raise EquilibriumError("The search for the measure did not settle.")
-
-
-def _secant(known: list[tuple[float, float]]) -> float:
-    here, miss = known[-1]
-    if len(known) == 1:
-        return 1.01 * here
-    before, missed = known[-2]
-    step = -miss * (here - before) / (miss - missed)
-    return here + float(np.clip(step, -0.2 * here, 0.2 * here))
 
 
 def _lateral(scene: Scene, rates: Rates, place: Array, moment: Array) -> tuple[Array, Array, float]:
@@ -453,32 +423,13 @@ def design_points(quick: bool) -> list[Point]:
     ]  # fmt: skip
 
 
-def checked_by_elements(
-    configuration: str,
-    edge: float,
-    distance: float,
-    frequency: float,
-    first: float,
-    rtol: float = RTOL,
-    close: float = CLOSE_ENOUGH,
+def _checked_by_elements(
+    configuration: str, edge: float, distance: float, frequency: float, first: float, rtol: float, close: float
 ) -> Array:
-    """Measure corrected for the true field, and what a forward search then gives.
+    """Measure (mm or °) corrected for the true field, and what a forward search then gives.
 
-    Parameters
-    ----------
-    configuration, edge : of the rotor; edge of its cubes, m
-    distance, frequency : that are wanted, m and Hz
-    first : the measure by the closed form
-    rtol, close : accuracy of the field, and of the distance, m
-
-    Returns
-    -------
-    Measure (mm or °), distance (m) and its error (m) of the equilibrium nearest to the wanted distance, 1 if it is
-    stable, its growth (1/s).
-
-    Raises
-    ------
-    EquilibriumError : there is none, or the corrections do not settle
+    That is distance (m) and its error (m) of the equilibrium nearest to the wanted distance, 1 if it is stable, its
+    growth (1/s). Raises EquilibriumError where there is none, or the corrections do not settle.
     """
     measure, step = first, 1e-5
     slope = step / (designed(configuration, edge, distance + step, frequency).measure - first)  # by the closed form
@@ -517,28 +468,24 @@ CHECKED: dict[str, Any] = {
 def design(point: Point, rtol: float = RTOL, close: float = CLOSE_ENOUGH) -> xr.Dataset:
     """Measures and margins for each edge, and a forward check of the best of them by finite elements."""
     name, distance, frequency = point["configuration"], 1e-3 * point["distance_mm"], point["frequency"]
-    rows = np.array([_row(name, 1e-3 * edge, distance, frequency) for edge in point["edges_mm"]])
+    rows = np.full((len(point["edges_mm"]), len(NAMES)), np.nan)
+    for k, edge in enumerate(point["edges_mm"]):
+        with suppress(EquilibriumError):
+            found = designed(name, 1e-3 * edge, distance, frequency)
+            angle = float(np.degrees(polar_angle(found.here.state[6:9])))
+            ends = found.low.parameter, found.high.parameter
+            rows[k] = found.measure, found.margin, *ends, found.here.growth_per_s, angle
     margin = rows[:, list(NAMES).index("margin")]
     best = int(np.nanargmax(margin)) if np.isfinite(margin).any() else -1
     true = np.full(5, np.nan)
     if best >= 0 and margin[best] > 0:
         try:
             edge = 1e-3 * point["edges_mm"][best]
-            true = checked_by_elements(name, edge, distance, frequency, rows[best, 0], rtol, close)
+            true = _checked_by_elements(name, edge, distance, frequency, rows[best, 0], rtol, close)
         except EquilibriumError as error:
             note(str(error))
     edges = variable(("edge",), 1e-3 * np.array(point["edges_mm"]), "m", "edge of the cubes")
     return recorded(point, NAMES | CHECKED, (*rows.T, *true, distance, frequency, best), {"edge": edges})
-
-
-def _row(configuration: str, edge: float, distance: float, frequency: float) -> list[float]:
-    try:
-        found = designed(configuration, edge, distance, frequency)
-    except EquilibriumError:
-        return [np.nan] * len(NAMES)
-    angle = float(np.degrees(polar_angle(found.here.state[6:9])))
-    ends = found.low.parameter, found.high.parameter
-    return [found.measure, found.margin, *ends, found.here.growth_per_s, angle]
 
 
 def wishes(result: xr.Dataset) -> list[tuple[float, float, xr.Dataset]]:

@@ -28,17 +28,10 @@ from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with, each_case, study_of_one
-from .article import (
-    PLATE_CONDUCTIVITY,
-    PLATE_SIZE,
-    article_scene,
-    conducting,
-    levitated_rotors,
-    levitation_of,
-    rotor_label,
-    stable_frequencies,
-)
-from .drawing import explain, plain_log, range_text, small_multiples, text_table, uncertain
+from .article import PLATE_CONDUCTIVITY, PLATE_SIZE, rotor_label
+from .drawing import explain, plain_log, small_multiples
+from .scenes import article_scene, conducting, levitated_rotors, levitation_of, stable_frequencies
+from .tables import range_text, text_table, uncertain
 
 # What a plate does to each mode of the floater, against its place, conductivity, thickness, and the rotor.
 DISTANCE = 0.018  # Face below or beside the floater's centre in the sweeps over all else, m

@@ -26,21 +26,10 @@ from ..figures.style import COLORS, NAMES, PALETTE, legend_below, styled
 from ..levitation import Levitation
 from ..result import Columns, columns
 from ..study import Point, Study, cases_with, each_case, one_case, recorded
-from .article import (
-    CONFIGURATIONS,
-    EDGE,
-    FLIGHT,
-    MODELS,
-    QUICK_ROTORS,
-    article_plate,
-    article_scene,
-    conducting,
-    label_of,
-    levitated_rotors,
-    levitation_of,
-    stable_frequencies,
-)
-from .drawing import by_rotor, configuration_panels, explain, small_multiples, text_table
+from .article import CONFIGURATIONS, EDGE, FLIGHT, MODELS, QUICK_ROTORS, label_of
+from .drawing import by_rotor, configuration_panels, explain, small_multiples
+from .scenes import article_plate, article_scene, conducting, levitated_rotors, levitation_of, stable_frequencies
+from .tables import text_table
 
 # Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
 #

@@ -4,7 +4,6 @@ import base64
 import gzip
 import json
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -102,11 +101,15 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
         raise InputError(f"Input DIR must have results (*.nc) in it; instead {folder} has none.")
     parts = [_part(path) for path in paths]
     _fit(parts)
+    viewer = {}
+    if any("view" in part for part in parts):  # what draws the views, packed, and the text that stands for each
+        page = gzip.compress(turnable_page(PLACE))
+        viewer = {name: base64.b64encode(what).decode() for name, what in (("viewer", page), ("place", PLACE))}
     template = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
     text = (
         jinja2.Environment(autoescape=True)
         .from_string(template)
-        .render(folder=folder.resolve().name, parts=parts, **_viewer(parts))
+        .render(folder=folder.resolve().name, parts=parts, **viewer)
     )
     write_whole(out / "report.html", text.encode())
     return out / "report.html", [part["name"] for part in parts]
@@ -117,7 +120,8 @@ def _part(path: Path) -> dict[str, Any]:
     result = read_result(path)
     kind = str(result.attrs["study"])
     study = CATALOGUE.get(kind)
-    captions = {name: _described(draw) for name, draw in study.figures.items()} if study else {}
+    drawers = study.figures if study else {}
+    captions = {name: (getattr(draw, "func", draw).__doc__ or "").split("\n")[0] for name, draw in drawers.items()}
     pictures = [
         (captions.get(name, _caption(name)), _embedded(figure_bytes(figure, "png"), "png"))
         for name, figure in figures_of(result).items()
@@ -130,6 +134,8 @@ def _part(path: Path) -> dict[str, Any]:
         if f.exists()
     ]
     summary = _summary(path) if kind == "run" else {}
+    told = ("headline", "equilibria")  # by themselves
+    answers = {key: json.dumps(value, ensure_ascii=False) for key, value in summary.items() if key not in told}
     return {
         "name": path.stem,
         "summary": study.summary if study else SUMMARIES.get(kind, ""),
@@ -138,7 +144,7 @@ def _part(path: Path) -> dict[str, Any]:
         "pictures": pictures,
         "headline": summary.get("headline", result.attrs.get("headline", "")),
         "equilibria": summary.get("equilibria", []),
-        "answers": _answers(summary),
+        "answers": {key: text if len(text) <= LONGEST else f"{text[:LONGEST]} …" for key, text in answers.items()},
         **_view(result),
         "variables": [_row(name, values) for name, values in result.data_vars.items()],
         "provenance": {key: str(value) for key, value in result.attrs.items() if key != "failed_points"},
@@ -155,19 +161,6 @@ def _view(result: xr.Dataset) -> dict[str, str]:
         return {"view": base64.b64encode(drawn(replace(view, turnable=True))).decode()}
     except RenderError as error:
         return {"no_view": str(error)}
-
-
-def _viewer(parts: list[dict[str, Any]]) -> dict[str, str]:
-    """The program that draws the views, packed, and the text in it for which each view stands."""
-    if not any("view" in part for part in parts):
-        return {}
-    packed = gzip.compress(turnable_page(PLACE))
-    return {"viewer": base64.b64encode(packed).decode(), "place": base64.b64encode(PLACE).decode()}
-
-
-def _described(draw: Callable[..., Any]) -> str:
-    """The first line of what a study says of a figure."""
-    return (getattr(draw, "func", draw).__doc__ or "").split("\n")[0]
 
 
 def _embedded(content: bytes, kind: str) -> str:
@@ -200,13 +193,6 @@ def _summary(path: Path) -> dict[str, Any]:
         raise
     except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"Input {summary} must be a JSON object; instead: {error}.") from None
-
-
-def _answers(summary: dict[str, Any]) -> dict[str, str]:
-    """Its numbers as texts, but those that the page tells by themselves."""
-    told = {key: value for key, value in summary.items() if key not in ("headline", "equilibria")}
-    texts = {key: json.dumps(value, ensure_ascii=False) for key, value in told.items()}
-    return {key: text if len(text) <= LONGEST else text[:LONGEST] + " …" for key, text in texts.items()}
 
 
 def _row(name: Any, values: xr.DataArray) -> dict[str, str]:

@@ -190,16 +190,10 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
 
 def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
     """The scene at the end of the flight that a result holds, and its motion along the rotor's axes."""
-    scene = _at_end(parse_scene(str(result.attrs["scene"]), source), float(result["time"][-1]))
-    names = ("position", "velocity", "moment", "spin")
-    laboratory = State(*(result[name].values for name in names))
+    scene = parse_scene(str(result.attrs["scene"]), source)
+    if (plate := scene.plate) is not None and plate.lowering is not None:
+        down = np.array([0.0, 0.0, plate.lowering.depth(float(result["time"][-1]))])
+        box = replace(plate.box, center=plate.box.center - down)
+        scene = replace(scene, plate=replace(plate, box=box, lowering=None))
+    laboratory = State(*(result[name].values for name in ("position", "velocity", "moment", "spin")))
     return scene, laboratory.to_rotor(scene.angular_velocity * result["time"].values)
-
-
-def _at_end(scene: Scene, time: float) -> Scene:
-    """The scene with its plate where the lowering has brought it."""
-    plate = scene.plate
-    if plate is None or plate.lowering is None:
-        return scene
-    center = plate.box.center - np.array([0.0, 0.0, plate.lowering.depth(time)])
-    return replace(scene, plate=replace(plate, box=replace(plate.box, center=center), lowering=None))

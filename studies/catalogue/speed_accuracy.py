@@ -38,7 +38,8 @@ from ..processes import safe_path
 from ..result import columns, variable
 from ..study import study_of_one
 from .article import EDGE, REMANENCE
-from .drawing import explain, small_multiples, text_table
+from .drawing import explain, small_multiples
+from .tables import text_table
 
 Magnets = tuple[Magnet, ...]
 INNER_SPHERE = 0.0087  # Holds all sources of the article's cube, m

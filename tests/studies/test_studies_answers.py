@@ -17,10 +17,11 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
-from spinlev.studies.catalogue.article import FLOATER, article_scene
+from spinlev.studies.catalogue.article import FLOATER
 from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem, shifted_equilibrium
 from spinlev.studies.catalogue.margins import PARAMETERS, QUANTITIES, designed, levitation, nominal, scene_of, slope_by
 from spinlev.studies.catalogue.regions import stability_map
+from spinlev.studies.catalogue.scenes import article_scene
 
 
 @pytest.fixture(scope="module")
