@@ -36,7 +36,7 @@ from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_who
 FORMATS = {
     "rotor": 6,
     "mutual": 5,
-    "map": 2,
+    "map": 3,
     "plate": 2,
     "driven-plate": 2,
     "plate-currents": 2,

@@ -14,7 +14,7 @@ from ...geometry.overlap import body_overlap
 from ...geometry.scene.contents import Plate, Scene
 from ...geometry.shapes import Box
 from ...geometry.solids import Solid
-from .plate import PlateMemory, seen_by_plate
+from .plate import PlateMemory, raised, seen_by_plate
 from .state import Parameter, Vector, turned_about_z
 
 # The last: where the range of a plate's table ends, beyond which nobody knows its currents' field.
@@ -31,7 +31,7 @@ def flight_events(scene: Scene, position: Vector) -> Events:
     metres = [length * p for p in position]
     gaps = [_excess(body, metres) for body in scene.turning_bodies]
     if scene.plate is not None:
-        gaps.append(_excess(scene.plate.box, _plate_view(metres)))
+        gaps.append(_excess(scene.plate.box, raised(position)))
     within = (scene.floater.inner_radius / scene.floater.radius) ** 2  # its own contact is found at the samples
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
     return [*((gap / (length * length) - within, CONTACT) for gap in gaps), (reach, LOST)]
@@ -40,7 +40,7 @@ def flight_events(scene: Scene, position: Vector) -> Events:
 def range_events(memory: PlateMemory, position: Vector) -> Events:
     """Where a scaled position leaves the range of a plate's table."""
     region = memory.table.region
-    away = [x - float(c) for x, c in zip(seen_by_plate(memory, position), region.center, strict=True)]
+    away = [x - float(c) for x, c in zip(seen_by_plate(memory.plate, position), region.center, strict=True)]
     half = (region.upper - region.lower) / 2
     return [(1.0 - (a * a) / float(h) ** 2, BEYOND) for a, h in zip(away, half, strict=True)]
 
@@ -56,15 +56,6 @@ def _excess(body: Solid, position: Vector) -> hy.expression:
         outside = hy.relu(along[0] * along[0] + along[1] * along[1] - radius**2)
         beyond = [hy.sqrt(radius**2 + outside) - radius, beyond[2]]
     return hy.sum([b * b for b in beyond])
-
-
-def _plate_view(position: Vector) -> Vector:
-    """The position along the laboratory's axes, raised by what the plate has gone down, m."""
-    angle = hy.par[Parameter.RATE] * hy.time
-    depth = hy.par[Parameter.LENGTH] * (hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time)
-    cosine, sine = hy.cos(angle), hy.sin(angle)
-    x, y, z = position
-    return [cosine * x - sine * y, sine * x + cosine * y, z + depth]
 
 
 def lost_distance(start: Array) -> float:

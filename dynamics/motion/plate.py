@@ -31,7 +31,7 @@ from ...fem.plate.table import PlateTable, RotorShare
 from ...geometry.common import Array
 from ...geometry.scene.contents import Plate
 from .effect import Added
-from .state import Parameter, Vector, cross, dot, dotted, turned, turned_about_z
+from .state import Parameter, Vector, cross, dot, dotted, subtract, turned, turned_about_z
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ def memory_terms(
     """
     plate, table, lowered = memory.plate, memory.table, memory.plate.lowering is not None
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
-    place, pointing = seen_by_plate(memory, position), _product(plate.box.rotation.T, _turn(moment, 1.0))
+    place, pointing = seen_by_plate(plate, position), _product(plate.box.rotation.T, _turn(moment, 1.0))
     source = [strength * m for m in pointing]
     # x, y and z enter only after the sums over multipoles: every operation counts in Taylor's method
     flux, slopes = (table.multipoles.derivatives(place, order) for order in (1, 2))
@@ -166,13 +166,18 @@ def _rotor_terms(
     return strengths, lowering, -dotted(here, sums), spent + dotted(changing, sums)
 
 
-def seen_by_plate(memory: PlateMemory, position: Vector) -> Vector:
+def raised(position: Vector) -> Vector:
+    """A scaled position in the rotor's frame along the laboratory's axes, raised by what the plate has gone down, m."""
+    depth = hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time
+    x, y, z = _turn([hy.par[Parameter.LENGTH] * p for p in position], 1.0)
+    return [x, y, z + hy.par[Parameter.LENGTH] * depth]
+
+
+def seen_by_plate(plate: Plate, position: Vector) -> Vector:
     """A scaled position in the rotor's frame along the plate's axes, m, from its centre."""
-    plate, depth = memory.plate, hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time
-    lab = [hy.par[Parameter.LENGTH] * x for x in _turn(position, 1.0)]
-    if plate.lowering:
-        lab[2] = lab[2] + hy.par[Parameter.LENGTH] * depth
-    return _product(plate.box.rotation.T, [lab[i] - float(plate.box.center[i]) for i in range(3)])
+    return _product(
+        plate.box.rotation.T, subtract(raised(position), [hy.expression(float(c)) for c in plate.box.center])
+    )
 
 
 def _seen_by_rotor(plate: Plate, vector: Vector) -> Vector:

@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import heyoka as hy
 import numpy as np
@@ -76,6 +76,20 @@ def falling(size: Array) -> tuple[Array, Array]:
     return weights, (basis @ weights) ** -FALL
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Near:
+    """An effect as its table writes it, about a pose, or in a ball."""
+
+    first: int | None = None  # number of the first of its runtime parameters; None: as the table writes it
+    ball: BallField | None = None  # whose centre and radius are among the runtime parameters
+
+    def placed(self, first: int) -> Self:
+        return replace(self, first=first)
+
+    def in_ball(self, ball: BallField, first: int) -> Self:
+        return replace(self, ball=ball, first=first)
+
+
 MUTUAL = "mutual magnetisation"
 # Degrees of u, the three of V, and xx, xy, xz, yy, yz, zz of H in a ball; V is small.
 IN_BALL = (2, *(1, 1, 1), *(2, 2, 2, 2, 2, 2))
@@ -86,21 +100,12 @@ STEP = 0.02  # Of the differences of `rough_force`, in floater radii
 
 
 @dataclass(frozen=True, eq=False)
-class Mutual:
+class Mutual(_Near):
     """Rotor and floater magnetise each other."""
 
     table: MutualTable  # of their answers
     moment: float  # of the floater, A m²
     name: str = MUTUAL
-    # number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
-    first: int | None = None
-    ball: BallField | None = None  # whose centre and radius are among the runtime parameters
-
-    def placed(self, first: int) -> Mutual:
-        return replace(self, first=first)
-
-    def in_ball(self, ball: BallField, first: int) -> Mutual:
-        return replace(self, ball=ball, first=first)
 
     @property
     def count(self) -> int:
@@ -247,20 +252,11 @@ BRAKE_ALLOWED = 5e-3  # Error of S by its largest entry; the table has 1e-2 in c
 
 
 @dataclass(frozen=True, eq=False)
-class RotorCurrents:
+class RotorCurrents(_Near):
     """The brake of a table."""
 
     table: RotorLosses  # of the losses
     name: str = ROTOR_CURRENTS
-    # number of the first of its runtime parameters about a pose or in a ball; None: as the table writes it
-    first: int | None = None
-    ball: BallField | None = None  # whose centre and radius are among the runtime parameters
-
-    def placed(self, first: int) -> RotorCurrents:
-        return replace(self, first=first)
-
-    def in_ball(self, ball: BallField, first: int) -> RotorCurrents:
-        return replace(self, ball=ball, first=first)
 
     @property
     def count(self) -> int:

@@ -13,51 +13,33 @@ from ..harmonics.solid import (
     field_sizes,
     irregular_gradient,
     irregular_values,
-    regular_gradient,
-    regular_values,
 )
-from .columns import FieldMap, FieldMapError
 
 
 @dataclass(frozen=True, eq=False)
 class HarmonicBasis:
-    """Fields -∇Θ_lm about centres (sources inside the map) and -∇Υ_lm (sources around it, the background).
+    """Fields -∇Θ_lm about centres (sources inside the map).
 
-    The root mean square of a column on its sphere is 3/(2l+1), that of a background's 1. Unknowns (T) are fields there
-    then, and of a like size for every degree: in a magnet with corners each part of degree l falls as l^-3/2.
-    Order: the background, then degree by degree all centres; the first `count(L)` columns are the basis of degree L.
+    The root mean square of a column on its sphere is 3/(2l+1). Unknowns (T) are fields there then, and of a like size
+    for every degree: in a magnet with corners each part of degree l falls as l^-3/2. Order: degree by degree all
+    centres; the first `count(L)` columns are the basis of degree L.
     """
 
     centers: Array  # (k, 3) and (k,) m, spheres that hold the sources
     radii: Array
     degree: int  # highest degree about the centres
-    background_degree: int = 0  # highest degree of the background: 0 none, 1 uniform, 2 with uniform gradients
-    extent: float = 1.0  # radius of the background's sphere about the first centre, m
-
-    @property
-    def background_count(self) -> int:
-        return (self.background_degree + 1) ** 2 - 1
 
     def count(self, degree: int) -> int:
-        """Unknowns of the background and of all harmonics up to `degree`."""
-        return self.background_count + len(self.centers) * ((degree + 1) ** 2 - 1)
+        """Unknowns of all harmonics up to `degree`."""
+        return len(self.centers) * ((degree + 1) ** 2 - 1)
 
     def columns(self, points: Array) -> Array:
         """Fields (unknowns, 3, n) at points (n, 3) m."""
         result = np.empty((self.count(self.degree), 3, len(points)))
-        scaled = ((points - self.centers[0]) / self.extent).T
-        harmonics = regular_values(self.background_degree, *scaled)
-        degrees = np.arange(self.background_degree + 1.0)[:, None]
-        irregular = field_sizes(self.background_degree)
-        inverse = np.divide(1.0, irregular, out=np.zeros_like(irregular), where=irregular > 0)
-        # The mean of |Υ_lm|² is 1/((l-m)!(l+m)!(2l+1)), that of |grad f|² is l(2l+1) times that of f².
-        sizes = np.where(degrees.T == 0, 1.0, 2.0) * np.sqrt(degrees * (degrees + 1)) * inverse
-        for row, l, m in _terms(0, self.background_degree, 1):
-            _fill(result, row, m, regular_gradient(harmonics, l, m), sizes[l, m])
         sizes = _sizes(self.degree)
         for k, (center, radius) in enumerate(zip(self.centers, self.radii, strict=True)):
             harmonics = irregular_values(self.degree + 1, (points - center) / radius)
-            for row, l, m in _terms(self.background_count, self.degree, len(self.centers), k):
+            for row, l, m in _terms(self.degree, len(self.centers), k):
                 _fill(result, row, m, irregular_gradient(harmonics, l, m), sizes[l, m])
         return result
 
@@ -67,16 +49,10 @@ class HarmonicBasis:
         found = []
         for k in range(len(self.centers)):
             c = np.zeros((degree + 1, degree + 1), complex)
-            for row, l, m in _terms(self.background_count, degree, len(self.centers), k):
+            for row, l, m in _terms(degree, len(self.centers), k):
                 c[l, m] = (unknowns[row] + (1j * unknowns[row + 1] if m else 0)) / sizes[l, m]
             found.append(c)
         return found
-
-    def background_field(self, unknowns: Array) -> Array:
-        """(3,) T: the background at the first centre; zero where none was fitted."""
-        if not self.background_degree:
-            return np.zeros(3)
-        return np.asarray(unknowns[:3] @ self.columns(self.centers[:1] + self.extent)[:3, :, 0])
 
 
 def _sizes(degree: int) -> Array:
@@ -84,10 +60,10 @@ def _sizes(degree: int) -> Array:
     return field_sizes(degree) * ((2 * np.arange(degree + 1) + 1) / 3)[:, None]
 
 
-def _terms(start: int, degree: int, centers: int, k: int = 0) -> Iterator[tuple[int, int, int]]:
+def _terms(degree: int, centers: int, k: int) -> Iterator[tuple[int, int, int]]:
     """Row of the first unknown, degree and order of each harmonic about centre number k."""
     for l in range(1, degree + 1):
-        first = start + centers * (l * l - 1) + k * (2 * l + 1)
+        first = centers * (l * l - 1) + k * (2 * l + 1)
         for m in range(l + 1):
             yield first + max(2 * m - 1, 0), l, m
 
@@ -99,32 +75,6 @@ def _fill(result: Array, row: int, m: int, gradient: list[Array], size: float) -
         result[row, axis] = factor * gradient[axis].real
         if m:
             result[row + 1, axis] = -factor * gradient[axis].imag
-
-
-SUBSET = 2000  # Map points that are enough to find a centre
-# A dipole that leaves more than this part of the field's root mean square does not tell where its sources are.
-EXPLAINED = 0.7
-
-
-def find_center(field_map: FieldMap) -> Array:
-    """Centre (1, 3) m of the dipole that fits a map best, sought from the origin.
-
-    Raises FieldMapError: too few observations, or no dipole near the origin fits better than none.
-    """
-    field_map.require_observations(6)
-    some = field_map.where(np.linspace(0, len(field_map.points) - 1, min(len(field_map.points), SUBSET)).astype(int))
-    observed = np.isfinite(some.field)
-    values, scale = some.field.T[observed.T], float(np.abs(some.points).max())
-
-    def residual(center: Array) -> Array:
-        basis = HarmonicBasis(center[None] * scale, np.array([scale]), 1)
-        columns = basis.columns(some.points)[:, observed.T].T
-        return np.asarray(columns @ np.linalg.lstsq(columns, values, rcond=None)[0] - values)
-
-    found = scipy.optimize.least_squares(residual, np.zeros(3), x_scale=0.1)
-    if not np.linalg.norm(found.fun) < EXPLAINED * np.linalg.norm(values):
-        raise FieldMapError("Input centers must be given; instead received None, and one dipole does not fit the map.")
-    return np.asarray(found.x * scale).reshape(1, 3)
 
 
 # Groups of points, each of which is held out once: they choose the degree, and the fits without them differ.
@@ -178,7 +128,7 @@ def fit_harmonics(
     whole = parts.sum(axis=0)
     count = basis.count(1)
     dipoles = np.linalg.lstsq(whole[:count, :count], whole[:count, -2], rcond=1e-10)[0]
-    expected = float(np.abs(dipoles[basis.background_count :]).max()) or 1.0  # field (T) of the largest unknown
+    expected = float(np.abs(dipoles).max()) or 1.0  # field (T) of the largest unknown
     nothing = _misfit([whole], [np.zeros(0)])
     misfits = [nothing]
     for degree in range(1, basis.degree + 1):

@@ -29,7 +29,7 @@ from ..harmonics.expressions import FieldExpressions
 from ..harmonics.solid import Coefficients, derivative, field_sizes, field_spectrum, outer_sums
 from ..rotor.table import RangeError, RotorTable, error_below
 from .columns import METERS, TESLAS, UNITS, FieldMap, FieldMapError
-from .fit import FLOOR, MARGIN, HarmonicBasis, HarmonicFit, find_center, fit_harmonics
+from .fit import FLOOR, MARGIN, HarmonicBasis, HarmonicFit, fit_harmonics
 from .read import read_field_map
 
 SUBSET = 400  # Map points that are enough to compare
@@ -290,41 +290,36 @@ EDGE_SAFETY = 2.0
 
 def fit_field_map(
     field_map: FieldMap,
-    centers: ArrayLike | None = None,
+    centers: ArrayLike,
     radius: float | None = None,
     max_degree: int = 30,
-    background_degree: int = 0,
-    seed: int = 0,
 ) -> GriddedTable:
     """Fit multipole expansions to a map of B.
 
-    Raises FieldMapError: too few observations for a dipole, points inside a sphere of sources, or no centre found.
+    Raises FieldMapError: too few observations for a dipole, or points inside a sphere of sources.
 
     Parameters
     ----------
     field_map : what is known of B; without errors they are taken as a common fraction of B at each distance, and the
         misfit tells which
-    centers : (3,) or (k, 3) m, one for each body of sources, best at its middle (None: where one dipole fits best)
+    centers : (3,) or (k, 3) m, one for each body of sources, best at its middle
     radius : of the spheres about the centres that hold all sources, m; the table begins there (None: the distance
         of the nearest map point)
     max_degree : the degree is chosen up to this one, and so that every unknown has two observations
-    background_degree : degree of a field from far away that is fitted and left out of the table, since it does not
-        turn with the rotor (1: uniform, like the earth's; its value is in the provenance)
-    seed : of the generator that picks held-out groups
 
     Accuracy: B of a 10 mm cube, or of two that touch, on a 2 mm grid to 3e-6 at 13 mm. 1e5 observations about two
     centres take 20 s of processor time; it grows as the square of the number of centres.
     """
     start = time.perf_counter()
-    middle = find_center(field_map) if centers is None else np.asarray(centers, float).reshape(-1, 3)
+    middle = np.asarray(centers, float).reshape(-1, 3)
     distances = np.linalg.norm(field_map.points[:, None] - middle, axis=2)
     radii = _radii(distances, radius)
-    basis = _basis(field_map, middle, radii, max_degree, background_degree)
+    basis = _basis(field_map, middle, radii, max_degree)
     errors = field_map.errors
     if errors is None:  # the typical size of a component, T, that falls as a dipole's
         fall = distances.min(axis=1)[:, None] ** 3
         errors = np.repeat((float(np.sqrt(np.nanmean((field_map.field * fall) ** 2))) or 1.0) / fall, 3, axis=1)
-    fit = fit_harmonics(basis, field_map.points, field_map.field, errors, np.random.default_rng(seed))
+    fit = fit_harmonics(basis, field_map.points, field_map.field, errors, np.random.default_rng(0))
     wide = min(fit.degree + MARGIN, basis.degree)
     deviations = np.array([basis.coefficients(member, wide) for member in fit.deviations])
     if field_map.errors is not None:
@@ -333,7 +328,7 @@ def fit_field_map(
     expansions = tuple(MultipoleExpansion(*part) for part in zip(middle, radii, coefficients, strict=True))
     left_out = _left_out(basis, fit, field_map, distances, expansions)
     doubts = {"tail": left_out} if left_out else {}
-    provenance = _provenance(basis, fit, field_map, time.perf_counter() - start)
+    provenance = _provenance(fit, field_map, time.perf_counter() - start)
     region = _region(field_map, middle, radii)
     return GriddedTable(RotorTable("map", (), (), expansions, doubts, provenance), deviations, region)
 
@@ -351,12 +346,11 @@ def _radii(distances: Array, radius: float | None) -> Array:
     return np.full(distances.shape[1], float(radius))
 
 
-def _basis(field_map: FieldMap, centers: Array, radii: Array, max_degree: int, background_degree: int) -> HarmonicBasis:
-    extent = float(np.linalg.norm(field_map.points - centers[0], axis=1).max())
-    smallest = HarmonicBasis(centers, radii, 1, background_degree, extent)
+def _basis(field_map: FieldMap, centers: Array, radii: Array, max_degree: int) -> HarmonicBasis:
+    smallest = HarmonicBasis(centers, radii, 1)
     field_map.require_observations(2 * smallest.count(1))
     fitting = [d for d in range(1, max_degree + 1) if 2 * smallest.count(d) <= field_map.observations]
-    return HarmonicBasis(centers, radii, max(fitting), background_degree, extent)
+    return replace(smallest, degree=max(fitting))
 
 
 def _left_out(
@@ -406,15 +400,13 @@ def _region(field_map: FieldMap, centers: Array, radii: Array) -> Array:
     return np.array([[-np.inf] * 3, [np.inf] * 3]) if surrounds else corners
 
 
-def _provenance(basis: HarmonicBasis, fit: HarmonicFit, field_map: FieldMap, seconds: float) -> dict[str, str | float]:
-    uniform = basis.background_field(fit.unknowns)
+def _provenance(fit: HarmonicFit, field_map: FieldMap, seconds: float) -> dict[str, str | float]:
     return {
         "map_points": len(field_map.points),
         "observations": field_map.observations,
         "degree": fit.degree,
         "misfit": fit.misfit,
         "misfit_means": "relative" if field_map.errors is None else "per given standard error",
-        **{f"background_{axis}_T": float(b) for axis, b in zip("xyz", uniform, strict=True)},
         "seconds": seconds,
     }
 
