@@ -1,1 +1,1 @@
-"""What we learn: the command line, results, figures, sweeps."""
+"""Command line, results, figures, sweeps and studies."""

@@ -1,4 +1,4 @@
-"""Whether a scene's magnets demagnetise: the field along their easy axes, with the floater where it levitates."""
+"""Demagnetisation of a scene's magnets: the field along their easy axes, with the floater where it levitates."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -118,7 +118,7 @@ def working_point_answer(found: xr.Dataset) -> dict[str, Any]:
 
 
 def working_point_lines(answer: Mapping[str, Any]) -> list[str]:
-    """The same for a person."""
+    """Working points as lines for a person."""
     lines = [] if answer["floater_position_mm"] is not None else ["The floater has no equilibrium: it is left out."]
     for one in answer["working_points"]:
         text = (

@@ -1,4 +1,4 @@
-"""What acts on the floater beyond the rigid dipole: included or neglected, and what it changes."""
+"""Effects on the floater beyond the rigid dipole: included or neglected, and what each changes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -88,7 +88,7 @@ def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
 
 
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
-    """Those of the scene, or what those of a sintered magnet would be."""
+    """Eddy currents of the scene's floater, or what those of a sintered magnet would be."""
     scene, floater, growth = levitation.scene, levitation.scene.floater, None
     if floater.body is not None:
         return ListedEffect(FLOATER_CURRENTS, False, None, None, OF_SPHERES)
@@ -101,7 +101,7 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
 
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
-    """Those of the scene, or what those of sintered magnets, taken as balls, would be."""
+    """Eddy currents of the scene's rotor, or what those of sintered magnets, taken as balls, would be."""
     scene, growth, included = levitation.scene, None, levitation.losses is not None
     if scene.floater.body is not None:
         return ListedEffect(ROTOR_CURRENTS, False, None, None, OF_SPHERES)
@@ -141,7 +141,7 @@ def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
 
 
 def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
-    """How far mutual magnetisation moves an equilibrium, m.
+    """Shift of an equilibrium by mutual magnetisation, m.
 
     To first order by `answers` in the field `table` of the `scene`; without them to a factor of two.
     """
@@ -158,7 +158,7 @@ def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, 
 
 
 def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium, included: bool) -> float:
-    """What the floater's own currents add to the growth of the mode that grows fastest with them, 1/s.
+    """Change of the growth rate (1/s) of the mode that grows fastest with the floater's own currents.
 
     `included`: whether the motion of the `equilibrium`, in the field `table` of the `scene`, had them.
     """
@@ -176,7 +176,7 @@ def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium,
 
 
 def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:
-    """What losses in the rotor add to the growth of the mode that grows fastest with them, 1/s.
+    """Change of the growth rate (1/s) of the mode that grows fastest with the losses in the rotor.
 
     `included`: whether the motion of the `equilibrium` of the `scene` had these `losses`.
     """
@@ -185,7 +185,7 @@ def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses,
 
 
 def _growth(scene: Scene, fixed: Equilibrium, brake: Array, included: bool) -> float:
-    """What a part (12, 12) of the Jacobian, which it has or has not, adds to the growth, 1/s."""
+    """Change of the growth rate (1/s) by a part (12, 12) of the Jacobian, which has it or has not."""
     # To first order, of the mode that grows fastest with it: the fastest one without it may be another mode, and the
     # difference of their growth rates is no effect.
     scales = Scales.of(scene)

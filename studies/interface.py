@@ -1,4 +1,4 @@
-"""What one does from Python: the functions behind `import spinlev as sl`, which answer with labelled data."""
+"""The functions behind `import spinlev as sl`, which return labelled data."""
 
 from __future__ import annotations
 
@@ -67,17 +67,14 @@ def equilibria(
     ----------
     scene : Scene, str or Path
         The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    plate_model : {"auto", "none", "slab", "reduced", "fem"}
-        Model of the plate.
+    model, plate_model : str
+        Models of the rotor's field and of the plate, see `Models`.
     spin : float
         Body spin S = Ω·m̂/ω of the floater about its own moment.
     progress : bool
         Whether messages go to standard error.
     **asked
-        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
-        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
+        `rtol`, `plate_rtol` and `interaction`, see `Models`.
 
     Returns
     -------
@@ -112,17 +109,14 @@ def stability(
     ----------
     scene : Scene, str or Path
         The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    plate_model : {"auto", "none", "slab", "reduced", "fem"}
-        Model of the plate.
+    model, plate_model : str
+        Models of the rotor's field and of the plate, see `Models`.
     spin : float
         Body spin S = Ω·m̂/ω of the floater about its own moment.
     progress : bool
         Whether messages go to standard error.
     **asked
-        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
-        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
+        `rtol`, `plate_rtol` and `interaction`, see `Models`.
 
     Returns
     -------
@@ -160,15 +154,12 @@ def simulate(
         The scene, or the path of its file.
     duration : float
         Simulated time, s.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    plate_model : {"auto", "none", "slab", "reduced", "fem"}
-        Model of the plate.
+    model, plate_model : str
+        Models of the rotor's field and of the plate, see `Models`.
     progress : bool
         Whether messages go to standard error.
     **asked
-        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
-        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
+        `rtol`, `plate_rtol` and `interaction`, see `Models`.
 
     Returns
     -------
@@ -236,15 +227,12 @@ def plate_table(
     ----------
     scene : Scene, str or Path
         The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    plate_model : {"auto", "none", "slab", "reduced", "fem"}
-        Model of the plate.
+    model, plate_model : str
+        Models of the rotor's field and of the plate, see `Models`.
     progress : bool
         Whether messages go to standard error.
     **asked
-        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
-        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
+        `rtol`, `plate_rtol` and `interaction`, see `Models`.
 
     Returns
     -------
@@ -441,8 +429,7 @@ def sweep(
     progress : bool
         Whether messages and a progress bar go to standard error.
     **asked
-        `rtol` and `plate_rtol`, the relative accuracy asked of the field and of the plate's reaction; `interaction`
-        ("auto", "rigid", "mutual"), whether rotor and floater magnetise each other.
+        `rtol`, `plate_rtol` and `interaction`, see `Models`.
 
     Returns
     -------

@@ -69,7 +69,7 @@ def plate_memory(
 
 
 class Levitation(SceneTables):
-    """What one scene does, by the models that are asked for.
+    """Equilibria, stability and trajectory of one scene by the models that are asked for.
 
     Every member is computed when it is first used and then kept: the rotor's `table`, the `survey` of all equilibria,
     the currents of the `plate`, the `stability` of the equilibrium at which a `flight` begins, and its trajectory.
@@ -129,7 +129,7 @@ class Levitation(SceneTables):
 
     @property
     def labels(self) -> dict[str, str]:
-        """What a result says of its models."""
+        """Names of the models, for a result."""
         plate = self.plate.model if self.plate else "none"
         return {"model": self.table.model, "plate_model": plate, "interaction": self.interaction_model}
 
@@ -312,7 +312,7 @@ class Levitation(SceneTables):
         return LiveFlight(self.scene, self._with_effects(self.flight_table), self._known_for_flight, self.flight_plate)
 
     def _followed(self, place: Array, time: float) -> bool:
-        """Whether there is now a plate's table for a floater that left the last one at a place (3,) m at a time, s."""
+        """Make a table for a floater that left the last one at a place (3,) m and time, s; False where none can be."""
         memory = self.flight_plate
         assert memory is not None
         up = np.array([0.0, 0.0, 1.0])
@@ -330,7 +330,7 @@ class Levitation(SceneTables):
         return True
 
     def _plate_matters(self, flown: Trajectory) -> bool:
-        """Whether a plate that was left out where the flight began can be felt where it went; then it is there now."""
+        """Include a plate that was neglected at the start if it matters on the way; False if it does not."""
         plate = self.scene.plate
         if plate is None or self.plate is not None or self.models.plate_model != "auto" or self._nearest is not None:
             return False

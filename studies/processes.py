@@ -46,12 +46,12 @@ class NoProcessError(ComputationError):
 
 
 def program() -> str:
-    """What tells this version of the program from any other."""
+    """Digest of this version of the program."""
     return program_digest()
 
 
 def results(number: int, function: Function, items: deque[Any]) -> Generator[tuple[Any, Any], None, None]:
-    """What a function gives for each item, as it comes, with its item; a `Death` in place of what is missing.
+    """Results of a function for each item as they come, with their item; a `Death` in place of what is missing.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def results(number: int, function: Function, items: deque[Any]) -> Generator[tup
 
 
 def _fewer(left: int, why: str) -> int:
-    """So many processes as there are, if there are any."""
+    """The number of processes left. Raises NoProcessError where there are none."""
     if not left:
         raise NoProcessError(f"No process can begin: {why}.")
     return left
@@ -172,7 +172,7 @@ class _Process:
             self.connection.send_bytes(cloudpickle.dumps(what))  # functions of a notebook as well
 
     def receive(self) -> tuple[str, Any]:
-        """What kind of message it sent, and its content."""
+        """The kind of a message, and its content."""
         try:
             kind, content = pickle.loads(self.connection.recv_bytes())
         except (EOFError, OSError):

@@ -78,7 +78,7 @@ def _measure(scene: Scene) -> tuple[str, float] | None:
 
 
 def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
-    """Where a flight begins does not matter."""
+    """Search scenes together that have one rotor or one family of rotors; where a flight begins does not matter."""
     same: dict[str, list[Levitation]] = {}
     first_places = []
     for levitation, place in zip(alike, places, strict=True):
@@ -157,7 +157,7 @@ PARTS = 4  # batches of a small sweep: as many workers share it
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked at every point."""
+    """A quantity of a scene that is asked for at every point of a sweep."""
 
     scene: Scene  # whose parameters are varied
     source: str  # its name in messages
@@ -193,7 +193,7 @@ class Question:
         return self._answer(point, self.levitation(point))
 
     def prepared(self, points: Sequence[Point]) -> list[Callable[[], xr.Dataset]]:
-        """How to answer at each of the points, which share what they can; a point that cannot be says so when asked."""
+        """Functions that compute the points, which share what they can; one that cannot be raises when called."""
         jobs: list[Callable[[], xr.Dataset]] = [partial(self, point) for point in points]
         made = {}
         for k, point in enumerate(points):

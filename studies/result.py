@@ -180,7 +180,7 @@ def _left_out(left_out: LeftOut) -> dict[str, Any]:
 
 
 def left_out_text(left_out: Sequence[LeftOut]) -> str:
-    """The same of several, for an attribute of a dataset."""
+    """Solutions that are no equilibria, for an attribute of a dataset."""
     return "; ".join(f"{one.why}: {millimetres(one.known.position)}" for one in left_out)
 
 

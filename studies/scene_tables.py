@@ -1,4 +1,4 @@
-"""What a scene's motion is made of without its plate: tables that scenes share, equations, equilibria."""
+"""Tables that scenes share, and equations and equilibria of one scene without its plate."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ class SceneTables:
 
     @cached_property
     def answers(self) -> tuple[MutualTable | None, str]:
-        """What rotor and floater do to each other's magnetisation, or None; and why."""
+        """Mutual magnetisation of rotor and floater, or None; and why."""
         scene = self.scene
         known, why = mutual_plan(scene, self.table, self.models)
         if not known:

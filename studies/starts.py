@@ -1,4 +1,4 @@
-"""Where the trajectories of an ensemble begin: given, or drawn at random about where the scene begins."""
+"""Initial states of an ensemble: given, or drawn at random about that of the scene."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a study is: a pure function of one point, and the points at which it is asked."""
+"""Studies: a pure function of one point, and the points at which it is computed."""
 
 from __future__ import annotations
 

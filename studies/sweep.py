@@ -140,7 +140,7 @@ class Journal:
 
 
 def _program(study: Study) -> str:
-    """What computes a study's points: the program without the rooms that draw and say, and the study's own file."""
+    """Digest of what computes a study's points: the program without the rooms that draw and say, and its own file."""
     function = study.compute
     if isinstance(function, partial):  # of a study that is computed as a whole
         (function,) = function.args

@@ -1,4 +1,4 @@
-"""What the console says of equilibria, flights and effects: sentences and tables."""
+"""Sentences and tables about equilibria and trajectories, for the console."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -63,7 +63,7 @@ def spoken_time(seconds: float) -> str:
 
 
 def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out: Sequence[LeftOut] = ()) -> str:
-    """Where the floater of a `levitation` levitates and whether it remains there, by `equilibria` and `left_out`."""
+    """Levitation distance and stability in a `levitation`, by its `equilibria` and what was `left_out`."""
     useful = worth_a_row(equilibria)
     if not useful:
         why = "there is no equilibrium"
@@ -189,13 +189,13 @@ def comparison_words(compared: Mapping[str, Any] | None) -> list[str]:
 
 
 def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:
-    """How a flight went; one that lasted, but had begun at an unstable equilibrium, is no stable one."""
+    """Kind of a trajectory; one that lasted, but had begun at an unstable equilibrium, is no stable one."""
     kind = flight_kind(flight)
     return kind if kind != STABLE or levitation.absolute or levitation.stability.stable else GROWING
 
 
 def flight_words(levitation: Levitation, flight: Trajectory) -> str:
-    """How a flight went, in one sentence."""
+    """Outcome of a trajectory, in one sentence."""
     kind, time = kind_of_flight(levitation, flight), f"{flight.levitated_s:.4g} s"
     if flight.levitated_s >= 7200:
         time += f" ({flight.levitated_s / 3600:.4g} h)"
@@ -213,7 +213,7 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
 
 
 def plate_words(levitation: Levitation) -> list[str]:
-    """How well the plate's response is known, where that is worse than asked for."""
+    """Error of the plate's response, where it is larger than asked for."""
     memory, asked = levitation.flight_plate, levitation.models.plate_rtol
     if memory is None or memory.error <= asked:
         return []
@@ -222,7 +222,7 @@ def plate_words(levitation: Levitation) -> list[str]:
 
 
 def tell_details(flight: Trajectory) -> None:
-    """How exactly a flight was integrated, where the user wants to know everything."""
+    """Report how exactly a trajectory was integrated, with --verbose."""
     beyond, changes = flight.beyond_plate_table, flight.field_changes
     detail(
         f"Energy balance and unit length of the moment violated by {flight.energy_error:.1e} at most; "

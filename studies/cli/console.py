@@ -1,4 +1,4 @@
-"""What goes to the terminal: messages and progress, answers, and what to install where a library is missing."""
+"""Messages, progress and answers on the terminal, and what to install where a library is missing."""
 
 import codecs
 import ctypes
@@ -162,7 +162,7 @@ class Heartbeat(threading.Thread):
             self.start()
 
     def advanced(self, fraction: float, stage: str = "") -> None:
-        """How much of the step is finished, 0 to 1, or of one of its stages."""
+        """Finished share of the step, 0 to 1, or of one of its stages."""
         self._fraction, self._stage = fraction, stage
 
     def stop(self) -> None:
@@ -289,7 +289,7 @@ def answers_only() -> Iterator[TextIO]:
 
 
 def plain(value: Any) -> Any:
-    """The same value in types that JSON knows; what is not finite becomes null."""
+    """A value in types that JSON knows; what is not finite becomes null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

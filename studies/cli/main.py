@@ -82,7 +82,7 @@ def _told(error: Exception) -> str:
 
 
 def _unforeseen(error: Exception) -> str:
-    """What failed and where; of a library that the system lacks, what to do."""
+    """Message about what failed and where; of a library that the system lacks, what to do."""
     if is_missing_library(error):
         mend = f"{sys.executable} -m {__package__}.installation"
         return f"a library cannot be loaded: {error}. It may be enough to run {mend}. {way_out(FORTRAN)}"

@@ -1,4 +1,4 @@
-"""What is given on the command line and from Python, checked: numbers, points of a file, models, values to vary."""
+"""Checked input from the command line and Python: numbers, points of a file, models, values to vary."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command says: numbers for a program, lines for a person."""
+    """Answer of a command: numbers for a program, lines for a person."""
 
     values: Mapping[str, Any]
     lines: Sequence[str]
@@ -223,7 +223,7 @@ class Answer:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Workers:
-    """Who computes.
+    """Workers that compute.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How the command line begins: streams, signals and a home folder, before anything large is loaded."""
+"""Start of the command line: streams, signals and a home folder, before anything large is loaded."""
 
 from __future__ import annotations
 
