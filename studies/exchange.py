@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ import xarray as xr
 from ..dynamics.equilibria.search import free_of_bodies
 from ..dynamics.motion.state import State
 from ..fem.closed_forms.uniform import closed_form_error, fields_of_magnets, fields_of_sphere
-from ..fem.files import write_whole
+from ..fem.files import replacing
 from ..fem.rotor.choice import rotor_table
 from ..fem.rotor.near_field import near_field
 from ..geometry.common import MU_0, Array, InputError
@@ -174,10 +173,8 @@ def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[
 
 def _write_grid(path: Path, mesh: meshio.Mesh) -> None:
     """Write a mesh as VTU; the file is whole or absent."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "fields.vtu"
-        mesh.write(file)
-        write_whole(path, file.read_bytes())
+    with replacing(path) as temporary:
+        mesh.write(temporary)
 
 
 PLANES = {"xy": (0, 1, 2), "xz": (0, 2, 1), "yz": (1, 2, 0)}

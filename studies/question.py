@@ -40,32 +40,26 @@ def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], 
     places : their coordinates in the grid of what is varied
     equilibria : which of them need theirs without the plate: these are found together, the neighbours' as guesses
     """
-    groups: dict[str, list[int]] = {}
-    for k, levitation in enumerate(levitations):
-        groups.setdefault(levitation.equations_key, []).append(k)
+    first: dict[str, Levitation] = {}
     families: dict[str, list[int]] = {}
-    for key, members in groups.items():
-        for k in members[1:]:
-            levitations[k].share(levitations[members[0]])
-        asked = [k for k in members if equilibria[k] and levitations[k].scene.floater.body is None]
-        if asked:
-            families.setdefault(_family_key(levitations[asked[0]]) or key, []).extend(asked)
+    for k, levitation in enumerate(levitations):
+        levitation.share(first.setdefault(levitation.equations_key, levitation))
+        if equilibria[k] and levitation.scene.frequency and levitation.scene.floater.body is None:
+            families.setdefault(_family_key(levitation), []).append(k)
     for members in families.values():
         if len(members) > 1:
             with suppress(SpinlevError):  # what cannot be found here is left to each scene, which says why
                 _find_together([levitations[k] for k in members], np.array([places[k] for k in members]))
 
 
-def _family_key(levitation: Levitation) -> str | None:
-    """All but displacement or tilt that decides the equations of a lone magnet of the article; None for others."""
+def _family_key(levitation: Levitation) -> str:
+    """All that decides the equations, of a lone magnet of the article but its displacement or tilt."""
     scene = levitation.scene
-    if len(scene.rotor) > 1 or scene.conductors or scene.field_map:
-        return None
     with suppress(SpinlevError):
-        if found := _measure(scene):
+        if len(scene.rotor) == 1 and not scene.conductors and not scene.field_map and (found := _measure(scene)):
             home = equations_key(replace(scene, rotor=canonical(scene.rotor)), levitation.models)
             return f"{found[0]} {levitation.table.model} {levitation.interaction_model} {home}"
-    return None
+    return levitation.equations_key
 
 
 def _measure(scene: Scene) -> tuple[str, float] | None:
@@ -82,8 +76,6 @@ def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
     same: dict[str, list[Levitation]] = {}
     first_places = []
     for levitation, place in zip(alike, places, strict=True):
-        if not levitation.scene.frequency:
-            continue
         with suppress(SpinlevError):
             levitation.interaction  # noqa: B018  # equations are shared, the limits of what acts in each scene are not
             key = f"{startless_text(levitation.scene)} {levitation.spin!r}"

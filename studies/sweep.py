@@ -20,7 +20,7 @@ import xarray as xr
 from ..fem.cache import program_digest
 from ..fem.files import seal, unsealed, write_whole
 from ..geometry.common import ComputationError, InputError
-from .cli.console import note, progress, silence, to_json
+from .cli.console import note, progress, to_json
 from .cli.options import Workers
 from .processes import Death, NoProcessError, program, results
 from .study import Batch, Point, Prepared, Study
@@ -194,7 +194,7 @@ def computed(by: Workers, study: Study, points: Sequence[Point], missing: Set[in
         yield from _completed(_on_scheduler(by.scheduler, job, batches), batches, missing)
     elif number > 1:
         try:
-            yield from _completed(results(number, partial(silent, job), batches), batches, missing)
+            yield from _completed(results(number, job, batches), batches, missing)
         except NoProcessError as error:
             note(f"{error} The points are computed in this process, one after the other, as with --workers 1.")
     while batches:
@@ -224,12 +224,6 @@ def attempts(
                 yield k, job()
             except Exception as error:  # a sweep lives longer than its points: the reason is kept with the result
                 yield k, f"{type(error).__name__}: {error}"
-
-
-def silent(job: Any, batch: Batch) -> Iterator[Attempt]:
-    """Attempts in a worker, whose messages would come in between those of the others."""
-    with silence():
-        yield from job(batch)
 
 
 def _completed(
@@ -302,7 +296,7 @@ def _answers(client: Client, address: str, job: Any, batches: deque[Batch]) -> I
 
 def answered(asked_by: str, job: Any, batch: Batch) -> list[Attempt] | None:
     """The attempts of a worker at a `batch` by `job`; None where its program is not `asked_by`, the asking one's."""
-    return list(silent(job, batch)) if program() == asked_by else None
+    return list(job(batch)) if program() == asked_by else None
 
 
 def _workers_of_us(client: Client, address: str) -> list[str]:

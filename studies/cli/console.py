@@ -231,16 +231,6 @@ def heard(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
 
 
 @contextmanager
-def silence() -> Iterator[None]:
-    """No messages inside the block."""
-    before, ERRORS.quiet = ERRORS.quiet, True
-    try:
-        yield
-    finally:
-        ERRORS.quiet = before
-
-
-@contextmanager
 def progress(label: str) -> Iterator[Callable[..., None]]:
     """A progress bar where messages are heard; gives a function that takes the finished fraction and a new label."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
