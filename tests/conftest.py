@@ -71,4 +71,4 @@ def undrawn(monkeypatch):
     def written(pictures, progress, command):
         return iter([b"not drawn"] * len(pictures))
 
-    monkeypatch.setattr("spinlev.studies.figures.renderer._drawn", written)
+    monkeypatch.setattr("spinlev.studies.figures.renderer._rendered", written)

@@ -324,7 +324,7 @@ FORCE_CURVE = Study(
 )
 
 
-# The circle on which the floater goes with the rotor: its radius in the finite magnets' field, flown, by formula.
+# The circle on which the floater goes with the rotor: its radius in the finite magnets' field, simulated, by formula.
 KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
 """Speed upwards with which the flight begins, m/s; its duration, s; samples of its last turns that are kept."""
 FLOWN_HZ, TURNS = 170.0, 3
@@ -364,30 +364,30 @@ def side_mode(point: Point) -> xr.Dataset:
     for k, there in enumerate(branch.side("near", grid)):
         if there is not None:
             rows[k] = np.hypot(*there.position[:2]), -there.position[2], there.growth_per_s
-    flown = np.full((4, SAMPLES), np.nan)
+    simulated = np.full((4, SAMPLES), np.nan)
     start = branch.side("near", np.array([FLOWN_HZ]))[0] if all(point[k] == v for k, v in FLOWN.items()) else None
     if start is not None:
         flight = simulate(kicked(scene, start, KICK), field, SECONDS, [])
         times = flight.time[-1] - np.linspace(TURNS / FLOWN_HZ, 0.0, SAMPLES)
         place = [np.interp(times, flight.time, column) for column in flight.lab.position.T]
-        flown = np.array([2 * np.pi * FLOWN_HZ * times, *place])
+        simulated = np.array([2 * np.pi * FLOWN_HZ * times, *place])
     frequency = variable(("frequency",), grid, "Hz", "frequency of the rotor")
-    found = (*rows.T, side_radius(rows[:, 1], grid), *flown)
+    found = (*rows.T, side_radius(rows[:, 1], grid), *simulated)
     return recorded(point, SIDE_COLUMNS, found, {"frequency": frequency})
 
 
-def _predicted(flown: xr.Dataset) -> float:
+def _predicted(simulated: xr.Dataset) -> float:
     """The article's radius at the mean distance of the flight, mm."""
-    return 1e3 * float(side_radius(-float(flown["flight_z"].mean()), FLOWN_HZ))
+    return 1e3 * float(side_radius(-float(simulated["flight_z"].mean()), FLOWN_HZ))
 
 
 @styled
 def orbit_figure(result: xr.Dataset) -> Figure:
     """The orbit of rotor and floater seen from above, and their coordinates, in one flight."""
     figure, ((above, *others),) = panels(1, 3, (PAGE, 2.9))
-    flown = case_with(result, model="fem", **FLOWN)
-    circle, radius = np.linspace(0, 2 * np.pi, 200), _predicted(flown)
-    x, y, turned = 1e3 * flown["flight_x"], 1e3 * flown["flight_y"], flown["flight_angle"].values
+    simulated = case_with(result, model="fem", **FLOWN)
+    circle, radius = np.linspace(0, 2 * np.pi, 200), _predicted(simulated)
+    x, y, turned = 1e3 * simulated["flight_x"], 1e3 * simulated["flight_y"], simulated["flight_angle"].values
     above.plot(np.cos(circle), np.sin(circle), color=PALETTE[1], label="rotor's cube")
     above.plot(x, y, color=PALETTE[0], label="floater")
     above.plot(radius * np.cos(circle), radius * np.sin(circle), ":k", lw=1.6, label="radius a of the formula")
@@ -423,12 +423,12 @@ def radius_figure(result: xr.Dataset) -> Figure:
 
 def side_lines(result: xr.Dataset) -> list[str]:
     lines, rows = [], []
-    for flown in (case_with(result, model=model, **FLOWN) for model in MODELS):
-        radius = 1e3 * np.hypot(flown["flight_x"].values, flown["flight_y"].values)
+    for simulated in (case_with(result, model=model, **FLOWN) for model in MODELS):
+        radius = 1e3 * np.hypot(simulated["flight_x"].values, simulated["flight_y"].values)
         lines.append(
-            f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {flown['model'].item()}: radius {radius.mean():.4f} mm "
-            f"({span(radius, '.4f')}) at {-1e3 * float(flown['flight_z'].mean()):.3f} mm; "
-            f"𝒢/(μ_f ω²) = {_predicted(flown):.4f} mm."
+            f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {simulated['model'].item()}: radius {radius.mean():.4f} mm "
+            f"({span(radius, '.4f')}) at {-1e3 * float(simulated['flight_z'].mean()):.3f} mm; "
+            f"𝒢/(μ_f ω²) = {_predicted(simulated):.4f} mm."
         )
     for label, rotor in by_rotor(result):
         cells = []

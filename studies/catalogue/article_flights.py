@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.stats import binned_statistic
 
 from ...dynamics.continuation.branch import BranchPoint, Family
 from ...dynamics.continuation.frequencies import by_frequency, distance_error, kicked, levitating_branch
@@ -89,8 +90,8 @@ def _in_field(point: Point, grid: Array) -> dict[str, Array]:
     family = by_frequency(scene, levitation.rates)
     rows = np.array([[_distance_row(scene, field, family, p) for p in side] for side in found])
     fold = branch.fold
-    flown = found[0] if point["model"] == FLOWN else []
-    known = [p for p in flown if p is not None and stable_in_flight(p.growth_per_s)]
+    simulated = found[0] if point["model"] == FLOWN else []
+    known = [p for p in simulated if p is not None and stable_in_flight(p.growth_per_s)]
     places = np.unique(np.linspace(0, len(known) - 1, point["flights"] if known else 0).astype(int))
     flights = np.full((3, point["flights"]), np.nan)
     for k, place in enumerate(places):
@@ -161,8 +162,8 @@ def formulas_figure(result: xr.Dataset) -> Figure:
         for model, style in (("semi-analytic", ":"), ("analytic", "-.")):
             if model in rotor["model"].values:
                 axes.plot(frequency, 1e3 * _side(rotor, model, "near")[1], style, color=color)
-        flown = case_with(rotor, model=FLOWN)
-        axes.plot(flown["flight_frequency"], 1e3 * flown["flight_distance"], "x", ms=4, color=color)
+        simulated = case_with(rotor, model=FLOWN)
+        axes.plot(simulated["flight_frequency"], 1e3 * simulated["flight_distance"], "x", ms=4, color=color)
         axes.set_ylim(8, 62)
     key = {"point dipole, stable": "-", "unstable": "--", "semi-analytic formula": ":"}
     explain(rotors[0][0], key | {"analytic formula, no gravity": "-.", "simulated flight, mean": "x"})
@@ -207,10 +208,10 @@ def distance_lines(result: xr.Dataset) -> list[str]:
                     f"{configuration}, {model}: the levitated rotors lower the lowest frequency from {folds.max():.1f} "
                     f"to {folds.min():.1f} Hz, a factor of {folds.max() / folds.min():.2f}."
                 )
-    flown = cases_with(result, model=FLOWN)
+    simulated = cases_with(result, model=FLOWN)
     off_mean = [
         one["flight_distance"] - np.interp(one["flight_frequency"], one["frequency"], one["distance"].sel(side="near"))
-        for one in each_case(flown)
+        for one in each_case(simulated)
     ]
     worst = 1e6 * np.max(np.abs(off_mean), initial=0.0, where=np.isfinite(off_mean))
     if np.isfinite(off_mean).any():
@@ -308,12 +309,9 @@ def _flight_row(
 def _parts(flight: Trajectory) -> dict[str, Array]:
     """Time, and least, mean and largest distance in equal parts of a flight; NaN in parts without a sample."""
     edges = np.linspace(0.0, flight.time[-1], PARTS + 1)
-    place = np.clip(np.searchsorted(edges, flight.time, side="right") - 1, 0, PARTS - 1)
+    kinds = {"lowest": "min", "mean": "mean", "highest": "max"}
     distance = -flight.lab.position[:, 2]
-    found = {name: np.full(PARTS, np.nan) for name in ("lowest", "mean", "highest")}
-    for part in np.unique(place):
-        here = distance[place == part]
-        found["lowest"][part], found["mean"][part], found["highest"][part] = here.min(), here.mean(), here.max()
+    found = {name: binned_statistic(flight.time, distance, kind, edges).statistic for name, kind in kinds.items()}
     return {"time": (edges[1:] + edges[:-1]) / 2, **found}
 
 

@@ -37,11 +37,11 @@ from .experiment_model import (
     Unknown,
     corrected,
     courses,
-    drawn,
     ended,
     ends,
     fitted,
     log_likelihoods,
+    prior_values,
 )
 from .tables import text_table, uncertain
 
@@ -80,7 +80,7 @@ def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, 
     from dynesty import NestedSampler
 
     def likelihood(shares: Array) -> float:
-        known = log_likelihoods(models, drawn(shares[None]), facts)
+        known = log_likelihoods(models, prior_values(shares[None]), facts)
         return float(sum(value[0] for value in known.values()))
 
     generator = np.random.default_rng(seed)
@@ -92,8 +92,8 @@ def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, 
     found = sampler.results
     weights = np.exp(found.logwt - logsumexp(found.logwt))
     shares = found.samples[generator.choice(len(weights), KEPT, p=weights / weights.sum())]
-    each = log_likelihoods(models, drawn(shares), facts)
-    values = np.stack([drawn(shares)[name] for name in NAMES], axis=1)
+    each = log_likelihoods(models, prior_values(shares), facts)
+    values = np.stack([prior_values(shares)[name] for name in NAMES], axis=1)
     likelihoods = np.stack([each[name] for name in facts], axis=1)
     numbers = (values, likelihoods, found.logz[-1], found.logzerr[-1], np.sum(found.ncall))
     return dict(zip(POSTERIOR, numbers, strict=True))
@@ -110,7 +110,8 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
     """
     shares = qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws)
     shares = np.clip(shares, 1e-12, 1 - 1e-12)
-    parts = [log_likelihoods(models, drawn(part), facts) for part in np.array_split(shares, max(1, draws // TOGETHER))]
+    pieces = np.array_split(shares, max(1, draws // TOGETHER))
+    parts = [log_likelihoods(models, prior_values(part), facts) for part in pieces]
     known = np.stack([np.concatenate([part[name] for part in parts]) for name in facts], axis=1)
 
     def mean(logarithms: Array) -> Array:

@@ -215,10 +215,10 @@ TURNS = 4  # Corrections of the spin at a height, of which each leaves a tenth o
 WINDOW, DWELL = 0.2, 10.0
 """A floater is lost where twice the bounce is so near to precession (Hz) for so long (s), see docs/learned.md."""
 NARROWEST = 1e-4  # Of "lateral": nearer to zero the side motion is lost before it grows by currents
-Course = Mapping[str, Array]  # What becomes of n flights, by name, see `flown`
+Course = Mapping[str, Array]  # What becomes of n flights, by name, see `simulated`
 
 
-def flown(
+def simulated(
     surrogate: Surrogate, inputs: Array, frequency: Array, spin: Array, strengths: Array, longest: Array
 ) -> Course:
     """Flights of n rotors, in the units of the surrogate's scenes.
@@ -348,7 +348,7 @@ class Models:
     effects: Sequence[str] = ("floater", "rotor", "air")
 
     def conditions(self, values: Values, flight: Flight) -> tuple[Array, ...]:
-        """One flight of each of the rotors with drawn unknowns, as `flown` takes them."""
+        """One flight of each of the rotors with drawn unknowns, as `simulated` takes them."""
         kind, distance, frequency, longest = flight
         rotor, known, surrogate = _rotor(values, kind, distance), likeness(values), self.surrogates[kind]
         displacement = rotor["displacement"] / known["edge"]
@@ -421,7 +421,7 @@ def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[F
         own = [flight for flight in flights if flight[0] == kind]
         if own:
             asked = zip(*(models.conditions(values, flight) for flight in own), strict=True)
-            together = flown(surrogate, *map(np.concatenate, asked))
+            together = simulated(surrogate, *map(np.concatenate, asked))
             parts = {name: np.split(each, len(own)) for name, each in together.items()}
             found |= {flight: {name: each[k] for name, each in parts.items()} for k, flight in enumerate(own)}
     return found
@@ -570,7 +570,7 @@ UNKNOWNS = (
 NAMES = tuple(unknown.name for unknown in UNKNOWNS)
 
 
-def drawn(shares: Array, unknowns: Sequence[Unknown] = UNKNOWNS) -> dict[str, Array]:
+def prior_values(shares: Array, unknowns: Sequence[Unknown] = UNKNOWNS) -> dict[str, Array]:
     """Values (n,) by name at points (n, unknown) of the unit cube."""
     return {unknown.name: unknown.at(shares[:, k]) for k, unknown in enumerate(unknowns)}
 

@@ -250,8 +250,8 @@ def flights_figure(result: xr.Dataset) -> Figure:
     figure, rows = _rotors(result, "time (s)", "distance (mm)")
     for panel, _, rotor in rows:
         nominal, frequency = rotor.sel(variant="nominal"), rotor["frequency"].values
-        flown = np.flatnonzero(nominal["levitation_time"].values >= float(result.attrs["shortest_s"]))
-        shown = flown[np.unique(np.linspace(0, max(len(flown) - 1, 0), 6).astype(int))] if len(flown) else []
+        counted = np.flatnonzero(nominal["levitation_time"].values >= float(result.attrs["shortest_s"]))
+        shown = counted[np.unique(np.linspace(0, max(len(counted) - 1, 0), 6).astype(int))] if len(counted) else []
         for k, color in zip(shown, PALETTE, strict=False):
             time, distance = nominal["flight_time"][k], 1e3 * nominal["flight_distance"][k]
             panel.plot(time, distance, color=color, label=f"{frequency[k]:.3g} Hz")

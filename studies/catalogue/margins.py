@@ -184,7 +184,7 @@ def _off(base: Nominal, off: dict[str, float]) -> Array:
     return levitation(base, values, off.get(PLACE, 0.0))
 
 
-def drawn(base: Nominal, samples: int) -> tuple[Array, Array]:
+def sampled(base: Nominal, samples: int) -> tuple[Array, Array]:
     """What `samples` draws of the tolerances give (sample, quantity), and the draws (sample, parameter).
 
     A Latin hypercube: each parameter's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239).
@@ -216,7 +216,7 @@ def leaning(base: Nominal) -> tuple[Array, Array]:
 def sensitivity(point: Point) -> xr.Dataset:
     """Derivatives, tolerance band and tilt of one rotor."""
     base = nominal(point["configuration"], point["measure"], point["field"])
-    slopes, samples = derivatives(base, point["steps"]), drawn(base, point["samples"])
+    slopes, samples = derivatives(base, point["steps"]), sampled(base, point["samples"])
     lean = variable(("lean",), np.array([0.0, *TILTS]), "°", "tilt of the axis from the vertical")
     axes = {"parameter": list(PARAMETERS), "quantity": list(QUANTITIES), "fraction": list(FRACTIONS), "lean": lean}
     found = (levitation(base, base.values), *slopes, *samples, base.grid, *leaning(base))

@@ -16,7 +16,7 @@ from ...fem.files import write_whole
 from ...geometry.common import InputError
 from ...geometry.files import file_content
 from ..figures.pictures import seen_from
-from ..figures.renderer import RenderError, drawn, turnable_page
+from ..figures.renderer import RenderError, rendered, turnable_page
 from ..figures.run import question_lines
 from ..figures.style import figure_bytes
 from .entries import CATALOGUE
@@ -158,7 +158,7 @@ def _view(result: xr.Dataset) -> dict[str, str]:
     scene, motion = flight_of(result, "scene")
     try:
         view = seen_from(scene, result["time"].values, motion)
-        return {"view": base64.b64encode(drawn(replace(view, turnable=True))).decode()}
+        return {"view": base64.b64encode(rendered(replace(view, turnable=True))).decode()}
     except RenderError as error:
         return {"no_view": str(error)}
 

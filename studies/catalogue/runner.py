@@ -20,7 +20,7 @@ from ...geometry.scene.files import check_files, parse_scene
 from ..cli.console import note, progress
 from ..cli.options import Models, Workers, combinations
 from ..figures.pictures import flight_frames, last_view, plate_currents
-from ..figures.renderer import drawn, render, turnable_page
+from ..figures.renderer import render, rendered, turnable_page
 from ..figures.run import (
     drawable,
     field_figure,
@@ -183,7 +183,7 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     files = [str(picture), str(animation)]
     if html:
         turned = out / f"{path.stem}-view.html"
-        write_whole(turned, turnable_page(drawn(replace(view, turnable=True))))
+        write_whole(turned, turnable_page(rendered(replace(view, turnable=True))))
         files.append(str(turned))
     return files
 

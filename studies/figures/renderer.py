@@ -56,16 +56,16 @@ def render(
     for path in pictures:
         path.unlink(missing_ok=True)
     left = list(pictures)
-    for answer in _drawn(list(pictures.values()), progress, command):
+    for answer in _rendered(list(pictures.values()), progress, command):
         if isinstance(answer, str):
             names = ", ".join(path.name for path in left)
             raise RenderError(f"The 3-D pictures are left out ({names}): {answer}")
         write_whole(left.pop(0), answer)
 
 
-def drawn(picture: Picture) -> bytes:
+def rendered(picture: Picture) -> bytes:
     """One picture as the content of a file. Raises RenderError where it cannot be drawn."""
-    (answer,) = _drawn([picture], lambda fraction: None, COMMAND)
+    (answer,) = _rendered([picture], lambda fraction: None, COMMAND)
     if isinstance(answer, str):
         raise RenderError(f"The view in three dimensions is left out: {answer}")
     return answer
@@ -83,11 +83,11 @@ def turnable_page(scene: bytes) -> bytes:
 @cache
 def unavailable(command: Sequence[str] = COMMAND) -> str | None:
     """Why nothing can be drawn in three dimensions on this machine; None where a small picture can."""
-    (answer,) = _drawn([Sample()], lambda fraction: None, command)
+    (answer,) = _rendered([Sample()], lambda fraction: None, command)
     return f"No 3-D pictures can be drawn: {answer}" if isinstance(answer, str) else None
 
 
-def _drawn(
+def _rendered(
     pictures: Sequence[Picture], progress: Callable[[float], None], command: Sequence[str]
 ) -> Iterator[bytes | str]:
     """The files' contents, one after the other; where that fails, last the reason."""

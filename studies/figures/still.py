@@ -23,7 +23,7 @@ from .view import FINE, SEEN, Currents, Frames, View, arrow, near_plate, triangl
 
 NORTH, METAL, DARK = "#D55E00", "#9AA5B1", "#4C566A"
 PER_SECOND = 12
-FIELD, CURRENT = "B (mT)", "J (A/mm²)"
+FIELD, CURRENT = "field (mT)", "J (A/mm²)"  # VTK takes | for borders of cells
 BAR: dict[str, Any] = {"color": "black", "vertical": True, "position_y": 0.3, "height": 0.4}
 BAR |= {"title_font_size": 24, "label_font_size": 22}
 NAME: dict[str, Any] = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7}
@@ -197,7 +197,7 @@ def _add_turning(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
     """The axis, and above the rotor an arrow in the sense in which it turns: in front of the field's plane."""
     corners = _rotor_corners(scene)
     height, radius = float(corners[:, 2].max()) + 3.0, float(np.linalg.norm(corners[:, :2], axis=1).max())
-    angles = np.radians(np.linspace(-170, -25, 60))
+    angles = np.radians(np.linspace(-170, -60, 60))
     arc = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(60, height)])
     plotter.add_mesh(pv.MultipleLines(arc).tube(radius=0.45), color="black")
     tip = pv.Cone(center=arc[-1], direction=arc[-1] - arc[-3], height=4.0, radius=1.6, resolution=30)

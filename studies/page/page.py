@@ -141,20 +141,29 @@ class Page:
         found = controls(self.state)
         if len(found) > 1:
             self.layout.point.data = {"x": [found[0].value], "y": [found[1].value]}
-        self.quick.ask("", lambda: (work.preview, self.state), partial(self._found, self.number))
+        self.quick.ask("", lambda: (work.preview, self.state), partial(self._answered, self.number, False))
         if self.resting is not None:
             self.document.remove_timeout_callback(self.resting)
         self.resting = self.document.add_timeout_callback(self._rest, REST)
 
-    def _found(self, number: int, found: Shown) -> None:
-        """Numbers at once."""
-        if number > self.answered:
-            self._show(found, number, "" if self.state.is_preview else FOLLOW)
+    def _answered(self, number: int, complete: bool, found: Shown) -> None:
+        """Numbers at once, and later by the models asked for."""
+        waits = "" if complete or self.state.is_preview else FOLLOW
+        if complete:
+            self.slow.stop()
+            self.answered = number
+        elif number <= self.answered:
+            return
+        self.shown = found
+        self.document.hold("combine")
+        self.layout.numbers(found, number, waits)
+        self.document.unhold()
+        self.document.add_next_tick_callback(lambda: self._picture(found.lines))  # the numbers go first
 
     def _rest(self) -> None:
         self.resting = None
         self.layout.tell("address", self.state.query())
-        self.slow.ask("", lambda: (work.complete, self.state), partial(self._completed, self.number))
+        self.slow.ask("", lambda: (work.complete, self.state), partial(self._answered, self.number, True))
         if not work.has_map(self.state):
             self._forget_map(NO_MAP)
         elif (key := work.map_key(self.state)) != self.mapped:
@@ -165,18 +174,6 @@ class Page:
                 for points in POINTS:
                     call = (work.regions, state, (x, y), model, points)
                     self.mapper.ask((model, points), lambda call=call: call, self._map)  # type: ignore[misc]
-
-    def _completed(self, number: int, found: Shown) -> None:
-        self.slow.stop()
-        self.answered = number
-        self._show(found, number, "")
-
-    def _show(self, found: Shown, number: int, waits: str) -> None:
-        self.shown = found
-        self.document.hold("combine")
-        self.layout.numbers(found, number, waits)
-        self.document.unhold()
-        self.document.add_next_tick_callback(lambda: self._picture(found.lines))  # the numbers go first
 
     def _picture(self, lines: list[Array]) -> None:
         """The bodies, where they are others than those that are drawn, with the field's lines as far as they hold."""

@@ -84,7 +84,7 @@ class Worker:
 
     Parameters
     ----------
-    document : of the page, in whose turn answers are heard
+    document : of the page, in whose turn answers are received
     words, seconds : what the work is, and after how long it is cut off; what takes longer is for the command line
     failed : is told in a sentence why there is no answer
     patience : by how much others go first
@@ -96,30 +96,30 @@ class Worker:
         self.document, self.words, self.seconds, self.failed, self.patience = document, words, seconds, failed, patience
         self.process: ForkServerProcess | None = None
         self._waiting: dict[Hashable, tuple[Callable[[], tuple[Any, ...]], Callable[[Any], None]]] = {}
-        self._hear: Callable[[Any], None] | None = None
+        self._receive: Callable[[Any], None] | None = None
         self._limit: Any = None
 
     @property
     def busy(self) -> bool:
         """Whether an answer is still to come."""
-        return self._hear is not None
+        return self._receive is not None
 
     @property
     def waits(self) -> bool:
         """Whether a question still waits for its turn."""
         return bool(self._waiting)
 
-    def ask(self, key: Hashable, call: Callable[[], tuple[Any, ...]], heard: Callable[[Any], None]) -> None:
+    def ask(self, key: Hashable, call: Callable[[], tuple[Any, ...]], receive: Callable[[Any], None]) -> None:
         """Compute something when its turn comes.
 
         Parameters
         ----------
         key : an older question with this key that still waits is left out
         call : gives the function and its arguments when the turn has come
-        heard : gets the answer
+        receive : gets the answer
         """
         self._waiting.pop(key, None)
-        self._waiting[key] = call, heard
+        self._waiting[key] = call, receive
         self._go_on()
 
     def stop(self) -> None:
@@ -140,7 +140,7 @@ class Worker:
             return
         if self.process is None:
             self._begin()
-        call, self._hear = self._waiting.pop(next(iter(self._waiting)))
+        call, self._receive = self._waiting.pop(next(iter(self._waiting)))
         self._limit = self._loop.call_later(self.seconds, self._say, self.process, self._cut_off)
         with suppress(BrokenPipeError, ConnectionResetError):  # it has ended, as `_listen` will find
             self._connection.send(call())
@@ -171,11 +171,11 @@ class Worker:
         self.document.add_next_tick_callback(lambda: what() if self.process is process else None)
 
     def _answered(self, answer: Any, problem: str) -> None:
-        hear = self._rest()
+        receive = self._rest()
         if problem:
             self.failed(problem)
-        elif hear is not None:
-            hear(answer)
+        elif receive is not None:
+            receive(answer)
         self._go_on()
         if self.patience and not self.busy:  # gives its memory back; another one begins in hundredths of a second
             self.stop()
@@ -183,8 +183,8 @@ class Worker:
     def _rest(self) -> Callable[[Any], None] | None:
         if self._limit is not None:
             self._loop.remove_timeout(self._limit)
-        hear, self._hear, self._limit = self._hear, None, None
-        return hear
+        receive, self._receive, self._limit = self._receive, None, None
+        return receive
 
     def _cut_off(self) -> None:
         self.stop()

@@ -21,7 +21,7 @@ from spinlev.studies.catalogue.report import report_job
 from spinlev.studies.catalogue.runner import flight_of, read_result
 from spinlev.studies.cli.options import Models
 from spinlev.studies.figures.pictures import last_view
-from spinlev.studies.figures.renderer import drawn, turnable_page, unavailable
+from spinlev.studies.figures.renderer import rendered, turnable_page, unavailable
 from spinlev.studies.figures.view import View
 from spinlev.studies.run import simulate_job
 
@@ -99,7 +99,7 @@ def report(tmp_path_factory):
     result = read_result(folder / "trajectory.nc")
     scene, motion = flight_of(result, "trajectory.nc")
     view = last_view(scene, rotor_table(scene.rotor, "dipole"), motion)
-    (folder / "trajectory-view.html").write_bytes(turnable_page(drawn(replace(view, turnable=True))))
+    (folder / "trajectory-view.html").write_bytes(turnable_page(rendered(replace(view, turnable=True))))
     return folder
 
 
@@ -129,7 +129,7 @@ def test_the_view_to_turn_cuts_no_plate_off(tmp_path):
         pytest.skip(unavailable())
     place = np.array([0.0, 0.0, -0.019])
     view = View(load_scene(SCENES / "tilt-over-plate.toml"), place, np.array([0.0, 0.0, 1.0]), place[None].repeat(2, 0))
-    (tmp_path / "view.html").write_bytes(turnable_page(drawn(replace(view, turnable=True))))
+    (tmp_path / "view.html").write_bytes(turnable_page(rendered(replace(view, turnable=True))))
     picture = tmp_path / "view.png"
     browser(tmp_path, (tmp_path / "view.html").as_uri(), f"--screenshot={picture}")
     rows = np.asarray(Image.open(picture).convert("L"))

@@ -41,13 +41,13 @@ from spinlev.studies.catalogue.experiment_model import (
     Models,
     Surrogate,
     at_spin,
-    drawn,
     ends,
     exponents,
     fitted,
-    flown,
     likeness,
     log_likelihoods,
+    prior_values,
+    simulated,
     targets,
 )
 from spinlev.studies.catalogue.scenes import levitation_of
@@ -141,7 +141,7 @@ def test_the_stated_error_is_that_of_rotors_left_out_one_by_one():
 
 def test_priors_have_the_shares_that_they_say():
     shares = np.array([[0.16] * len(UNKNOWNS), [0.5] * len(UNKNOWNS)])
-    values = drawn(shares)
+    values = prior_values(shares)
     for unknown in UNKNOWNS:
         low, middle = values[unknown.name]
         assert low < middle
@@ -230,7 +230,7 @@ def test_flights_on_a_surrogate_are_the_averaged_ones(models):
     """δx = 1 mm with 2.3°: the fold, and 140 Hz for 250 s, within three times what the surrogate misses."""
     strengths, inputs = np.tile([1.0, 0.0, 0.0, 1.0], (2, 1)), np.tile(list(INPUTS.values()), (2, 1))
     frequency = np.array([118.0, 140.0])
-    course = flown(models.surrogates["single"], inputs, frequency, np.zeros(2), strengths, np.full(2, 250.0))
+    course = simulated(models.surrogates["single"], inputs, frequency, np.zeros(2), strengths, np.full(2, 250.0))
     scene = scene_of(INPUTS)
     bare, whole = levitation_of(scene, "cuboid"), levitation_of(in_air(scene), "cuboid")
     stable = levitating_ranges(scene, bare.table, bare.rates)[0]
@@ -267,7 +267,7 @@ def test_the_same_seed_gives_the_same_draws_to_the_last_bit(models):
 
 
 def test_no_fact_is_impossible_and_none_is_more_than_certain(models):
-    values = drawn(np.random.default_rng(0).uniform(size=(200, len(UNKNOWNS))))
+    values = prior_values(np.random.default_rng(0).uniform(size=(200, len(UNKNOWNS))))
     alone = {name: fact for name, fact in FACTS.items() if {flight[0] for flight in fact.flights} == {"single"}}
     for name, found in log_likelihoods(models, values, alone).items():
         assert (found > np.log(0.004)).all(), name
