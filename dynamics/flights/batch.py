@@ -206,13 +206,9 @@ class Endings:
     @classmethod
     def joined(cls, parts: Sequence[Endings]) -> Endings:
         vectors = zip(*(part.last.vectors for part in parts), strict=True)
-        return cls(
-            np.concatenate([part.ended_by for part in parts]),
-            np.concatenate([part.levitated_s for part in parts]),
-            State(*(np.concatenate(same) for same in vectors)),
-            np.concatenate([part.changes for part in parts]),
-            np.concatenate([part.left_plate_table for part in parts]),
-        )
+        names = ("ended_by", "levitated_s", "changes", "left_plate_table")
+        whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return cls(last=State(*map(np.concatenate, vectors)), **whole)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{np.sum(self.ended_by == end)} by {end}" for end in np.unique(self.ended_by))
@@ -245,7 +241,7 @@ def ensemble(
     """
     _check(scene, starts, duration)
     pieces = [slice(first, first + together) for first in range(0, len(starts.position), together)]
-    parts = mapped(partial(_ended, scene, table, duration), [State(*(v[p] for v in starts.vectors)) for p in pieces])
+    parts = mapped(partial(_ended, scene, table, duration), [starts[p] for p in pieces])
     return Endings.joined(list(parts))
 
 
@@ -259,7 +255,7 @@ def _check(scene: Scene, starts: State, duration: float) -> None:
 
 def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
     flight, count = _flight(scene, table, duration), len(starts.position)
-    flown = [_begun(flight, State(*(v[k] for v in starts.vectors)), duration, False) for k in range(count)]
+    flown = [_begun(flight, starts[k], duration, False) for k in range(count)]
     _fly(flown)
     return _endings(flown)
 
@@ -369,8 +365,7 @@ def launched(
     outside = ~memory.in_range(starts.position, np.repeat(plate_depth(memory.plate, np.zeros(1)), count))
     flown = []
     for k in range(count):
-        start = State(*(v[k] for v in starts.vectors))
-        course = flight.begin(start, duration, None if currents is None else currents[k])
+        course = flight.begin(starts[k], duration, None if currents is None else currents[k])
         if currents is None:
             course.state[12:-1] = own[k]
         flown.append(_Launch(course, bool(outside[k])))

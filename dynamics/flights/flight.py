@@ -353,17 +353,10 @@ class Course:
         """All that decides the rest, for a checkpoint, and the region (2, 3) m of the plate's table; zeros: none."""
         memory, recorder = self.flight.memory, self.recorder
         assert recorder is not None
-        return {
-            "time": self.time,
-            "state": self.state,
-            "values": self.values,
-            "times": recorder.times,
-            "states": recorder.states,
-            "interval": recorder.interval,
-            "steps": self.steps,
-            "changes": astuple(self.changes),
-            "region": np.zeros((2, 3)) if memory is None else [memory.table.region.lower, memory.table.region.upper],
-        }
+        content = {name: getattr(self, name) for name in ("time", "state", "values", "steps")}
+        content |= {name: getattr(recorder, name) for name in ("times", "states", "interval")}
+        region = np.zeros((2, 3)) if memory is None else [memory.table.region.lower, memory.table.region.upper]
+        return {**content, "changes": astuple(self.changes), "region": region}
 
     def restore(self, content: Mapping[str, Any]) -> None:
         assert self.recorder is not None

@@ -105,7 +105,7 @@ def plate_depth(plate: Plate, time: Array) -> Array:
     """How far the plate has gone down at `time` (n,) s, in m."""
     if plate.lowering is None:
         return np.zeros(len(time))
-    return np.array([plate.lowering.depth(float(t)) for t in time])
+    return np.clip((time - plate.lowering.start) * plate.lowering.speed, 0.0, plate.lowering.distance)
 
 
 def plate_legs(plate: Plate | None, duration: float) -> list[tuple[float, float, float]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, auto
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -85,6 +86,10 @@ class State:
     velocity: Array  # m/s
     moment: Array  # direction of the magnetic moment, a unit vector fixed in the body
     spin: Array  # angular velocity of the body, rad/s
+
+    def __getitem__(self, chosen: Any) -> State:
+        """One of many states, or some."""
+        return State(*(v[chosen] for v in self.vectors))
 
     def to_rotor(self, angle: ArrayLike) -> State:
         """Components along the rotor's axes, from those along the laboratory's; `angle` of the rotor in rad."""

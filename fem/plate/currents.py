@@ -30,10 +30,9 @@ from ...geometry.scene.contents import Plate
 from ..cache import TableKind
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..elements.spaces import Parity
-from .eddy import MESH_SHARE, EddySpace, Ladder, ShiftedSystem, Source
+from .eddy import CHUNK, MESH_SHARE, EddySpace, Ladder, ShiftedSystem, Source, source_images
 from .table import Region
 
-CHUNK = 16  # Sources handled at a time: bounds the memory
 # Component, moment's axis j, component of K and sign of what is not zero in e_j × K.
 CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 0, 2, -1.0), (1, 2, 0, 1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
 PROBES = 6  # Dipoles at places off the grid, beside those at the region's corners
@@ -106,15 +105,6 @@ def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: com
         for b_class, induct in zip(b, inductances, strict=True)
     ]
     return np.asarray(-shift * sum(parts))
-
-
-def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> Iterator[Array]:
-    """(classes, some sources, n, 3) parity parts of the sources' potentials at `points` (n, 3), T m."""
-    flips = parity.flips
-    mirrored = (points * flips[:, None]).reshape(-1, 3)
-    for start in range(0, len(sources), CHUNK):
-        some = [s.vector_potential(mirrored).reshape(len(flips), -1, 3) for s in sources[start : start + CHUNK]]
-        yield parity.project(np.stack(some, axis=1) * flips[:, None, None])
 
 
 def dipole_images(parity: Parity, points: Array, places: Array) -> Iterator[Array]:

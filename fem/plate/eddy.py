@@ -13,7 +13,7 @@ A `Ladder` solves at rising orders until a tolerance is met.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -34,6 +34,7 @@ from .table import OPTION
 
 # ωμ0σL² below which the response is resistive: A = a0 + iω a1, with a0 (charges) and a1 (currents) real and constant.
 # The slowest current of a plate decays in less than μ0σL²/100, so that this is exact to RESISTIVE²/1e4 = 1e-8.
+CHUNK = 16  # Sources handled at a time: bounds the memory
 RESISTIVE = 1e-2
 SILENT = 1e-9  # Parity parts smaller than this share of the whole source are not solved for
 
@@ -97,9 +98,7 @@ class EddySpace:
 
     def class_images(self, sources: Sequence[Source]) -> NDArray[np.float64]:
         """(classes, sources, n, 3) parity parts of the sources' potentials at the quadrature points, T m."""
-        flips = self.parity.flips
-        images = [[flip * s.vector_potential(self.points * flip) for s in sources] for flip in flips]
-        return self.parity.project(np.array(images))
+        return np.concatenate(list(source_images(self.parity, self.points, sources)), axis=1)
 
     def loads(self, potentials: Array) -> Array:
         """∫ σ A·v dV (sources, unknowns), S m³ T, of potentials (sources, n, 3) at the quadrature points, T m."""
@@ -137,6 +136,15 @@ class EddySpace:
         for edge in tree_edges(self._edges, self._conducting | region_edges(mesh, fixed)):
             free[int(edge)] = False
         return free
+
+
+def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> Iterator[Array]:
+    """(classes, some sources, n, 3) parity parts of the sources' potentials at `points` (n, 3), T m."""
+    flips = parity.flips
+    mirrored = (points * flips[:, None]).reshape(-1, 3)
+    for start in range(0, len(sources), CHUNK):
+        some = [s.vector_potential(mirrored).reshape(len(flips), -1, 3) for s in sources[start : start + CHUNK]]
+        yield parity.project(np.stack(some, axis=1) * flips[:, None, None])
 
 
 class ShiftedSystem:

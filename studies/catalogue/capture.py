@@ -201,7 +201,7 @@ def capture(point: Point) -> xr.Dataset:
     found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": outcome.astype(float)}
     found |= {**how, "left_plate_table": ended.left_plate_table.astype(float)}
     if point["checked"]:
-        first = State(*(v[: point["checked"]] for v in states.vectors))
+        first = states[: point["checked"]]
         later = _flown(place, first, SETTLED + LOWERED / LOWERING_SPEED + AFTER, lowered=True)
         found["settled"] = np.sum(later.levitated_s >= SETTLED)
         found["stayed"] = np.sum(later.ended_by == DURATION)

@@ -16,11 +16,10 @@ from spinlev.fem.plate.currents import (
     outer_box,
     outer_frequencies,
     solve_currents,
-    source_images,
     space_couplings,
     train,
 )
-from spinlev.fem.plate.eddy import MESH_SHARE, EddySpace, Ladder, solve_eddy
+from spinlev.fem.plate.eddy import MESH_SHARE, EddySpace, Ladder, solve_eddy, source_images
 from spinlev.fem.plate.rotor_share import rotor_box, turning_rotor
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import plate_and_rotor_table
