@@ -11,13 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..dynamics.motion.effects import mutual_choice
 from ..dynamics.motion.plate import PlateMemory
 from ..fem.maps_of_B.table import GriddedTable
 from ..fem.mutual.making import mutual_key
 from ..fem.plate.choice import resolve_plate_model
 from ..fem.plate.table import Region
-from ..fem.rotor.choice import resolve_model
 from ..fem.rotor.table import ROTOR, RotorTable
 from ..fem.rotor_metal import losses_key, pieces_of
 from ..geometry.common import Array, InputError, millimetre_size
@@ -37,21 +35,6 @@ PLATE_WORDS = {
     "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
     "reduced": "finite, {size}",
 }
-
-
-def field_plan(scene: Scene, asked: str, rtol: float) -> tuple[str, str]:
-    """The model of a `scene`'s rotor field that meets `rtol`, and why it is taken: the map if that is `asked` for."""
-    return (
-        ("map", "as asked") if asked == "map" else resolve_model(scene.rotor, asked, rtol, nearest_faces(scene.floater))
-    )
-
-
-def mutual_plan(scene: Scene, table: RotorField, models: Models) -> tuple[bool, str]:
-    """Whether rotor and floater of a `scene` magnetise each other, and why, in the field of `table` and by `models`.
-
-    Raises InputError as `mutual_choice`.
-    """
-    return mutual_choice(scene, table, models.interaction, models.rtol)
 
 
 @dataclass(frozen=True, eq=False)

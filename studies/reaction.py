@@ -1,8 +1,6 @@
 """The command `plate`: reaction tensor of the scene's plate at one place and frequency."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,15 +22,6 @@ NEAREST = 1e-3
 FARTHEST = 100.0
 TIGHTEST = 1e-5  # smallest tolerance that the finite elements reach in minutes
 LOWEST, HIGHEST = 0.5, 250.0  # frequencies for which a reduced table is made at least, Hz
-
-
-class Reaction(NamedTuple):
-    """Tensor G (3, 3), T/(A m²), laboratory frame, with its estimated relative error."""
-
-    model: str
-    tensor: ComplexArray
-    error: float
-    from_cache: tuple[str, ...] = ()
 
 
 def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: float, out: Path) -> Job:
@@ -58,12 +47,12 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
         )
     if not TIGHTEST <= rtol < 1:
         raise InputError(f"Input --rtol must be at least {TIGHTEST:g} and less than 1; instead received {rtol}.")
-    name, tensor, error, from_cache = MODELS[model](plate, place, frequency, rtol)
+    name, tensor, error, from_cache = response(plate, place, frequency, model, rtol)
     values = {
         "model": name,
         "error_estimate": error,
         "G_T_per_A_m2": {"real": tensor.real, "imag": tensor.imag},
-        "tables_from_cache": list(from_cache),
+        "tables_from_cache": from_cache,
     }
     write_whole(out / "plate.json", f"{to_json(values)}\n".encode())
     lines = [f"Reaction tensor at {frequency:g} Hz, T/(A m²), phasors e^(+iωt), laboratory frame:"]
@@ -71,50 +60,31 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
     return values, [*lines, f"Model {name}; estimated relative error {error:.1e}"]
 
 
-def _slab(plate: Plate, place: Array, frequency: float, rtol: float) -> Reaction:
-    """The plate as infinite along its two longer edges."""
-    body, size = plate.box.to_body(place), plate.box.size
+def response(
+    plate: Plate, place: Array, frequency: float, model: str, rtol: float
+) -> tuple[str, ComplexArray, float, list[str]]:
+    """Model, tensor G (3, 3), T/(A m²), laboratory frame, its estimated relative error, and tables from the cache."""
+    body, size, turn = plate.box.to_body(place), plate.box.size, plate.box.rotation
     normal = int(np.argmin(size))
     height = abs(body[normal]) - size[normal] / 2
+    if model == "auto":  # the infinite slab where the edges are too far to matter
+        model = "slab" if height > 0 and edge_error(plate, place) <= rtol else "fem"
+    if model == "fem":
+        note("Eddy currents by finite elements ...")
+        found = plate_reaction(plate, place, frequency, rtol)
+        return model, found.tensors[0], float(found.error_estimate[0]), []
+    if model == "reduced":
+        note("Plate table ...")
+        reach = NEARBY * float(plate.box.distance(place))
+        frequencies = LOWEST, max(HIGHEST, frequency)
+        table, cached = cached_plate_table(plate, Region(body - reach, body + reach), frequencies, rtol, note)
+        tensor = turn @ table.reaction_tensor(body, frequency)[0] @ turn.T
+        return model, tensor, table.errors.total, ["plate"] if cached else []
     if height <= 0:
         raise InputError(
             "Input --at must be over one of the plate's two largest faces for --model slab; instead it is beside them. "
             "Use --model fem."
         )
-    local = reaction_tensor(Slab(plate.conductivity, size[normal]), height, frequency)
-    along = plate.box.rotation[:, normal]
+    local, along = reaction_tensor(Slab(plate.conductivity, size[normal]), height, frequency), turn[:, normal]
     tensor = local[0, 0] * np.eye(3) + (local[2, 2] - local[0, 0]) * np.outer(along, along)
-    return Reaction("slab", tensor, edge_error(plate, place))
-
-
-def _fem(plate: Plate, place: Array, frequency: float, rtol: float) -> Reaction:
-    note("Eddy currents by finite elements ...")
-    found = plate_reaction(plate, place, frequency, rtol)
-    return Reaction("fem", found.tensors[0], float(found.error_estimate[0]))
-
-
-def _reduced(plate: Plate, place: Array, frequency: float, rtol: float) -> Reaction:
-    note("Plate table ...")
-    body, turn = plate.box.to_body(place), plate.box.rotation
-    reach = NEARBY * float(plate.box.distance(place))
-    frequencies = LOWEST, max(HIGHEST, frequency)
-    table, found = cached_plate_table(plate, Region(body - reach, body + reach), frequencies, rtol, note)
-    tensor = turn @ table.reaction_tensor(body, frequency)[0] @ turn.T
-    return Reaction("reduced", tensor, table.errors.total, ("plate",) if found else ())
-
-
-def _auto(plate: Plate, place: Array, frequency: float, rtol: float) -> Reaction:
-    """The infinite slab where the edges are too far to matter, else finite elements."""
-    normal = int(np.argmin(plate.box.size))
-    over_a_face = abs(plate.box.to_body(place)[normal]) > plate.box.half_edges[normal]
-    if over_a_face and edge_error(plate, place) <= rtol:
-        return _slab(plate, place, frequency, rtol)
-    return _fem(plate, place, frequency, rtol)
-
-
-MODELS: dict[str, Callable[[Plate, Array, float, float], Reaction]] = {
-    "slab": _slab,
-    "fem": _fem,
-    "reduced": _reduced,
-    "auto": _auto,
-}
+    return model, tensor, edge_error(plate, place), []

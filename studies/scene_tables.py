@@ -13,14 +13,14 @@ from ..dynamics.equilibria.equilibrium import Survey
 from ..dynamics.equilibria.search import FixedPoints, cached_points, survey
 from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.effect import Interaction, interaction_of
-from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, with_effects
+from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, mutual_choice, with_effects
 from ..dynamics.motion.equations import FORCE_ALONE
 from ..dynamics.motion.rates import Rates
 from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..fem.maps_of_B.table import GriddedTable, map_table
 from ..fem.mutual.making import cached_mutual_table, mutual_key
 from ..fem.mutual.table import MutualTable
-from ..fem.rotor.choice import cached_rotor_table, rotor_table
+from ..fem.rotor.choice import cached_rotor_table, resolve_model, rotor_table
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import Pieces, RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
 from ..geometry.common import InputError, Watch, shown, unwatched
@@ -33,8 +33,6 @@ from .plan import (
     check_way,
     equations_key,
     field_key,
-    field_plan,
-    mutual_plan,
     nearest_faces,
 )
 
@@ -126,9 +124,12 @@ class SceneTables:
         """
         scene, rtol, nearest = self.scene, self.models.rtol, nearest_faces(self.scene.floater)
         key = partial(field_key, scene, rtol=rtol)
-        name, reason = self._tables.once(f"model {key(model)}", lambda: field_plan(scene, model, rtol))
-        if model == "auto":
-            detail(f"Field model: {name} ({reason})")
+        name = model
+        if model != "map":
+            chosen = partial(resolve_model, scene.rotor, model, rtol, nearest)
+            name, reason = self._tables.once(f"model {key(model)}", chosen)
+            if model == "auto":
+                detail(f"Field model: {name} ({reason})")
         if name == "fem":
             make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest)
             return self._tables.table(key(name), name, "Rotor's field by finite elements", make)
@@ -140,7 +141,7 @@ class SceneTables:
     def answers(self) -> tuple[MutualTable | None, str]:
         """Mutual magnetisation of rotor and floater, or None; and why."""
         scene = self.scene
-        known, why = mutual_plan(scene, self.table, self.models)
+        known, why = mutual_choice(scene, self.table, self.models.interaction, self.models.rtol)
         if not known:
             return None, why
         title, make = (
