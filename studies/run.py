@@ -15,7 +15,7 @@ from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey
 from ..dynamics.equilibria.search import free_of_bodies
 from ..dynamics.flights.flight import Checkpoint, most_like_levitation, starting_point
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
-from ..fem.cache import owned, program_digest
+from ..fem.cache import program_digest
 from ..fem.files import write_whole
 from ..fem.rotor.near_field import NEAR_RTOL, CompleteTable, complete
 from ..fem.rotor.table import FieldTable, RotorTable
@@ -103,11 +103,6 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
 
     A checkpoint is kept while it lasts; `resume` goes on from there.
     """
-    with owned(out):
-        return _simulated(scene, asked, duration, out, resume)
-
-
-def _simulated(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
     asked_of = {"scene": scene_digest(scene), "duration_s": duration, **vars(asked)}
     identity = to_json({**asked_of, "program": program_digest()})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
@@ -171,7 +166,7 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         failure = error
         best = levitation.field(exact).model
         alone = dict.fromkeys(("dipole", best, chosen), survey)
-    compared = _compared(alone["dipole"], alone[best], best)
+    compared = compared_models(alone["dipole"], alone[best], best)
     result, flight = Result(levitation, survey, comparison=compared, failed=str(failure or "")), None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
@@ -208,8 +203,8 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
     return values, [*lines, f"Results and figures in {out}/"]
 
 
-def _compared(dipole: Survey, best: Survey, name: str) -> dict[str, Any] | None:
-    """Levitation distances (mm) by the point dipole and the field of the finite magnets, both without the plate.
+def compared_models(dipole: Survey, best: Survey, name: str) -> dict[str, Any] | None:
+    """Levitation distances (mm) by the point `dipole` and the `best` model, of this `name`, both without the plate.
 
     Of the dipole's equilibria the one nearest to where the floater levitates; None where one of both has none.
     """

@@ -185,9 +185,11 @@ def simulate(
     """
     positive("--duration-s", duration_s)
     loaded = _loaded(scene)
+    from ...fem.cache import owned
     from ..run import simulate_job
 
-    return Answer(*simulate_job(loaded, asked.checked(), duration_s, output.folder, resume), output.json)
+    with owned(output.folder):
+        return Answer(*simulate_job(loaded, asked.checked(), duration_s, output.folder, resume), output.json)
 
 
 def plate(

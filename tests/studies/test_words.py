@@ -24,6 +24,7 @@ from spinlev.geometry.shapes import Box
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.result import Result
+from spinlev.studies.run import compared_models
 from spinlev.studies.words import (
     bracketed,
     comparison_words,
@@ -135,6 +136,16 @@ def test_a_difference_below_its_error_is_none(apart, error, said):
     compared = {"true_model": "fem", "dipole_distance_mm": 18.83, "difference_mm": apart, "difference_error_mm": error}
     (line,) = comparison_words(compared | {"dipole_stability": "stable", "true_stability": "stable"})
     assert line == f"Point-dipole model, same conditions: levitation distance {said}"
+
+
+def test_the_dipole_is_compared_whatever_its_stability():
+    """With its equilibrium that is nearest to where finite elements have the floater levitate."""
+    near, far = equilibrium(stable=False, growth=0.1), equilibrium(stable=False, growth=0.2)
+    far = replace(far, state=State(far.position - [0.0, 0.0, 0.02], np.zeros(3), far.state.moment, np.zeros(3)))
+    found = compared_models(Survey((far, near), ()), Survey((equilibrium(),), ()), "fem")
+    assert (found["dipole_stability"], found["true_stability"], found["difference_mm"]) == ("unstable", "stable", 0.0)
+    (line,) = comparison_words(found)
+    assert "levitation distance 17.21 mm (unstable), no difference" in line
 
 
 def test_a_flight_from_an_unstable_equilibrium_is_never_called_stable():
