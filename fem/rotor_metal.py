@@ -108,16 +108,12 @@ def flat(values: Array) -> Array:
     return values.reshape(-1, values.shape[-1])
 
 
-def metal_of(bodies: Sequence[Solid], conductivity: float, order: int) -> Metal:
+def metal_of(bodies: Sequence[Solid] | SolidMesh, conductivity: float, order: int) -> Metal:
     """Mesh and factorise metal (`conductivity`, S/m) of `bodies` that touch, with elements of degree `order`.
 
     Raises TooLargeError: the memory does not hold the system.
     """
-    return metal_on(mesh_metal(bodies), conductivity, order)
-
-
-def metal_on(mesh: SolidMesh, conductivity: float, order: int) -> Metal:
-    """The same, with `conductivity` and `order`, on a mesh that is there."""
+    mesh = bodies if isinstance(bodies, SolidMesh) else mesh_metal(bodies)
     space = ng.H1(mesh.mesh, order=order)
     free = space.FreeDofs()
     free[0] = False

@@ -58,7 +58,7 @@ class PassiveNetwork:
     couplings: Callable[[Sequence[Source]], Array]
     # for a tolerance of reaction tensors the multipoles, their weights (states, k), 1/√J, and the error that they
     # leave, which may be more
-    field_functions: Callable[[float, Watch], tuple[Multipoles, Array, float]]
+    field_functions: Callable[[PassiveNetwork, float, Watch], tuple[Multipoles, Array, float]]
     mesh_error: float  # estimated relative errors of reaction tensors
     state_error: float
     provenance: Mapping[str, str | float]  # how it was made; texts and numbers
@@ -248,7 +248,7 @@ def from_elements(
         every = np.concatenate(rates)
         return PassiveNetwork(
             plate, region, frequencies, every, lambda sources: by_state(held.couplings(sources)),
-            partial(_functions, plate, region, frequencies, every, lambda at: by_state(held.dipole_couplings(at))),
+            partial(_functions, lambda places: by_state(held.dipole_couplings(places))),
             solution.mesh_error, state_error + space_error,
             {"ngsolve": version("ngsolve"), "order": float(space.order), "cells": float(space.cells)}, solution.seconds,
         )  # fmt: skip
@@ -257,20 +257,15 @@ def from_elements(
 
 
 def _functions(
-    plate: Plate,
-    region: Region,
-    frequencies: tuple[float, float],
-    rates: Array,
-    dipole_couplings: Callable[[Array], Array],
-    rtol: float,
-    watch: Watch,
+    dipole_couplings: Callable[[Array], Array], network: PassiveNetwork, rtol: float, watch: Watch
 ) -> tuple[Multipoles, Array, float]:
     """`PassiveNetwork.field_functions` from the fields on the region's surface, which determine those within."""
+    region, rates = network.region, network.rates
     extent = region.upper - region.lower
     x, y, z = np.clip(np.ceil(13 * np.sqrt(extent / extent.max())), 6, 13).astype(int)  # more along the longer edges
     points = region.surface((int(x), int(y), int(z)))
     values = dipole_couplings(points).T.reshape(len(rates), -1, 3)
-    low, high = (2 * np.pi * f for f in frequencies)
+    low, high = (2 * np.pi * f for f in network.frequencies)
     middle = np.sqrt(low * high)
     state_scale = 1 / np.sqrt(rates + middle)
     point_scale = 1 / np.sqrt(np.sum((values * state_scale[:, None, None]) ** 2, axis=(0, 2)))
@@ -278,7 +273,7 @@ def _functions(
     def worst(error: Array) -> float:
         return max(tensor_error(values, error, rates, omega) for omega in (low, middle, high))
 
-    choice = candidates(region, plate.box.half_edges, DEGREE if rtol >= STRICT else STRICT_DEGREE)
+    choice = candidates(region, network.plate.box.half_edges, DEGREE if rtol >= STRICT else STRICT_DEGREE)
     fit = fit_multipoles(
         choice, points, values, state_scale, point_scale, rtol,
         lambda error: worst(error) <= FUNCTION_SHARE * rtol, watch=watch,

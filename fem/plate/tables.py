@@ -142,7 +142,7 @@ def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> 
     """
     start = time.perf_counter()
     watch("field functions of the plate", 0.0)
-    multipoles, weights, error = network.field_functions(rtol, watch)
+    multipoles, weights, error = network.field_functions(network, rtol, watch)
     seconds = network.seconds + time.perf_counter() - start
     return PlateTable(
         network.plate.box.size, network.plate.conductivity, network.region, network.frequencies, network.rates,

@@ -230,7 +230,7 @@ def from_slab(
 
         return PassiveNetwork(
             plate, region, frequencies, np.concatenate([rates[0], *(np.tile(part, 2) for part in rates[1:])]),
-            couplings, partial(_functions, waves, region, frequencies, rates, fields), sums_error, state_error,
+            couplings, partial(_functions, waves, rates, fields), sums_error, state_error,
             {"conductor": "infinite slab", "wave_numbers": float(len(modes.rates)),
              "modes": float(modes.rates.shape[1])},
             time.perf_counter() - start,
@@ -263,10 +263,9 @@ def _sums_error(waves: SlabWaves, places: Array, sources: Array, frequency: floa
 
 def _functions(
     waves: SlabWaves,
-    region: Region,
-    frequencies: tuple[float, float],
     rates: Sequence[Array],
     fields: Sequence[Array],
+    network: PassiveNetwork,
     rtol: float,
     watch: Watch,
 ) -> tuple[Multipoles, Array, float]:
@@ -275,7 +274,7 @@ def _functions(
     Each order is fitted where cos mφ = sin mφ, so that all three components show.
     """
     tolerance = FUNCTION_SHARE * rtol
-    grid = meridian(region, waves.frame, POINTS)
+    grid = meridian(network.region, waves.frame, POINTS)
     radius, height = grid[:, 0], grid[:, 2]
     places = grid[(radius == radius.max()) | (height == height.min()) | (height == height.max())]
     amplitudes = waves.amplitudes(local_dipoles(waves.frame, places))
@@ -283,7 +282,7 @@ def _functions(
     signals = [amplitudes[:, :, m] @ field.T for m, field in enumerate(fields)]
     shown = [(s.real - s.imag) / np.sqrt(2) if m else s.real for m, s in enumerate(signals)]
     values = [part.T.reshape(part.shape[1], len(places), 3) for part in shown]
-    omegas = 2 * np.pi * np.geomspace(*frequencies, 3)
+    omegas = 2 * np.pi * np.geomspace(*network.frequencies, 3)
     doubled = np.concatenate([np.tile(part, 2) for part in rates])
     scales = [1 / np.sqrt(part + omegas[1]) for part in rates]
     point_scale = 1 / np.linalg.norm(

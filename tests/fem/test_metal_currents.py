@@ -13,7 +13,6 @@ from spinlev.fem.rotor_metal import (
     ball_losses,
     current_patterns,
     metal_of,
-    metal_on,
     of_motion,
     of_places,
     places_around,
@@ -37,7 +36,7 @@ def uniform(points):
 def ball():
     mesh = ng.Mesh(occ.OCCGeometry(occ.Sphere((0, 0, 0), 1)).GenerateMesh(maxh=0.7))
     mesh.Curve(5)
-    return metal_on(SolidMesh(mesh, np.zeros(3), 5e-3), SIGMA, 4)
+    return metal_of(SolidMesh(mesh, np.zeros(3), 5e-3), SIGMA, 4)
 
 
 def test_a_ball_in_a_uniform_field(ball):
