@@ -217,40 +217,25 @@ def whole_curves(
     fixed = np.flatnonzero(sizes[:, -1] >= 1e-12 * sizes[:, 0])
     begin, tangent = np.repeat(starts[fixed], 2, axis=0), np.repeat(rows[fixed, -1], 2, axis=0)
     tangent[1::2] *= -1
-    ways = _followed(equations, begin, tangent, steps, inside)
-    found: list[Traced | None] = [None] * len(starts)
-    for number, curve in enumerate(fixed):
-        found[curve] = _joined(ways[2 * number], ways[2 * number + 1])
-    return found
-
-
-def _followed(
-    equations: Equations, starts: Array, tangents: Array, steps: Steps, inside: Callable[[Array], Truth]
-) -> list[list[Traced]]:
-    """The points and tangents (k + 1,) of curves from their starts (m, k + 1) on, one way."""
-    found: list[list[Traced]] = [[pair] for pair in zip(starts, tangents, strict=True)]
-    before = starts.copy()
+    ways, before = [[pair] for pair in zip(begin, tangent, strict=True)], begin.copy()
 
     def watch(which: Indices, points: Array, turned: Array, lengths: Array) -> NDArray[np.int_]:
         travelled = np.linalg.norm(points - before[which], axis=1)
-        near = np.linalg.norm(points - starts[which], axis=1) < travelled
-        closed = near & (np.sum(turned * tangents[which], axis=1) > 0.9)
+        near = np.linalg.norm(points - begin[which], axis=1) < travelled
+        closed = near & (np.sum(turned * tangent[which], axis=1) > 0.9)
         before[which] = points
-        for k, (curve, point, tangent) in enumerate(zip(which, points, turned, strict=True)):
-            closed[k] &= len(found[curve]) > 2
-            found[curve].append(found[curve][0] if closed[k] else (point, tangent))
+        for k, (way, point, direction) in enumerate(zip(which, points, turned, strict=True)):
+            closed[k] &= len(ways[way]) > 2
+            ways[way].append(ways[way][0] if closed[k] else (point, direction))
         return np.where(closed | ~inside(points), END, ON)
 
-    follow(equations, starts, tangents, steps, watch)
+    follow(equations, begin, tangent, steps, watch)
+    found: list[Traced | None] = [None] * len(starts)
+    for curve, ahead, behind in zip(fixed, ways[::2], ways[1::2], strict=True):
+        if len(ahead) == 1 or ahead[-1] is not ahead[0]:  # a closed one is whole in its first half
+            ahead = [*((point, -direction) for point, direction in behind[:0:-1]), *ahead]
+        found[curve] = np.array([point for point, _ in ahead]), np.array([direction for _, direction in ahead])
     return found
-
-
-def _joined(ahead: list[Traced], behind: list[Traced]) -> Traced:
-    """One curve from its two halves; a closed one is whole in the first."""
-    if len(ahead) == 1 or ahead[-1] is not ahead[0]:
-        ahead = [*((point, -tangent) for point, tangent in behind[:0:-1]), *ahead]
-    points, tangents = (np.array(column) for column in zip(*ahead, strict=True))
-    return points, tangents
 
 
 NEWTON_STEPS = 12  # Of Newton's method from a problem's equilibrium to that of one nearby
