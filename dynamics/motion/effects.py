@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...fem.mutual.making import unanswered
+from ...fem.mutual.making import without_response
 from ...fem.rotor.floater import floater_sources
 from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
@@ -29,7 +29,7 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
         if asked == "mutual":
             floater.must_be("sphere", where="for --interaction mutual", instead="Choose --interaction rigid.")
         return False, "the answer of a floater that is no sphere is not known"
-    reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := unanswered(magnet))}
+    reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := without_response(magnet))}
     if asked == "mutual":
         if table.model == "map":
             raise InputError(

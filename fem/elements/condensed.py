@@ -15,8 +15,8 @@ Robin term 2/R is exact for l = 1; what other degrees lack is a matrix of low ra
 
 from __future__ import annotations
 
+import contextlib
 import resource
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -41,31 +41,15 @@ class TooLargeError(ComputationError):
     """A system that the free memory does not hold."""
 
 
-@dataclass(frozen=True)
-class MemoryNeed:
-    """Bytes that a system will take.
+def memory_need(space: ngsolve.FESpace, free: ngsolve.BitArray) -> tuple[float, float]:
+    """Bytes that a symmetric system on the `free` unknowns of a space will take, with static condensation.
 
-    Parameters
-    ----------
-    elements : for the matrix and what is condensed
-    factor : for the triangular factor
+    For the matrix with what is condensed, and for the triangular factor; at one time `PEAK` of both at most.
     """
-
-    elements: float
-    factor: float
-
-    @property
-    def peak(self) -> float:
-        """At most at one time."""
-        return PEAK * (self.elements + self.factor)
-
-
-def memory_need(space: ngsolve.FESpace, free: ngsolve.BitArray) -> MemoryNeed:
-    """What a symmetric system on the `free` unknowns of a space will take, with static condensation."""
     mesh, number = space.mesh, 16 if space.is_complex else 8
     sizes = [sum(dof >= 0 for dof in space.GetDofNrs(ngsolve.ElementId(ngsolve.VOL, k))) for k in range(int(mesh.ne))]
     separator = free.NumSet() * mesh.ne ** (2 / 3) / max(mesh.nface, 1)
-    return MemoryNeed(float(number * sum(n**2 for n in sizes)), SEPARATORS * number * separator**2)
+    return float(number * sum(n**2 for n in sizes)), float(SEPARATORS * number * separator**2)
 
 
 def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str) -> None:
@@ -80,7 +64,7 @@ def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str)
     ------
     TooLargeError : it says how much is needed, how much there is, and `way_out`
     """
-    need, there = memory_need(space, free).peak, free_memory()
+    need, there = PEAK * sum(memory_need(space, free)), free_memory()
     if need > there:
         needed, given = (f"{size / 1e9:.2g} GB" if size < 1e10 else f"{size / 1e9:.0f} GB" for size in (need, there))
         raise TooLargeError(
@@ -92,20 +76,15 @@ def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str)
 def free_memory(group: Path = GROUP) -> float:
     """Bytes that this process can still have: of the machine, of its container or batch job, of its own limit."""
     own, _ = resource.getrlimit(resource.RLIMIT_AS)
-    limits = [float(psutil.virtual_memory().available), _group_memory(group)]
+    limits = [float(psutil.virtual_memory().available)]
+    with contextlib.suppress(OSError):  # no control group
+        limit = (group / "memory.max").read_text().strip()
+        used = dict(line.split() for line in (group / "memory.stat").read_text().splitlines())
+        if limit != "max":
+            limits.append(float(int(limit) - int(used["anon"])))
     if own != resource.RLIM_INFINITY:
         limits.append(float(own - psutil.Process().memory_info().vms - HEAP))
     return max(min(limits), 0.0)
-
-
-def _group_memory(group: Path) -> float:
-    """Bytes left in the control group; infinite where there is none with a limit."""
-    try:
-        limit = (group / "memory.max").read_text().strip()
-        used = dict(line.split() for line in (group / "memory.stat").read_text().splitlines())
-    except OSError:
-        return float("inf")
-    return float("inf") if limit == "max" else float(int(limit) - int(used["anon"]))
 
 
 class OpenBoundary:

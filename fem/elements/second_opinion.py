@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ..closed_forms.uniform import remanent_field
 from .magnetostatics import Formulation
 
 if TYPE_CHECKING:
-    import skfem
+    pass
 
 NODES = 60  # a side of the Gauss rule on a face; farther than 1.2 half edges from the faces its error is below 1e-40
 
@@ -39,7 +38,7 @@ def coulomb_field(magnet: Magnet, points: Array) -> Array:
 
 
 def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Array:
-    """∫ M dV (n, 3), T m³, of every magnet, M as in `magnetostatics.solver`: whole (`direct`) or correction (`split`).
+    """∫ M dV (n, 3), T m³, of every magnet, M as in `magnetostatics`: whole (`direct`) or correction (`split`).
 
     The error falls as the square of that of ∇ψ: about h² with elements of size h at the edges, where ∇ψ is logarithmic.
 
@@ -68,38 +67,25 @@ def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Arra
 
     bodies = []
     load = np.zeros(basis.N)
-    for k in range(len(mesh.magnets)):
+    for k, magnet in enumerate(mesh.magnets):
         cells = np.nonzero(regions == exchange.field_data[f"magnet{k}"][0])[0]
         inside = skfem.Basis(tetrahedra, skfem.ElementTetP2(), elements=cells, intorder=6)
-        source = _source(mesh, k, formulation, inside)
+        points = np.moveaxis(np.asarray(inside.global_coordinates()), 0, -1)
+        susceptibility = magnet.permeability_in_rotor - np.eye(3)
+        # the magnetisation (3, elements, points) in T that is known before ∇ψ is, and its integral
+        if formulation == "direct":
+            source = np.broadcast_to(magnet.polarization_in_rotor[:, None, None], (3, *points.shape[:-1]))
+            closed = magnet.polarization_in_rotor * magnet.body.volume
+        else:
+            field = remanent_field(mesh.magnets, mesh.to_meter(points.reshape(-1, 3))).reshape(points.shape)
+            source = np.moveaxis(field @ susceptibility, -1, 0)
+            places, weights = volume_rule(magnet.body, [other.body for other in mesh.magnets], 24)
+            closed = susceptibility @ (weights @ remanent_field(mesh.magnets, places))
         load += skfem.LinearForm(lambda v, w: dot(w["source"], grad(v))).assemble(inside, source=source)
-        bodies.append(inside)
+        bodies.append((inside, closed, susceptibility))
     potential = skfem.solve(stiffness, load)
-    return np.array([_dipole(mesh, k, formulation, inside, potential) for k, inside in enumerate(bodies)])
-
-
-def _source(mesh: MagnetMesh, k: int, formulation: Formulation, inside: skfem.Basis) -> Array:
-    """Magnetisation (3, elements, points) in T that is known before ∇ψ is."""
-    points = np.moveaxis(np.asarray(inside.global_coordinates()), 0, -1)
-    magnet = mesh.magnets[k]
-    if formulation == "direct":
-        return np.broadcast_to(magnet.polarization_in_rotor[:, None, None], (3, *points.shape[:-1]))
-    field = remanent_field(mesh.magnets, mesh.to_meter(points.reshape(-1, 3))).reshape(points.shape)
-    return np.moveaxis(field @ _susceptibility(magnet), -1, 0)
-
-
-def _dipole(mesh: MagnetMesh, k: int, formulation: Formulation, inside: skfem.Basis, potential: Array) -> Array:
-    magnet = mesh.magnets[k]
-    susceptibility = _susceptibility(magnet)
-    if formulation == "direct":
-        closed = magnet.polarization_in_rotor * magnet.body.volume
-    else:
-        points, weights = volume_rule(magnet.body, [source.body for source in mesh.magnets], 24)
-        closed = susceptibility @ (weights @ remanent_field(mesh.magnets, points))
-    slope = np.asarray(inside.interpolate(potential).grad)
-    return np.asarray(closed - susceptibility @ np.sum(slope * inside.dx, axis=(1, 2)) * mesh.unit**3)
-
-
-def _susceptibility(magnet: Magnet) -> Array:
-    """(3, 3) μ - 1 in the rotor's frame."""
-    return magnet.permeability_in_rotor - np.eye(3)
+    found = []
+    for inside, closed, susceptibility in bodies:
+        slope = np.asarray(inside.interpolate(potential).grad)
+        found.append(closed - susceptibility @ np.sum(slope * inside.dx, axis=(1, 2)) * mesh.unit**3)
+    return np.array(found)

@@ -31,6 +31,7 @@ class Ball:
     radius: float
 
 
+@cache
 def sphere(degree: int) -> tuple[Array, Array]:
     """Points (n, 3) on the unit sphere and their areas (n,), exact for products of two harmonics up to `degree` + 5."""
     nodes = degree + 6
@@ -53,10 +54,16 @@ def interior_coefficients(field: Callable[[Array], Array], ball: Ball, degree: i
     Aliasing is a part ρ^(degree + 10) of the field, ρ the radius over the
     distance of the centre from the nearest singularity.
     """
-    normals, areas = sphere(degree)
-    radial = areas * np.sum(field(ball.center + ball.radius * normals) * normals, axis=1)
-    along_circles = np.conj(np.fft.rfft(radial.reshape(degree + 6, -1)))[:, : degree + 1]
-    return np.asarray(np.einsum("lmk,km->lm", _by_height(degree), along_circles), complex)
+    normals, _ = sphere(degree)
+    return _by_normal_field(np.sum(field(ball.center + ball.radius * normals) * normals, axis=1), degree)
+
+
+def _by_normal_field(normal: Array, degree: int) -> Coefficients:
+    """Coefficients a_lm (T) by the normal component of B (n,) T at the points of `sphere`."""
+    around = (sphere(degree)[1] * normal).reshape(degree + 6, -1)
+    # a Fourier transform on each circle of latitude, then a sum over heights
+    orders = np.conj(np.fft.rfft(around))[:, : degree + 1]
+    return np.asarray(np.einsum("lmk,km->lm", _by_height(degree), orders), complex)
 
 
 @cache
@@ -85,6 +92,7 @@ def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -
         square = np.sum(away**2, axis=1)[:, None]
         sums += weighted_sums(degree + 1, away / square, moments[start : start + CHUNK] / np.sqrt(square))
     sums *= factorials(degree + 1)  # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r
+    # M·∇Θ_lm by (∂_x ± i ∂_y) Θ_lm = ±Θ_(l+1)(m±1), ∂_z Θ_lm = -Θ_(l+1)m
     minus = np.concatenate([-np.conj(sums[:, 1:, 1:2]), sums[:, 1:, :-2]], axis=2)
     plus = sums[:, 1:, 1:]
     x, y, z = (plus[0] - minus[0]) / 2, (plus[1] + minus[1]) / 2j, -sums[2, 1:, :-1]
@@ -146,52 +154,28 @@ def dipole_sources(moment: Array, ball: Ball, degree: int) -> Coefficients:
     return result
 
 
-def real_weights(coefficients: Coefficients) -> Array:
-    """Weights (..., K), in the order of `members`, of Σ conj a_lm Υ_lm (..., l, m) over positive and negative m."""
-    degree = coefficients.shape[-1] - 1
-    scaled = coefficients * _sizes(degree) * np.where(np.arange(degree + 1), 2.0, 1.0)
-    parts = [(scaled[..., l, m].imag if part else scaled[..., l, m].real) for l, m, part in members(degree)]
-    return np.stack(parts, axis=-1)
-
-
-def _sizes(degree: int) -> Array:
-    """[l, m]: Υ_lm by S_m Q_lm, (-1)^m (2l-1)!!/((l-m)! (l+m)!)."""
+@cache
+def _real(degree: int) -> tuple[Array, Array]:
+    """`members` (K, 3), and [l, m] of Υ_lm by S_m Q_lm, (-1)^m (2l-1)!!/((l-m)! (l+m)!)."""
     l, m = np.indices((degree + 1, degree + 1))
     doubled = np.cumprod([1.0, *(2.0 * k - 1 for k in range(1, degree + 1))])
-    return np.where(m <= l, (-1.0) ** m * doubled[l] / factorials(degree), 0.0)
+    return np.array(members(degree)), np.where(m <= l, (-1.0) ** m * doubled[l] / factorials(degree), 0.0)
+
+
+def real_weights(coefficients: Coefficients) -> Array:
+    """Weights (K,), in the order of `members`, of Σ conj a_lm Υ_lm over positive and negative m."""
+    (l, m, part), sizes = _real(len(coefficients) - 1)[0].T, _real(len(coefficients) - 1)[1]
+    chosen = (coefficients * sizes)[l, m] * np.where(m, 2.0, 1.0)
+    return np.where(part, chosen.imag, chosen.real)
 
 
 @cache
-def _fitting(degree: int) -> tuple[Array, Array, Array]:
-    """Points (n, 3) on the unit sphere for potentials of a degree; exact for them.
-
-    With (3 degree² + 5 (degree - 1)², n) the weights of B and of its gradient by the normal component of B there, and
-    (degree², n) the R_k up to one degree less.
-    """
-    normals, areas = sphere(degree)
-    by_normal = np.zeros((len(normals), degree + 1, degree + 1), complex)
-    for (l, m), values in regular_values(degree, *normals.T).items():
-        if l:
-            by_normal[:, l, m] = -(2 * l + 1) / (4 * np.pi * l) * values * areas
-    potential = real_weights(np.asarray(factorials(degree) * by_normal, complex)).T
-    first, second = derivatives(degree), derivatives(degree - 1)
-    field = [-slope @ potential for slope in first]
-    weights = np.concatenate([*field, *(second[j] @ field[i] for i, j in UPPER)])
-    known, sizes = regular_values(degree - 1, *normals.T), _sizes(degree - 1)
-    basis = [(known[l, m].imag if p else known[l, m].real) / sizes[l, m] for l, m, p in members(degree - 1)]
-    return normals, weights, np.array(basis)
-
-
-@cache
-def derivatives(degree: int) -> Array:
-    """(3, degree², K): the coefficients of ∂/∂x_a Σ c_k R_k by the c_k, K = (degree + 1)²."""
-    columns = []
-    for k, (l, m, part) in enumerate(members(degree)):
-        single = np.zeros((degree + 1, degree + 1), complex)
-        single[l, m] = 1j if part else 1.0
-        single /= real_weights(single)[k]
-        columns.append([real_weights(gradient_coefficients(single, axis)) for axis in range(3)])
-    return np.moveaxis(np.array(columns), 0, -1)
+def _real_values(degree: int) -> Array:
+    """(K, n): R_k up to one degree less at the points of `sphere`."""
+    (l, m, part), sizes = _real(degree - 1)[0].T, _real(degree - 1)[1]
+    known = regular_values(degree - 1, *sphere(degree)[0].T)
+    values = np.array([known[key] for key in zip(l.tolist(), m.tolist(), strict=True)]) / sizes[l, m][:, None]
+    return np.where(part[:, None], values.imag, values.real)
 
 
 @dataclass(frozen=True)
@@ -236,14 +220,16 @@ class BallField:
 
         The error is the largest on the surface, of B or of its gradient, by the root mean square there.
         """
-        (normals, by_normal, basis), size, less = _fitting(self.degree), self.degree**2, (self.degree - 1) ** 2
+        normals, _ = sphere(self.degree)
         field, gradient = evaluate(ball.center + ball.radius * normals)
-        slopes = np.array([gradient[:, i, j] for i, j in UPPER])
-        weights = by_normal @ np.einsum("na,na->n", field, normals)
-        weights[3 * size :] /= ball.radius
-        field_error = _relative_miss(weights[: 3 * size].reshape(3, size) @ basis - field.T, field.T)
-        slope_error = _relative_miss(weights[3 * size :].reshape(5, less) @ basis[:less] - slopes, slopes)
-        return np.concatenate([ball.center, [1 / ball.radius], weights]), max(field_error, slope_error)
+        known = [field.T, np.array([gradient[:, i, j] for i, j in UPPER])]
+        incident = _by_normal_field(np.sum(field * normals, axis=1), self.degree)
+        parts = [-gradient_coefficients(incident, axis) for axis in range(3)]
+        slopes = [gradient_coefficients(parts[i], j) / ball.radius for i, j in UPPER]
+        weights = [np.array([real_weights(one) for one in group]) for group in (parts, slopes)]
+        basis = _real_values(self.degree)
+        misses = [_relative_miss(w @ basis[: w.shape[1]] - v, v) for w, v in zip(weights, known, strict=True)]
+        return np.concatenate([ball.center, [1 / ball.radius], *(w.ravel() for w in weights)]), max(misses)
 
 
 def _relative_miss(missed: Array, values: Array) -> float:

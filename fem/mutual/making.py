@@ -34,14 +34,14 @@ from .table import (
     OF_SPHERE,
     POWERS,
     RETURNED,
-    AnswerGrid,
     EnergySum,
     MutualTable,
-    answer_box,
+    ResponseGrid,
     image_weights,
     mixed_sum,
     pair_sum,
     point_counts,
+    response_box,
 )
 
 SMALL = 1e-9  # relative size of a singular value that is none
@@ -142,17 +142,17 @@ def mutual_table(
     rotor, fine = rotor_ladder(magnets, (order, order + 1))
     grids = []
     for magnet in magnets:
-        if reason := unanswered(magnet):
+        if reason := without_response(magnet):
             raise InputError(
                 "Input magnets must be of the kinds that answer to the floater where both magnetise each other; "
                 f"instead one is {reason}"
             )
-        box, size = answer_box(magnet.body), float(np.linalg.norm(magnet.polarization))
+        box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
         counts = point_counts(box, (1 + NEAREST) * floater.radius)
         n = int(np.prod(counts))
         zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
         axis = magnet.polarization / size if size else np.zeros(3)
-        grids.append(AnswerGrid(box, axis, floater.radius, counts, *zeros))
+        grids.append(ResponseGrid(box, axis, floater.radius, counts, *zeros))
     images = image_weights(floater.recoil_permeability)
     inner = [grid.inner(INNER if 1 < len(grids) < MANY else 1) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
@@ -176,7 +176,7 @@ def mutual_table(
     return replace(table, gaps=gaps, errors=errors, provenance=made)
 
 
-def unanswered(magnet: Magnet) -> str:
+def without_response(magnet: Magnet) -> str:
     """Why a magnet's response to the floater is not computed, with the way out; empty where it is."""
     if isinstance(magnet.body, Part):
         return PART
@@ -186,13 +186,13 @@ def unanswered(magnet: Magnet) -> str:
 
 
 def _rotor_fit(
-    grids: Sequence[AnswerGrid],
+    grids: Sequence[ResponseGrid],
     inner: Sequence[Array],
     magnets: Sequence[Magnet],
     direct: Array,
     beyond: Array,
     places: Array,
-) -> tuple[list[AnswerGrid], Array]:
+) -> tuple[list[ResponseGrid], Array]:
     """Strengths λ and coupling that give the products of dipoles' fields with the responses to them.
 
     `direct`, by points of one weight for a class, which mirrors keep; what is `beyond` by these and the coupling.
@@ -260,11 +260,13 @@ def cached_mutual_table(
         return table, found
     (magnet,), (grid,) = magnets, table.grids
     turn = np.kron(np.eye(len(table.coupling) // 3), magnet.box.rotation)
-    grids = (replace(grid, box=answer_box(magnet.body)),)
+    grids = (replace(grid, box=response_box(magnet.body)),)
     return replace(table, magnets=magnets, grids=grids, coupling=turn @ table.coupling @ turn.T), found
 
 
-def sphere_fit(grids: Sequence[AnswerGrid], images: Array, samples: SphereSamples) -> tuple[list[AnswerGrid], Array]:
+def sphere_fit(
+    grids: Sequence[ResponseGrid], images: Array, samples: SphereSamples
+) -> tuple[list[ResponseGrid], Array]:
     """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
 
     Parameters
@@ -289,8 +291,8 @@ def sphere_fit(grids: Sequence[AnswerGrid], images: Array, samples: SphereSample
 
 
 def returned_fit(
-    grids: Sequence[AnswerGrid], inner: Sequence[Array], images: Array, samples: ReturnedSamples
-) -> tuple[list[AnswerGrid], Array]:
+    grids: Sequence[ResponseGrid], inner: Sequence[Array], images: Array, samples: ReturnedSamples
+) -> tuple[list[ResponseGrid], Array]:
     """Weights of the points' powers, and of pairs, that give V and its slopes.
 
     Parameters
@@ -318,7 +320,7 @@ def returned_fit(
 
 
 def _fitted(
-    grids: Sequence[AnswerGrid],
+    grids: Sequence[ResponseGrid],
     numbers: range,
     sums: Sequence[EnergySum],
     places: Array,
@@ -348,7 +350,7 @@ def _fitted(
     return each, np.array([float(part[0]) for part in parts])
 
 
-def classes(grid: AnswerGrid, mirrored: bool) -> Array:
+def classes(grid: ResponseGrid, mirrored: bool) -> Array:
     """(n, classes): which points are exchanged by mirrors at the body's planes, or else by its centre."""
     key = np.round(grid.points * 1e9).astype(int)
     if mirrored:

@@ -13,7 +13,7 @@ from ...geometry.solids import places_off
 from ..harmonics.interior import Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
 from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums
 from .response import RotorResponse, direct_rule, enough_degree
-from .table import AnswerGrid, induced_sources, reflection
+from .table import ResponseGrid, induced_sources, reflection
 
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
 # Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets
@@ -182,7 +182,7 @@ class ReturnedSamples:
 def returned_samples(
     rotor: RotorResponse,
     floater: Floater,
-    grids: Sequence[AnswerGrid],
+    grids: Sequence[ResponseGrid],
     inner: Array,
     coupling: Array,
     places: Array,
@@ -223,7 +223,7 @@ def returned_samples(
 
 
 def point_response(
-    grids: Sequence[AnswerGrid], inner: Array, coupling: Array, sources: Coefficients, ball: Ball
+    grids: Sequence[ResponseGrid], inner: Array, coupling: Array, sources: Coefficients, ball: Ball
 ) -> Coefficients:
     """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball.
 

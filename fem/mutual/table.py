@@ -247,12 +247,12 @@ def _kernel(formula: Formula, width: int) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class AnswerGrid:
+class ResponseGrid:
     """Points of one magnet with their energies, see `point_energy`.
 
     Parameters
     ----------
-    box : of the magnet, see `answer_box`
+    box : of the magnet, see `response_box`
     axis : (3,) direction of its remanence along the body's axes; zero: none
     radius : of the floater, m
     counts : points along each body axis
@@ -338,7 +338,7 @@ def charge_sum(
     return EnergySum(formula, np.concatenate([*ends, -np.outer(q, p).reshape(-1, 1), same], axis=1))
 
 
-def answer_box(body: Solid) -> Box:
+def response_box(body: Solid) -> Box:
     """The box in which a body's points lie: itself, or for round ones a box that hardly leaves it."""
     if isinstance(body, Box):
         return body
@@ -375,7 +375,7 @@ class MutualTable:
     """
 
     magnets: tuple[Magnet, ...]
-    grids: tuple[AnswerGrid, ...]
+    grids: tuple[ResponseGrid, ...]
     coupling: Array = field(metadata={"units": "A m2/T"})
     pairs: Array = field(metadata={"units": "J"})
     mixed: Array = field(metadata={"units": "T"})
@@ -462,7 +462,7 @@ class MutualTable:
         return f"MutualTable: {points} points in {len(self.grids)} magnets; relative error {told} from contact"
 
 
-def pair_sum(first: AnswerGrid, second: AnswerGrid, images: Array, weight: float = 1.0) -> EnergySum:
+def pair_sum(first: ResponseGrid, second: ResponseGrid, images: Array, weight: float = 1.0) -> EnergySum:
     """Minus `weight` (J) times the energy of the sphere by what the charges of `first` and `second` do in it together.
 
     `images` are the weights of `pair_energy`.
@@ -471,7 +471,7 @@ def pair_sum(first: AnswerGrid, second: AnswerGrid, images: Array, weight: float
     return charge_sum(pair_energy, (places, weight * amounts), second.charges(CHARGES), first.radius, images)
 
 
-def mixed_sum(source: AnswerGrid, points: Array, images: Array, weight: float = 1.0) -> EnergySum:
+def mixed_sum(source: ResponseGrid, points: Array, images: Array, weight: float = 1.0) -> EnergySum:
     """Minus `weight` (T) times the energy of the moment by what `points` (k, 3) m respond to the sphere's response.
 
     That is to the `source`; `images` are the weights of `mixed_energy`.

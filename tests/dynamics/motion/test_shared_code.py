@@ -9,7 +9,7 @@ from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
-from spinlev.fem.mutual.table import AnswerGrid, MutualTable, answer_box
+from spinlev.fem.mutual.table import MutualTable, ResponseGrid, response_box
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Floater, Scene
@@ -77,7 +77,7 @@ def test_floaters_that_answer_share_their_code_and_each_has_its_own_answer(float
 def _answering(rotor, floater):
     """The field of a lone cube beside a floater whose uniform answer to it is all that there is."""
     nothing = np.zeros((1, 3)), np.zeros((1, 3, 2)), np.zeros((1, 2, 2))
-    grid = AnswerGrid(answer_box(rotor[0].body), np.array([1.0, 0, 0]), floater.radius, (1, 1, 1), *nothing)
+    grid = ResponseGrid(response_box(rotor[0].body), np.array([1.0, 0, 0]), floater.radius, (1, 1, 1), *nothing)
     none = np.zeros((1, 1))
     table = MutualTable(rotor, (grid,), np.zeros((3, 3)), none, none, np.zeros(3), floater.polarizability)
     return Interaction(rotor_table(rotor, "cuboid"), (Mutual(table, floater.moment),))
