@@ -1,7 +1,5 @@
 """The field of magnets without permeability by Coulomb's law, in 80-bit numbers: slow, and without cancellation."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np
@@ -12,9 +10,6 @@ from ...geometry.meshes.magnets import MagnetMesh, to_meshio
 from ..closed_forms.moments import volume_rule
 from ..closed_forms.uniform import remanent_field
 from .magnetostatics import Formulation
-
-if TYPE_CHECKING:
-    pass
 
 NODES = 60  # a side of the Gauss rule on a face; farther than 1.2 half edges from the faces its error is below 1e-40
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -65,19 +66,26 @@ class IntegrationPoints:
     space : NGSolve space with one unknown per point
     region : NGSolve region
     measure : differential symbol that integrates over the region with exactly these points
-    points : (n, 3) in the mesh's coordinates
     weights : (n,)
     """
 
     space: Any
     region: Any
     measure: Any
-    points: Array
     weights: Array
+
+    @cached_property
+    def points(self) -> Array:
+        """(n, 3) in the mesh's coordinates."""
+        return self.sample(ng.x, ng.y, ng.z)
 
     def sample(self, *functions: Any) -> Array:
         """Values (n, k) of k scalar NGSolve functions."""
-        return _sample(self.space, self.region, functions)
+        values, columns = ng.GridFunction(self.space), []
+        for function in functions:
+            values.Interpolate(function, definedon=self.region)
+            columns.append(values.vec.FV().NumPy().copy())
+        return np.stack(columns, axis=1)
 
     def function(self, values: Array) -> Any:
         """NGSolve function that takes `values` (n,) at the points; only for integrals with `measure`."""
@@ -131,17 +139,7 @@ def _collect(space: Any, region: Any, measure: Any) -> IntegrationPoints:
     form = ng.LinearForm(space)
     form += space.TestFunction() * measure
     form.Assemble()
-    weights = form.vec.FV().NumPy().copy()
-    return IntegrationPoints(space, region, measure, _sample(space, region, (ng.x, ng.y, ng.z)), weights)
-
-
-def _sample(space: Any, region: Any, functions: tuple[Any, ...]) -> Array:
-    values = ng.GridFunction(space)
-    columns = []
-    for function in functions:
-        values.Interpolate(function, definedon=region)
-        columns.append(values.vec.FV().NumPy().copy())
-    return np.stack(columns, axis=1)
+    return IntegrationPoints(space, region, measure, form.vec.FV().NumPy().copy())
 
 
 IntArray = NDArray[np.int64]
