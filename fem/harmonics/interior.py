@@ -166,7 +166,7 @@ def real_weights(coefficients: Coefficients) -> Array:
     """Weights (K,), in the order of `members`, of Σ conj a_lm Υ_lm over positive and negative m."""
     (l, m, part), sizes = _real(len(coefficients) - 1)[0].T, _real(len(coefficients) - 1)[1]
     chosen = (coefficients * sizes)[l, m] * np.where(m, 2.0, 1.0)
-    return np.where(part, chosen.imag, chosen.real)
+    return np.asarray(np.where(part, chosen.imag, chosen.real))
 
 
 @cache
@@ -175,7 +175,7 @@ def _real_values(degree: int) -> Array:
     (l, m, part), sizes = _real(degree - 1)[0].T, _real(degree - 1)[1]
     known = regular_values(degree - 1, *sphere(degree)[0].T)
     values = np.array([known[key] for key in zip(l.tolist(), m.tolist(), strict=True)]) / sizes[l, m][:, None]
-    return np.where(part[:, None], values.imag, values.real)
+    return np.asarray(np.where(part[:, None], values.imag, values.real))
 
 
 @dataclass(frozen=True)
