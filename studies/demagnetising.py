@@ -73,7 +73,8 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
     sections = [field.section(k, point.place, STEPS) for k, point in found]
     shares = np.linspace(0, 1, LEVELS)
     values = {
-        **{name: [_or_nan(getattr(point, name)) for _, point in found] for name in OF_A_POINT},
+        # As an array of numbers, in which None is NaN.
+        **{name: np.array([getattr(point, name) for _, point in found], float) for name in OF_A_POINT},
         "levels": [np.quantile(point.levels, shares) for _, point in found],
         **{name: [section[n] for section in sections] for n, name in enumerate(OF_A_SECTION)},
         "easy_axis": [easy_axis(scene.rotor[k]) for k in numbers],
@@ -89,10 +90,6 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
         },
         {"title": "Field along the easy axes of the rotor's magnets, rotor's frame"},
     )
-
-
-def _or_nan(value: Any) -> Any:
-    return np.nan if value is None else value
 
 
 def working_point_answer(found: xr.Dataset) -> dict[str, Any]:

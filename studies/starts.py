@@ -82,7 +82,9 @@ def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array
         rows = np.full(3, rows)
     fine = rows.ndim in (1, 2) and rows.shape[-1] == 3 and rows.size and np.isfinite(rows).all()
     if not fine or (name == "spread" and rows.ndim > 1):
-        shape = "one or three finite numbers" if name == "spread" else "three finite numbers for each flight, (n, 3)"
+        shape = (
+            "one or three finite numbers" if name == "spread" else "three finite numbers for each trajectory, (n, 3)"
+        )
         what = values if rows.ndim == 0 else f"an array of shape {rows.shape}"
         raise InputError(f"Input {name}.{key} must be {shape}; instead received {what}.")
     return np.atleast_2d(rows) * units[key]

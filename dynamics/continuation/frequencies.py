@@ -275,7 +275,7 @@ def way_out(
     The `scene` has these `equilibria` in the field, and with the effects, of `table`, and the plate's currents, if they
     are modelled (`memory`).
     """
-    kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (grows e-fold in {1 / e.growth_per_s:.2g} s)" for e in equilibria)
+    kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (e-folding time {1 / e.growth_per_s:.2g} s)" for e in equilibria)
     found = f"only unstable ones at {', '.join(kinds)}" if kinds else "nor any unstable one below the rotor"
     other = _levitating_frequency(scene, table, memory)
     advice = f"About {other:.4g} Hz has one; or" if other else f"None was found within a factor of {WIDEST:g};"

@@ -71,7 +71,7 @@ class Trajectory:
     lab: State  # motion (n, 3) along the laboratory's axes, SI units
     angular_velocity: float  # of the rotor, rad/s
     ended_by: str  # "duration", "contact" or "lost"; "stopped" by the user
-    energy_error: float  # largest relative violation of the energy ledger or of |m̂| = 1
+    energy_error: float  # largest relative violation of the energy balance or of |m̂| = 1
     realtime_factor: float  # simulated seconds per second of integration, compilation left out
     steps: int  # number of Taylor steps
     compile_seconds: float  # time spent on compilation (little where heyoka's cache knows the system)
@@ -87,7 +87,7 @@ class Trajectory:
         speed = f"{self.steps} steps, {self.realtime_factor:.3g} times real time"
         return (
             f"Trajectory of {self.levitated_s:.4g} s ({len(self.time)} samples), "
-            f"ended by {self.ended_by} at ({place}) mm\n  energy ledger to {self.energy_error:.1e}; {speed}"
+            f"ended by {self.ended_by} at ({place}) mm\n  energy balance to {self.energy_error:.1e}; {speed}"
         )
 
     def _repr_html_(self) -> str:
@@ -95,7 +95,7 @@ class Trajectory:
             "ended by": self.ended_by,
             "at": millimetres(self.lab.position[-1]),
             "samples": str(len(self.time)),
-            "energy ledger": f"{self.energy_error:.1e}",
+            "energy balance": f"{self.energy_error:.1e}",
         }
         return html_table(f"Flight of {self.levitated_s:.4g} s", rows)
 
@@ -114,7 +114,7 @@ class FlightStopped(KeyboardInterrupt):
 
     def __init__(self, flown: Trajectory) -> None:
         self.flown = flown
-        super().__init__(f"The flight was stopped at {flown.levitated_s:.4g} s.")
+        super().__init__(f"The simulation was stopped at {flown.levitated_s:.4g} s.")
 
 
 STABLE, LINEAR_FALL, OSCILLATING_LOSS = "stable", "linear fall", "oscillating loss"

@@ -63,7 +63,7 @@ def resolve_plate_model(
     if place is None:
         return PlateChoice("none", "there is no equilibrium around which to make a table")
     if model == "fem":
-        return PlateChoice("reduced", "in the motion the finite elements enter by their reduced network")
+        return PlateChoice("reduced", "the finite elements enter the motion by their reduced network")
     if model != "auto":
         return PlateChoice(model, "as asked", edge_error(plate, place) if model == "slab" else 0.0)
     gap = float(plate.box.distance(place))
