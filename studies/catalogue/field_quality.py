@@ -283,7 +283,12 @@ def case_errors(case: HardCase, places: int) -> xr.Dataset:
     before, truth = reference(case, np.concatenate(points))
     ends = np.cumsum([len(p) for p in points])[:-1]
     parts = zip(points, np.split(before, ends), np.split(truth, ends), strict=True)
-    rows = [_errors(field, case, *part) for part in parts]
+    rows = []
+    for places_there, lower, exact in parts:
+        scale = typical_field(case.magnets, places_there)
+        true, own = (np.linalg.norm(b - exact, axis=1) / scale for b in (field.evaluate(places_there)[0], lower))
+        stated = field.absolute_error(places_there)[0] / scale + ROUND_OFF
+        rows.append((true.max(), stated.max(), own.max(), (true / (stated + own)).max()))
     found = {key: field.provenance[key] for key in ("order", "unknowns")}
     found |= dict(zip(ERRORS, np.array(rows).T, strict=True)) | {"distance": distance, "seconds": seconds}
     return xr.Dataset(columns(COLUMNS, {key: np.asarray(value, float) for key, value in found.items()}))
@@ -319,15 +324,6 @@ def reference(case: HardCase, points: Array) -> tuple[Array, Array]:
         parts = found.expansions([a + b for a, b in zip(closed, found.coefficients, strict=True)])
         fields.append(remanent + sum(part.evaluate(points)[0] for part in parts))
     return fields[0], fields[1]
-
-
-def _errors(table: RotorTable, case: HardCase, points: Array, before: Array, truth: Array) -> tuple[float, ...]:
-    """True, stated, reference's own error and shortfall at points (n, 3) m of like distance."""
-    scale = typical_field(case.magnets, points)
-    true = np.linalg.norm(table.evaluate(points)[0] - truth, axis=1) / scale
-    own = np.linalg.norm(truth - before, axis=1) / scale
-    stated = table.absolute_error(points)[0] / scale + ROUND_OFF
-    return float(true.max()), float(stated.max()), float(own.max()), float((true / (stated + own)).max())
 
 
 LINES = {

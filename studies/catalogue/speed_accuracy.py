@@ -196,27 +196,22 @@ def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measure
     Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here (Linux)
     began, processor = time.perf_counter(), time.process_time()
     table, unknowns = method.build(magnets)
-    field, gradient = _at_points(table)
+    field, gradient, stated = _at_points(table)
     seconds, cpu_seconds = time.perf_counter() - began, time.process_time() - processor
     grown = _memory("VmHWM") - memory
     many = _many(timed_points)
     table.evaluate(many)
     pace = min(timeit.repeat(lambda: table.evaluate(many), timer=time.process_time, number=1)) / timed_points
     costs = dict(zip(COSTS, (unknowns, seconds, cpu_seconds, grown, pace), strict=True))
-    return Measured(field, gradient, _stated(table), costs)
+    return Measured(field, gradient, stated, costs)
 
 
-def _at_points(table: FieldTable) -> tuple[Array, Array]:
-    """B (d, n, 3) and its gradient (d, n, 3, 3) at `sphere_points`."""
+def _at_points(table: FieldTable) -> tuple[Array, Array, Array]:
+    """B (d, n, 3), its gradient (d, n, 3, 3) and the largest relative error (d,) of B that is stated."""
     points = sphere_points()
-    b, g = table.evaluate(points.reshape(-1, 3))
-    return b.reshape(points.shape), g.reshape(*points.shape, 3)
-
-
-def _stated(table: FieldTable) -> Array:
-    """Largest relative error (d,) of B that a table states of these."""
-    points = sphere_points()
-    return np.asarray(table.relative_error(points.reshape(-1, 3))[0].reshape(points.shape[:2]).max(axis=1))
+    every, shape = points.reshape(-1, 3), points.shape
+    b, g = table.evaluate(every)
+    return b.reshape(shape), g.reshape(*shape, 3), table.relative_error(every)[0].reshape(shape[:2]).max(axis=1)
 
 
 def _memory(entry: str) -> float:
@@ -275,7 +270,7 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AccuracyWarning)  # its own error is stored, whatever it is
             table = rotor_table(cube(problem), "auto", asked)
-        truths[problem] = *_at_points(table), _stated(table)
+        truths[problem] = _at_points(table)
     errors, costs = [], []
     for name, method in catalogue.items():
         note(f"  {name} ...")
