@@ -55,7 +55,8 @@ def recorded(
     axes : coordinates
     sizes : of the dimensions of what was not found, which is NaN
     """
-    named = found if isinstance(found, Mapping) else dict(zip(table, found, strict=True))
+    pairs = found.items() if isinstance(found, Mapping) else zip(table, found, strict=True)
+    named = {name: np.asarray(values) for name, values in pairs}  # xarray takes a tuple for one value
     return one_case(point, xr.Dataset(columns(table, named, **sizes), axes))
 
 

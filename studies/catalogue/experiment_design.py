@@ -27,7 +27,6 @@ from ...dynamics.motion.rotor_effects import Dissipation, brake_slope
 from ...dynamics.motion.state import Parameter, Scales
 from ...fem.cache import TableKind
 from ...fem.harmonics.expressions import CompiledField
-from ...fem.rotor.table import FieldTable
 from ...fem.rotor_metal import RotorLosses, cached_rotor_losses
 from ...geometry.common import MAGNET_CONDUCTIVITY, Array
 from ...geometry.magnets import Magnet
@@ -69,22 +68,20 @@ KINDS = {
 }
 
 
-def magnets_of(inputs: Mapping[str, float], permeability: float) -> tuple[Magnet, ...]:
-    """The magnets of a rotor: a cube displaced along +x and tilted about y, and the second one if there is a stack."""
+def scene_of(inputs: Mapping[str, float], permeability: float = 1.0) -> Scene:
+    """The scene of a rotor, in vacuum and without metal; its frequency is any.
+
+    A cube is displaced along +x and tilted about y, and there is a second one if there is a stack.
+    """
     angle = np.radians(inputs["on_axis"] - PER_MILLIMETRE * inputs["displacement"])
     cube = tilt(angle, EDGE, REMANENCE, permeability)[0]
     shift = np.array([1e-3 * inputs["displacement"], 0.0, 0.0])
-    cube = replace(cube, body=moved(cube.body, cube.body.center + shift, cube.body.rotation))
-    if "stack" not in inputs:
-        return (cube,)
-    return (cube, vertical(1e-3 * inputs["stack"], EDGE, REMANENCE, permeability)[1])
-
-
-def scene_of(inputs: Mapping[str, float], permeability: float = 1.0) -> Scene:
-    """The scene of a rotor, in vacuum and without metal; its frequency is any."""
+    magnets = [replace(cube, body=moved(cube.body, cube.body.center + shift, cube.body.rotation))]
+    if "stack" in inputs:
+        magnets.append(vertical(1e-3 * inputs["stack"], EDGE, REMANENCE, permeability)[1])
     floater = replace(FLOATER, radius=FLOATER.radius * inputs["radius"])
     gravity = np.array([0.0, 0.0, -GRAVITY * inputs["weight"]])
-    return Scene(100.0, magnets_of(inputs, permeability), floater, Drag(0.0, 0.0), gravity=gravity)
+    return Scene(100.0, tuple(magnets), floater, Drag(0.0, 0.0), gravity=gravity)
 
 
 EFFECTS = ("floater", "magnets", "steel", "air")
@@ -110,16 +107,15 @@ class Levitating:
     """The floater of a scene whose frequency is open."""
 
     scene: Scene  # without losses
-    table: FieldTable  # the rotor's field
-    rates: Rates
+    table: Interaction  # the rotor's field, and what else acts
     # gives those in the magnets and in the steel, None where they are not asked for; called when something
     # levitates, so that one process compiles while another computes the losses that both need
     losses: Callable[[], Losses]
 
-    @classmethod
-    def of(cls, scene: Scene, interaction: Interaction, losses: Callable[[], Losses]) -> "Levitating":
+    @cached_property
+    def rates(self) -> Rates:
         """With the floater's currents and real air among the compiled equations, where their strength is zero."""
-        return cls(scene, interaction, Rates(with_effects(_lossy(scene), interaction)), losses)
+        return Rates(with_effects(_lossy(self.scene), self.table))
 
     @cached_property
     def _field(self) -> CompiledField:
@@ -299,7 +295,7 @@ def design_row(point: Point, cached: bool = True) -> xr.Dataset:
         scene = scene_of(inputs, 1.0 if model == "cuboid" else 1.05)
         field: FieldModel = "cuboid" if model == "cuboid" else "fem"
         levitation = levitation_of(scene, field, interaction="mutual" if model == "mutual" else "rigid")
-        floater = Levitating.of(scene, levitation.interaction, lambda: losses_of(scene, point["steel"]))
+        floater = Levitating(scene, levitation.interaction, lambda: losses_of(scene, point["steel"]))
         hanging = floater.hanging
         return floater.nodes(CONTACT + part * (hanging - CONTACT), spins), float(hanging)
 

@@ -63,7 +63,7 @@ def test_nodes_are_the_equilibria_of_the_branch_and_their_growth_that_of_its_poi
     """Frequencies against the branch followed by arc length; first-order growth against eigenvalues with the losses."""
     scene = scene_of(INPUTS)
     losses = partial(losses_of, scene, False) if metal else lambda: (None, None)
-    floater = Levitating.of(scene, levitation_of(scene, "cuboid").interaction, losses)
+    floater = Levitating(scene, levitation_of(scene, "cuboid").interaction, losses)
     branch = levitating_branch(scene, floater.table, floater.rates, 200.0)
     point = branch.side("near", np.array([150.0]))[0]
     node = dict(zip(QUANTITIES, floater.nodes(-point.position[2:], np.zeros(1))[0, 0], strict=True))
