@@ -21,19 +21,14 @@ Problem = Callable[[float], tuple[Array, float]]
 OSCILLATORY, REAL = "oscillatory", "real"
 
 
-def scenes(make: Callable[[float], Scene], spin: float = 0.0) -> Problem:
-    """The problem in which a parameter makes the scene: anything but the rotor, whose field is compiled in."""
-
-    def problem(parameter: float) -> tuple[Array, float]:
-        scene = make(parameter)
-        return parameters(scene, Scales.of(scene), frozen_spin=True), spin
-
-    return problem
-
-
 def frequencies(scene: Scene, spin: float = 0.0) -> Problem:
     """The problem whose parameter is the rotor's frequency, Hz."""
-    return scenes(lambda frequency: replace(scene, frequency=frequency), spin)
+
+    def problem(frequency: float) -> tuple[Array, float]:
+        there = replace(scene, frequency=frequency)
+        return parameters(there, Scales.of(there), frozen_spin=True), spin
+
+    return problem
 
 
 def spins(scene: Scene) -> Problem:

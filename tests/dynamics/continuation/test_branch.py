@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from article import FLOATER
 
-from spinlev.dynamics.continuation.branch import OSCILLATORY, Family, follow_branch, frequencies, scenes, spins
+from spinlev.dynamics.continuation.branch import OSCILLATORY, Family, follow_branch, frequencies, spins
 from spinlev.dynamics.equilibria.equilibrium import FOLD, EquilibriumError
 from spinlev.dynamics.equilibria.path import Steps
 from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.rotor.choice import rotor_table
@@ -103,7 +104,11 @@ def test_fold_is_located_to_round_off(compiled):
     ids=["frequency", "gravity", "remanence"],
 )
 def test_any_parameter_of_the_scene_ends_at_the_survey_s_equilibrium(compiled, make, begin, end, unit):
-    last = followed(compiled, HORIZONTAL, 0.0, end, scenes(make), begin, unit)[-1]
+    def problem(value):
+        scene = make(value)
+        return parameters(scene, Scales.of(scene), frozen_spin=True), 0.0
+
+    last = followed(compiled, HORIZONTAL, 0.0, end, problem, begin, unit)[-1]
     expected = nearest(make(end), TABLES[id(HORIZONTAL)], compiled[id(HORIZONTAL)], 0.0)
     np.testing.assert_allclose(last.position, expected.position, atol=1e-13)
     assert last.motion.stable == expected.stable
