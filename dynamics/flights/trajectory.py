@@ -143,13 +143,11 @@ def flight_kind(flight: Trajectory) -> str:
     distance = np.linalg.norm(flight.lab.position, axis=1)
     if len(distance) < FEWEST * WINDOWS or flight.levitated_s <= HELD:
         return STABLE if lasted else NOT_HELD
-    parts = np.array_split(np.arange(len(distance)), WINDOWS)
+    whole = np.arange(len(distance))
     if not lasted:
-        whole, end = np.arange(len(distance)), parts[-1]
+        end = np.array_split(whole, WINDOWS)[-1]
         return OSCILLATING_LOSS if _swings(flight, whole) or _swings(flight, end) else LINEAR_FALL
-    places = flight.rotor.position
-    means = np.array([distance[part].mean() for part in parts])
-    sizes = np.array([_oscillation(flight.time[part], places[part]) for part in parts])
+    means, sizes = _trends(flight, whole)
     late = sizes[-WINDOWS // 4 :].mean()
     if late > VISIBLE and late > 2 * sizes[: WINDOWS // 4].mean():
         return GROWING
@@ -163,11 +161,16 @@ def _swings(flight: Trajectory, samples: Indices) -> bool:
     """
     if len(samples) < FEWEST * WINDOWS:
         return False
+    means, sizes = (trend[:-1] for trend in _trends(flight, samples))
+    return bool(sizes.max() - sizes[0] > abs(means[-1] - means[0]))
+
+
+def _trends(flight: Trajectory, samples: Indices) -> tuple[Array, Array]:
+    """Mean distance, and size of the oscillation in the rotor's frame, in parts of samples (n,), m."""
     distance, places = np.linalg.norm(flight.lab.position, axis=1), flight.rotor.position
-    parts = np.array_split(samples, WINDOWS)[:-1]
-    means = [distance[part].mean() for part in parts]
+    parts = np.array_split(samples, WINDOWS)
     sizes = [_oscillation(flight.time[part], places[part]) for part in parts]
-    return bool(max(sizes) - sizes[0] > abs(means[-1] - means[0]))
+    return np.array([distance[part].mean() for part in parts]), np.array(sizes)
 
 
 def _oscillation(time: Array, places: Array) -> float:

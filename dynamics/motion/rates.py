@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from types import SimpleNamespace
 from typing import Any, cast
 
 import heyoka as hy
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...fem.compiled_code import RuntimeNumbers, compiled_later, one_thread
-from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.rotor.table import FieldFormula, FieldTable, RotorTable
 from ...geometry.common import Array
 from .effect import Effect, Interaction, Placeable, interaction_of
@@ -40,7 +39,10 @@ class Rates:
                 self._placed.append(effect.placed(len(Parameter) + sum(known.count for known in self._placed)))
             effects.append(self._placed[-1] if isinstance(effect, Placeable) else effect)
         self._numbers = RuntimeNumbers(len(Parameter) + sum(known.count for known in self._placed))
-        formula = _Written(whole.field, self._numbers) if isinstance(whole.field, RotorTable) else whole.field
+        formula = whole.field
+        if isinstance(formula, RotorTable):  # its numbers as runtime parameters: rotors of one kind share the code
+            written = partial(formula.expressions, number=self._numbers)
+            formula = cast(FieldFormula, SimpleNamespace(expressions=written))
         equations = equations_of_motion(Interaction(formula, tuple(effects)))
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._equations, self._level = equations, 1 if optimised else 0
@@ -124,17 +126,6 @@ def _with_jacobian(equations: Equations) -> tuple[list[hy.expression], list[hy.e
     variables = list(equations.variables)
     tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
     return [*equations.rates, *np.asarray(tensors.jacobian).ravel()], variables
-
-
-@dataclass(frozen=True, eq=False)
-class _Written:
-    """A table's field, its numbers as runtime parameters: rotors of one kind share the compiled code."""
-
-    table: RotorTable
-    numbers: RuntimeNumbers
-
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        return self.table.expressions(position, self.numbers)
 
 
 def _called(function: Any, given: Array, values: Array) -> Array:
