@@ -256,7 +256,7 @@ def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
 
 @styled
 def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
-    """Damping rate of each mode in some sweeps, a panel each; open: it grows instead."""
+    """Damping rate of each mode against what is varied; crosses: it grows; bars: error of the plate's table."""
     titles, ylabel = [SWEEPS[sweep][0] for sweep in sweeps], "damping rate (1/s)"
     figure, axes = small_multiples(titles, 3.0, 3, "", ylabel, sharey=True)
     for panel, sweep in zip(axes, sweeps, strict=True):
