@@ -347,6 +347,7 @@ def corner_figure(result: xr.Dataset) -> Figure:
     figure, axes = panels(len(chosen), len(chosen), (PAGE, PAGE), sharex="col")
     for row, column in np.ndindex(axes.shape):
         panel, i, j = axes[row, column], chosen[row], chosen[column]
+        panel.set_title("")  # a letter for each of a corner's many panels says nothing
         if column > row:
             panel.set_axis_off()
             continue
@@ -362,9 +363,9 @@ def corner_figure(result: xr.Dataset) -> Figure:
             panel.tick_params(labelleft=column == 0)
         panel.locator_params(nbins=2)
         if row == len(chosen) - 1:
-            panel.set_xlabel(labels[names[j]].replace(" (", "\n("))
+            panel.set_xlabel(labels[names[j]].replace(" ", "\n"))
         if row and not column:
-            panel.set_ylabel(labels[names[i]].replace(" (", "\n("))
+            panel.set_ylabel(labels[names[i]].replace(" ", "\n"))
     return figure
 
 
