@@ -535,7 +535,7 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 
 
 def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """Where a flight begins, or, where none may, the equilibrium whose small motions grow least; None without any.
+    """Where a flight begins, or, where none may, the equilibrium whose modes grow least; None without any.
 
     A brake undoes those near the rotor the most.
     """

@@ -58,7 +58,9 @@ class FieldChanges:
     """What changes of the field's representation did in a flight through balls."""
 
     count: int = 0  # of the changes
-    energy: float = 0.0  # their sum U_new - U_old, each at the place of the change; relative, as the ledger's error
+    energy: float = (
+        0.0  # their sum U_new - U_old, each at the place of the change; relative, as the error of the energy balance
+    )
     total: float = 0.0  # sum of |U_new - U_old|, relative
     error: float = 0.0  # largest error of a ball's field or gradient against the table, relative
 
@@ -79,7 +81,7 @@ class Trajectory:
     beyond_plate_table: float = 0.0
     # whether it ended, as "lost", where that range does: the plate's field is not known farther on
     left_plate_table: bool = False
-    # from one representation of the rotor's field to another; the ledger is that of the motion between them
+    # from one representation of the rotor's field to another; the energy balance is that of the motion between them
     field_changes: FieldChanges = field(default_factory=FieldChanges)
 
     def __repr__(self) -> str:
@@ -131,7 +133,7 @@ HELD = 0.5
 def flight_kind(flight: Trajectory) -> str:
     """How a flight went.
 
-    Told from the mean distance, and from the size of the oscillation in the rotor's frame about its trend, in twenty
+    By the mean distance, and from the size of the oscillation in the rotor's frame about its trend, in twenty
     parts of the flight.  Lost or in contact: "not held" from the beginning; an "oscillating loss" if the oscillation
     grew more than the mean distance changed, in the whole flight or in its last part; else a "linear fall".  Still up
     at the end: "growing oscillation" if it became more than twice as large, or "drifting" if the distance goes on

@@ -14,13 +14,13 @@ from .floater_effects import FLOATER_SHAPE, FloaterCurrents, FloaterShape, RealA
 from .rotor_effects import ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
-NEAR = 2.0  # Distance from the rotor, in floater radii, at which the answers are compared with the accuracy asked for
+NEAR = 2.0  # Distance from the rotor, in floater radii, at which induced forces are compared with `rtol`
 
 
 def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> tuple[bool, str]:
     """Whether it is in `scene` and `table`, for `asked` "rigid", "mutual" or "auto" (if worth `rtol`); and why.
 
-    Raises InputError: "mutual" is asked for with a measured map, or with magnets whose answer is not known.
+    Raises InputError: "mutual" is asked for with a measured map, or with magnets whose response is not known.
     """
     if asked == "rigid":
         return False, "as asked"
@@ -56,7 +56,7 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
 
 
 def rough_part(scene: Scene, table: FieldTable) -> float:
-    """Roughly, what the answers add to the force near the rotor, relative to the rigid dipole's."""
+    """Roughly, what induced magnetisation adds to the force near the rotor, relative to the rigid dipole's."""
     magnets, floater = scene.rotor, scene.floater
     lowest = min((float(corner[2]) for magnet in magnets for corner in magnet.box.corners), default=0.0)
     direction = np.array([0.0, 0.0, 1.0])

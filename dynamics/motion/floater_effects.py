@@ -14,7 +14,7 @@ oscillating sphere), the part of the torque that is in phase with Ω is, over St
 
     h = (3 + 6q + 6q² + 2q³) / (3 (1 + 2q + 2q²)),
 
-eight at 60 Hz for the article's floater.  Seen from the laboratory a floater in step with the rotor spins steadily
+eight at 60 Hz for the article's floater.  Seen from the laboratory a frequency-locked floater spins steadily
 about the rotor's axis and swings across it once a turn: f is applied to Ω_z and h to the part of Ω across the axis.
 
 A fast way through the air separates the flow: with Re = 2Rv/ν the drag is 1 + 0.15 Re^0.687 times Stokes', within 5 %
@@ -35,7 +35,7 @@ steady turn at every frequency: what is odd in X of X (1 - τX)⁻¹ = X + τX²
 weakens, the even part the ball's lift, its push out of the field.  What changes the turn, and the drift through G, is
 taken as slow against the delays (`slow_error`); a magnet's motions are not always (`too_slow`).  Where skin depth is
 large against R all is that of a thin field, a loss κ |Ḃ|² + (2/21) R² κ |Ġ|² whose derivatives by v and w force and
-torque are.  Degree 3 is left out; it changes the growth of small motions by 1 to 2 % of this effect's at 14 to 22 mm,
+torque are.  Degree 3 is left out; it changes the growth rates of modes by 1 to 2 % of this effect's at 14 to 22 mm,
 more nearer by.
 """
 
@@ -60,7 +60,7 @@ from .state import Parameter, Vector, cross, dot
 REAL_AIR = "air beyond Stokes"
 AIR_DENSITY = 1.19  # kg/m³ at 20-25 °C
 BOUNDARY_LAYER, REST = 6.45, 32.1
-# Reynolds number at which a steady spin begins to feel more than Stokes' torque.
+# Reynolds number at which a steady spin begins to meet more than Stokes' torque.
 STOKES_UP_TO = ((16 * np.pi - REST) / BOUNDARY_LAYER) ** 2
 # Reynolds number that is added in square to that of translation, so that its power is smooth at rest: 3 % there.
 SLOW = 0.1

@@ -4,7 +4,7 @@ While the plate stands at depth d the rotor's share r_i = Re Σ_h r_ih e^{ihφ} 
 
     q_i(φ, d) = Re Σ_h λ_i/(λ_i + ihω) r_ih(d) e^{ihφ},    ∂q_i/∂t = -λ_i (q_i - r_i).
 
-What is integrated is p_i - q_i.  It hears the floater, and of the rotor only that the plate goes down, with speed u:
+What is integrated is p_i - q_i.  The floater drives it, and the rotor only as the plate goes down, with speed u:
 
     d(p_i - q_i)/dt = -λ_i (p_i - q_i - m·b_i) - u ∂q_i/∂d,    y_i = (p_i - q_i - m·b_i) + (q_i - r_i),
 
@@ -64,8 +64,8 @@ class PlateMemory:
 
     def __repr__(self) -> str:
         harmonics = len(self.share.series) // 2
-        told = f"relative error {self.error:.1e}, {harmonics} harmonics of the rotor"
-        return f"PlateMemory {self.model!r}: {told}\n{self.table!r}"
+        text = f"relative error {self.error:.1e}, {harmonics} harmonics of the rotor"
+        return f"PlateMemory {self.model!r}: {text}\n{self.table!r}"
 
 
 def plate_numbers(memory: PlateMemory, values: Array) -> Array:

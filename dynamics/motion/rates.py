@@ -87,7 +87,7 @@ class Rates:
     def rough(self) -> Rates:
         """The same by the same code, but for the numbers of effects that have some: they are zero, which costs nothing.
 
-        Of mutual magnetisation the floater's uniform answer to the rotor's field stays.
+        Of mutual magnetisation the moment that the rotor's field induces in the floater stays.
         """
         self.compile()  # both share it
         found = copy(self)

@@ -5,16 +5,16 @@ whose numbers are runtime parameters.  What bodies do to each other falls steepl
 in all its parts: in a ball they are q⁻³ times polynomials with one q of degree 2.  With degree 2 they err by a tenth of
 what polynomials of degree 3 alone do.
 
-Mutual magnetisation has one energy.  With M = m + α B0 the floater's whole moment, the rotor's answer to it and what
-the floater's own currents of magnetisation do have the energy u(x) + V(x)·M + ½ M·H(x)·M.  About one pose (searches,
-modes) the table's values and first and second derivatives are all that counts: u, V and H are polynomials of degree 2,
-1 and 0, and M is counted from the pose's.  In a ball (flights) they are q⁻³ times polynomials.
+Mutual magnetisation has one energy.  With M = m + α B0 the floater's whole moment, the magnetisation that it induces in
+the rotor and what the floater's own currents of magnetisation do have the energy u(x) + V(x)·M + ½ M·H(x)·M.  About one
+pose (searches, modes) the table's values and first and second derivatives are all that counts: u, V and H are
+polynomials of degree 2, 1 and 0, and M is counted from the pose's.  In a ball (flights) they are q⁻³ times polynomials.
 
 The currents are in metal that turns with the rotor.  A rate u_k = d/dt m·c_k is linear in eight numbers, the five of
-the traceless symmetric part of m ⊗ (drift) and the three of the rate of m, by the five of ∇c_k and the three of c_k.
-So the power is quadratic in them, with a matrix S of place alone, S_ab = Σ_k w_ka w_kb, whatever the moment is.  About
-one pose S is a constant: where the floater is in step the rates vanish, so that derivatives are right as well.  In a
-ball S is q⁻³ times polynomials of degree 1. The work that force and torque do is that power exactly.
+the traceless symmetric part of m ⊗ (drift) and the three of the rate of m, by the five of ∇c_k and the three of c_k. So
+the power is quadratic in them, with a matrix S of place alone, S_ab = Σ_k w_ka w_kb, whatever the moment is.  About one
+pose S is a constant: where the floater is frequency-locked the rates vanish, so that derivatives are right as well.  In
+a ball S is q⁻³ times polynomials of degree 1. The work that force and torque do is that power exactly.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def fitting(degree: int) -> tuple[Array, Array]:
 
 
 def falling(size: Array) -> tuple[Array, Array]:
-    """Weights (10,) of q and q⁻³ (n,) for the size (n,) > 0, at the nodes, of what is told by it."""
+    """Weights (10,) of q and q⁻³ (n,) for the size (n,) > 0, at the nodes, of what it bounds."""
     solve, basis = fitting(2)
     weights = solve @ (size / size[0]) ** (-1 / FALL)
     return weights, (basis @ weights) ** -FALL
@@ -103,7 +103,7 @@ STEP = 0.02  # Of the differences of `rough_force`, in floater radii
 class Mutual(_Near):
     """Rotor and floater magnetise each other."""
 
-    table: MutualTable  # of their answers
+    table: MutualTable  # of what they induce in each other
     moment: float  # of the floater, A m²
     name: str = MUTUAL
 
@@ -146,14 +146,14 @@ class Mutual(_Near):
         pairs = list(zip(factors, weights, strict=True))
         slope = [hy.sum([f * row[1 + j] for f, row in pairs if len(row) > 1]) for j in range(3)]
         bend = [hy.sum([f * row[4 + k] for f, row in pairs if len(row) > 4]) for k in range(len(PAIRS))]
-        scale, answer = -unit * fall, [-fall * s for s in seen]
+        scale, induced_field = -unit * fall, [-fall * s for s in seen]
         return Added(
             force=[
                 scale * hy.sum([slope[j], *(_twice(j, b) * bend[_pair(j, b)] * offset[b] for b in range(3))])
                 for j in range(3)
             ],
-            pulled=[(length * induced) * (a + b) for a, b in zip(answer, flux, strict=True)],
-            turning=[strength / hy.par[Parameter.INERTIA] * a for a in answer],
+            pulled=[(length * induced) * (a + b) for a, b in zip(induced_field, flux, strict=True)],
+            turning=[strength / hy.par[Parameter.INERTIA] * b for b in induced_field],
             energy=fall * level - 0.5 * induced * dot(motion.field, flux),
         )
 
@@ -225,7 +225,7 @@ def _twice(a: int, b: int) -> float:
 def rough_force(
     magnets: Sequence[Magnet], floater: Floater, table: FieldTable, place: Array, direction: Array
 ) -> Array:
-    """Force (3,) N that the answers of `magnets` and `floater` add to that in `table`, to a factor of two.
+    """Force (3,) N that induced magnetisation of `magnets` and `floater` adds to that in `table`, to a factor of two.
 
     At a `place` (3,) m, for a `direction` of the moment.
     """
@@ -329,7 +329,7 @@ class Dissipation(Protocol):
 
 
 def brake_slope(table: Dissipation, scene: Scene, state: State) -> Array:
-    """(12, 12): what currents of `table` add to derivatives of scaled rates of `scene`, in step in `state`."""
+    """(12, 12): what currents of `table` add to derivatives of scaled rates of `scene`, locked in `state`."""
     scales, floater = Scales.of(scene), scene.floater
     matrix = table.dissipation(state.position[None], floater.moment * state.moment[None])[0]
     units = np.repeat([scales.length, 1.0], 3) / scales.time

@@ -109,7 +109,7 @@ class RotorShare:
     distance : how far the plate goes down, m
     series : (2H+1, states, k) Chebyshev coefficients over 0…distance, √J: constant, cos φ, sin φ, cos 2φ, …
     error : estimated largest error of a signal, relative to the largest signal; in it, of harmonics that were left out
-        because the floater does not feel them (`without_high_harmonics`), what they miss of the rotor's currents' field
+        as the floater does not need them (`without_high_harmonics`), what they miss of the rotor's currents' field
     """
 
     distance: float = field(metadata={"units": "m"})
