@@ -193,17 +193,15 @@ class Question:
                 made[k] = self.levitation(point)
         axes = [sorted({point[key] for point in points}) for key in points[0]]
         places = [tuple(axis.index(value) for axis, value in zip(axes, points[k].values(), strict=True)) for k in made]
-        share(list(made.values()), places, [self._needs_equilibria(one) for one in made.values()])
-        if self.ask == "flight":
+        flights = self.ask == "flight"  # which begin at equilibria, or whose plate is about one
+        asked = [one.scene.plate is not None or not one.absolute if flights else self.ask == "equilibria"
+                 for one in made.values()]  # fmt: skip
+        share(list(made.values()), places, asked)
+        if flights:
             fly(list(made.values()), self.duration)
         for k, levitation in made.items():
             jobs[k] = partial(self._answer, points[k], levitation)
         return jobs
-
-    def _needs_equilibria(self, levitation: Levitation) -> bool:
-        if self.ask == "flight":
-            return levitation.scene.plate is not None or not levitation.absolute
-        return self.ask == "equilibria"
 
     def batches(self, points: Mapping[int, Point]) -> list[list[int]]:
         """Points that are answered together: neighbours with the same rotor, the same ones whoever computes them."""

@@ -252,46 +252,37 @@ def _on_scheduler(
 ) -> Generator[tuple[Batch, Attempt | Death], None, None]:
     """The attempts of the scheduler's workers; those of another version of the program are not used."""
     with _client(address) as client:
-        try:
-            yield from _answers(client, address, job, batches)
-        except (OSError, TimeoutError, RuntimeError) as error:
-            if isinstance(error, ComputationError) or client.status == "running":
-                raise
-            raise _lost(address) from None
+        from concurrent.futures import CancelledError
 
+        from distributed import as_completed
+        from distributed.scheduler import KilledWorker
 
-def _answers(client: Client, address: str, job: Any, batches: deque[Batch]) -> Iterator[tuple[Batch, Attempt | Death]]:
-    from concurrent.futures import CancelledError
-
-    from distributed import as_completed
-    from distributed.scheduler import KilledWorker
-
-    of_us = _workers_of_us(client, address)
-    begun: dict[Future[Any], Batch] = {}
-    running = as_completed(loop=client.loop)
-    while batches or begun:
-        while batches:
-            batch = batches.popleft()
-            future = client.submit(answered, program(), job, batch, pure=False, workers=of_us or None)
-            begun[future] = batch
-            running.add(future)
-        batch = begun.pop(future := next(running))
-        try:
-            found: list[Attempt] | None = future.result()
-        except KilledWorker as error:
-            yield batch, Death("died", error.allowed_failures + 1)
-            continue
-        except (CancelledError, OSError):
-            raise _lost(address) from None
-        except Exception:  # of a worker that does not know what is asked of it
-            found = None
-        future.release()
-        if found is None:  # of a worker that has come since
-            of_us = _workers_of_us(client, address)
-            if not of_us:
-                raise _lost(address)
-            batches.append(batch)
-        yield from ((batch, attempt) for attempt in found or ())
+        of_us = _workers_of_us(client, address)
+        begun: dict[Future[Any], Batch] = {}
+        running = as_completed(loop=client.loop)
+        while batches or begun:
+            while batches:
+                batch = batches.popleft()
+                future = client.submit(answered, program(), job, batch, pure=False, workers=of_us or None)
+                begun[future] = batch
+                running.add(future)
+            batch = begun.pop(future := next(running))
+            try:
+                found: list[Attempt] | None = future.result()
+            except KilledWorker as error:
+                yield batch, Death("died", error.allowed_failures + 1)
+                continue
+            except (CancelledError, OSError):
+                raise _lost(address) from None
+            except Exception:  # of a worker that does not know what is asked of it
+                found = None
+            future.release()
+            if found is None:  # of a worker that has come since
+                of_us = _workers_of_us(client, address)
+                if not of_us:
+                    raise _lost(address)
+                batches.append(batch)
+            yield from ((batch, attempt) for attempt in found or ())
 
 
 def answered(asked_by: str, job: Any, batch: Batch) -> list[Attempt] | None:
@@ -345,6 +336,10 @@ def _client(address: str) -> Iterator[Client]:
         ) from None
     try:
         yield client
+    except (OSError, TimeoutError, RuntimeError) as error:
+        if isinstance(error, ComputationError) or client.status == "running":
+            raise
+        raise _lost(address) from None
     finally:
         # Of a scheduler that is gone, until the client has given up; its thread must not outlive the interpreter.
         with suppress(OSError, TimeoutError):
