@@ -182,7 +182,7 @@ def test_a_command_on_a_terminal_that_knows_only_ascii(tmp_path, settings):
     environment = {**os.environ, "PYTHONCOERCECLOCALE": "0", **settings}
     done = subprocess.run([*command, *arguments], capture_output=True, check=False, env=environment)
     assert done.returncode == 0, done.stderr
-    assert re.search(rb"polar angle \d+\.\ddeg; stable", done.stdout)
+    assert re.search(rb"Stable levitation .* polar angle \d+\.\ddeg\. .* s-1 by air drag", done.stdout)
     assert (done.stdout + done.stderr).isascii()
 
 
