@@ -176,7 +176,7 @@ class Mutual(_Near):
         units = np.repeat(np.concatenate([length, np.ones_like(length)], axis=1), 3, axis=1)
         slope, second = slope * units, second * units[:, :, None] * units[:, None, :]
         quadratic = np.stack([second[:, a, b] / _twice(a, b) for a, b in PAIRS], axis=1)
-        linear = np.concatenate([slope[:, 3:, None], second[:, 3:, :3]], axis=2).reshape(len(place), -1)
+        linear = np.concatenate([slope[:, 3:, None], second[:, 3:, :3]], axis=2).reshape(len(place), 12)
         constant = np.stack([second[:, 3 + a, 3 + b] for a, b in PAIRS], axis=1)
         return np.concatenate([position, whole, energy[:, None], slope[:, :3], quadratic, linear, constant], axis=1)
 
