@@ -106,16 +106,14 @@ def _mantle(radius: float, half: float, points: Array, slopes: bool = False) -> 
         chosen = np.flatnonzero((width >= least) & (width < upper))
         for part in np.array_split(chosen, max(1, len(chosen) * nodes // CHUNK)):
             sums = _sums(radius, half, rho[part], z[part], width[part], nodes, slopes)
-            tensor[part] = _symmetric_tensor(*sums[:4])
+            xx, yy, xz, zz = sums[:4]
+            nothing = np.zeros_like(xx)
+            rows = [[xx, nothing, xz], [nothing, yy, nothing], [xz, nothing, zz]]
+            tensor[part] = np.moveaxis(np.array(rows), -1, 0)
             if slopes:
                 slope[part] = _symmetric_slope(*sums[4:])
         upper = least
     return tensor[owner.ravel()], slope[owner.ravel()] if slopes else slope
-
-
-def _symmetric_tensor(xx: Array, yy: Array, xz: Array, zz: Array) -> Array:
-    nothing = np.zeros_like(xx)
-    return np.moveaxis(np.array([[xx, nothing, xz], [nothing, yy, nothing], [xz, nothing, zz]]), -1, 0)
 
 
 def _symmetric_slope(xxx: Array, xyy: Array, xxz: Array, yyz: Array, xzz: Array) -> Array:

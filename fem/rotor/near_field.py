@@ -139,18 +139,6 @@ class NearField:
         return self.flux_density - self.field
 
 
-def _off_faces(magnets: Sequence[Magnet], points: Array) -> Array:
-    """Points (n, 3) m, those on a face of a magnet moved out of it by `OFF_FACE`: H jumps there."""
-    moved = points.copy()
-    for magnet in magnets:
-        on = np.abs(magnet.body.distance(points)) < OFF_FACE
-        if on.any():
-            steps = ON_EDGE / 2 * np.eye(3)
-            slope = [magnet.body.distance(points[on] + s) - magnet.body.distance(points[on] - s) for s in steps]
-            moved[on] += OFF_FACE * np.transpose(slope) / ON_EDGE
-    return moved
-
-
 def near_field(
     magnets: Sequence[Magnet],
     points: ArrayLike,
@@ -174,7 +162,13 @@ def near_field(
     """
     places = np.asarray(points, float).reshape(-1, 3)
     refuse_edges(magnets, places)
-    places = _off_faces(magnets, places)
+    given, places = places, places.copy()
+    for magnet in magnets:  # H jumps at a face: points on it are moved out
+        on = np.abs(magnet.body.distance(given)) < OFF_FACE
+        if on.any():
+            steps = ON_EDGE / 2 * np.eye(3)
+            slope = [magnet.body.distance(given[on] + s) - magnet.body.distance(given[on] - s) for s in steps]
+            places[on] += OFF_FACE * np.transpose(slope) / ON_EDGE
     solved = elements or NearElements(magnets)
     rows = [UniformField(one).rows(np.ascontiguousarray(places.T)) for one in solved.carriers if one.polarization.any()]
     closed = sum(rows, np.zeros((12, len(places))))
