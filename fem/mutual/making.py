@@ -20,8 +20,6 @@ from .samples import (
     NEAR_GAPS,
     ROTOR_GAPS,
     SPHERE_GAPS,
-    ReturnedSamples,
-    SphereSamples,
     places_around,
     places_facing,
     response_products,
@@ -164,12 +162,12 @@ def mutual_table(
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
         places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)])
         near = places_around(magnets, floater.radius, NEAR_GAPS, 90, 3) if len(magnets) > 1 else places[:0]
-        samples = sphere_samples(rotor, floater, np.concatenate([places, near]), watch)
-        grids, pairs = sphere_fit(grids, images, samples)
+        both = np.concatenate([places, near])
+        grids, pairs = sphere_fit(grids, images, both, sphere_samples(rotor, floater, both, watch))
         if rotor.regions is not None:
             fewer = np.concatenate([facing, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
             returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
-            grids, mixed = returned_fit(grids, inner, images, returned)
+            grids, mixed = returned_fit(grids, inner, images, fewer, returned)
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, floater.polarizability)
     gaps, errors = mutual_errors(table, rotor, fine, floater, watch)
     made: dict[str, str | float] = {"order": order, "seconds": time.perf_counter() - started}
@@ -265,7 +263,7 @@ def cached_mutual_table(
 
 
 def sphere_fit(
-    grids: Sequence[ResponseGrid], images: Array, samples: SphereSamples
+    grids: Sequence[ResponseGrid], images: Array, places: Array, samples: Sequence[Array]
 ) -> tuple[list[ResponseGrid], Array]:
     """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
 
@@ -273,17 +271,18 @@ def sphere_fit(
     ----------
     grids : whose `degrees` are sought
     images : weights of the sphere's images
-    samples : the response of degree 2 and more
+    places, samples : (n, 3) m, and what `sphere_samples` gives there
     """
+    energy, force, energy_size, force_size = samples
 
-    def scaled(energy: Array, slope: Array, _: Array) -> Array:
+    def scaled(value: Array, slope: Array, _: Array) -> Array:
         by_place = np.moveaxis(slope[..., :3], -1, 0)
-        return np.concatenate([energy / samples.energy_size, *(by_place / samples.force_size)], axis=1)
+        return np.concatenate([value / energy_size, *(by_place / force_size)], axis=1)
 
     pairs = list(combinations(range(len(grids)), 2))
     sums = [pair_sum(grids[a], grids[b], images) for a, b in pairs]
-    right = scaled(samples.energy[None], -samples.force[None], samples.force)[0]
-    found, weights = _fitted(grids, OF_SPHERE, sums, samples.places, scaled, right, HELD)
+    right = scaled(energy[None], -force[None], force)[0]
+    found, weights = _fitted(grids, OF_SPHERE, sums, places, scaled, right, HELD)
     coupled = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         coupled[a, b] = coupled[b, a] = weight
@@ -291,7 +290,7 @@ def sphere_fit(
 
 
 def returned_fit(
-    grids: Sequence[ResponseGrid], inner: Sequence[Array], images: Array, samples: ReturnedSamples
+    grids: Sequence[ResponseGrid], inner: Sequence[Array], images: Array, places: Array, samples: tuple[Array, Array]
 ) -> tuple[list[ResponseGrid], Array]:
     """Weights of the points' powers, and of pairs, that give V and its slopes.
 
@@ -300,9 +299,10 @@ def returned_fit(
     grids : whose `returned` are sought
     inner : (k, 3) m of each magnet, points that respond for the whole of it
     images : weights of the sphere's images
-    samples : the rotor's response to the sphere's
+    places, samples : (n, 3) m, and what `returned_samples` gives there
     """
-    sizes = np.linalg.norm(samples.field, axis=1)[:, None], np.linalg.norm(samples.slope, axis=(1, 2))[:, None, None]
+    field, change = samples
+    sizes = np.linalg.norm(field, axis=1)[:, None], np.linalg.norm(change, axis=(1, 2))[:, None, None]
 
     def scaled(_: Array, slope: Array, second: Array) -> Array:
         parts = slope[..., 3:] / sizes[0], second[..., 3:, :3] / sizes[1]
@@ -311,8 +311,8 @@ def returned_fit(
     pairs = list(permutations(range(len(grids)), 2))
     sums = [mixed_sum(grids[a], inner[b], images) for a, b in pairs]
     # the energy is -M·V
-    right = -np.concatenate([(samples.field / sizes[0]).ravel(), (samples.slope / sizes[1]).ravel()])
-    found, weights = _fitted(grids, OF_RETURN, sums, samples.places, scaled, right, 10 * HELD)
+    right = -np.concatenate([(field / sizes[0]).ravel(), (change / sizes[1]).ravel()])
+    found, weights = _fitted(grids, OF_RETURN, sums, places, scaled, right, 10 * HELD)
     mixed = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         mixed[a, b] = weight

@@ -1,7 +1,6 @@
 """Responses of rotor and floater at sampled places: by finite elements, and exactly for the sphere."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -120,25 +119,7 @@ def response_products(rotor: RotorResponse, fine: RotorResponse, places: Array, 
     return direct, size * size[:, None] * (shares @ ((found + found.T) / 2) @ shares.T)
 
 
-@dataclass(frozen=True, eq=False)
-class SphereSamples:
-    """The sphere's response to the rotor's field at places (n, 3).
-
-    Parameters
-    ----------
-    places : m
-    energy, force : (n,) J and (n, 3) N of the response of degree 2 and more
-    energy_size, force_size : (n,) of the whole response
-    """
-
-    places: Array
-    energy: Array
-    force: Array
-    energy_size: Array
-    force_size: Array
-
-
-def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch: Watch) -> SphereSamples:
+def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch: Watch) -> list[Array]:
     """The sphere's response, degree by degree, to the rotor's own field.
 
     Parameters
@@ -146,6 +127,10 @@ def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch:
     rotor, floater : each alone
     places : (n, 3) m of the floater's centre
     watch : hears of the progress
+
+    Returns
+    -------
+    Energy (n,) J and force (n, 3) N of the response of degree 2 and more, and the sizes (n,) of those of the whole
     """
     dipoles, rows = rotor.own_dipoles(), []
     for place in watched(places, watch, "induced magnetisation of the floater"):
@@ -161,22 +146,7 @@ def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch:
         scale = FOUR_PI * floater.radius**3 / MU_0 / 2
         energies = scale * reflection(floater.recoil_permeability, degree) * square
         rows.append((-energies[2:].sum(), whole - uniform, energies.sum(), np.linalg.norm(whole)))
-    return SphereSamples(places, *(np.array(column) for column in zip(*rows, strict=True)))
-
-
-@dataclass(frozen=True, eq=False)
-class ReturnedSamples:
-    """The rotor's response to the sphere's response of degree 2 and more to the rotor's field, at places (n, 3).
-
-    Parameters
-    ----------
-    places : m
-    field, slope : (n, 3) T at the sphere's centre, and (n, 3, 3) T/m: its change as the sphere moves along x, y, z
-    """
-
-    places: Array
-    field: Array
-    slope: Array
+    return [np.array(column) for column in zip(*rows, strict=True)]
 
 
 def returned_samples(
@@ -187,8 +157,10 @@ def returned_samples(
     coupling: Array,
     places: Array,
     watch: Watch,
-) -> ReturnedSamples:
-    """The same from the points that respond for the rotor: to 2e-3 what its finite elements give from 1 mm off contact.
+) -> tuple[Array, Array]:
+    """The rotor's response to the sphere's response of degree 2 and more to the rotor's field.
+
+    By the points that respond for the rotor: to 2e-3 what its finite elements give from 1 mm off contact.
 
     The energy is -M·V of the moment M. A unit moment and the sphere's response to B0 are sources, the rotor responds to
     both, and the sphere to its response to the moment: the forces of the three are the derivatives of V.
@@ -199,6 +171,10 @@ def returned_samples(
     grids, inner, coupling : points (n, 3) m and weights that respond for the rotor, see `MutualTable`
     places : (n, 3) m of the floater's centre
     watch : hears of the progress
+
+    Returns
+    -------
+    (n, 3) T at the sphere's centre, and (n, 3, 3) T/m: its change as the sphere moves along x, y, z
     """
     dipoles, fields, slopes = rotor.own_dipoles(), [], []
 
@@ -219,7 +195,7 @@ def returned_samples(
             slope.append(np.sum([multipole_force(*pair, ball) for pair in pairs], axis=0))
         fields.append(field_at_center(back))
         slopes.append(slope)
-    return ReturnedSamples(places, np.array(fields), np.array(slopes))
+    return np.array(fields), np.array(slopes)
 
 
 def point_response(

@@ -167,8 +167,8 @@ def near_field(
         on = np.abs(magnet.body.distance(given)) < OFF_FACE
         if on.any():
             steps = ON_EDGE / 2 * np.eye(3)
-            slope = [magnet.body.distance(given[on] + s) - magnet.body.distance(given[on] - s) for s in steps]
-            places[on] += OFF_FACE * np.transpose(slope) / ON_EDGE
+            rise = [magnet.body.distance(given[on] + s) - magnet.body.distance(given[on] - s) for s in steps]
+            places[on] += OFF_FACE * np.transpose(rise) / ON_EDGE
     solved = elements or NearElements(magnets)
     rows = [UniformField(one).rows(np.ascontiguousarray(places.T)) for one in solved.carriers if one.polarization.any()]
     closed = sum(rows, np.zeros((12, len(places))))

@@ -117,12 +117,13 @@ class RotorTable:
         ------
         RangeError : a point lies in a magnet or where an expansion does not converge
         """
-        columns = as_columns(points)
-        outside = self._in_range(columns)
+        columns, outside = as_columns(points), self.in_range(points)
         if not outside.all():
             where = ", ".join(f"{c * 1e3:.6g}" for c in columns[:, int(np.argmin(outside))])
+            nearest = max((expansion.nearest for expansion in self.expansions), default=0.0)
+            beyond = f" and farther than {nearest * 1e3:.4g} mm from their centres" if nearest else ""
             raise RangeError(
-                f"Input points must lie outside the magnets{self._beyond()}; instead received a point at ({where}) mm."
+                f"Input points must lie outside the magnets{beyond}; instead received a point at ({where}) mm."
             )
         rows = np.zeros((12, columns.shape[1]))
         for form in self._closed_forms:  # apart from the series: far away and near surfaces they have other forms
@@ -136,10 +137,6 @@ class RotorTable:
         """(3,) dipole moment of the whole rotor, A m²."""
         parts = [magnet.moment for magnet in self.uniform] + [expansion.moment for expansion in self.expansions]
         return np.asarray(np.sum(parts, axis=0))
-
-    def _beyond(self) -> str:
-        nearest = max((expansion.nearest for expansion in self.expansions), default=0.0)
-        return f" and farther than {nearest * 1e3:.4g} mm from their centres" if nearest else ""
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated relative errors (n,) of B and of its gradient (Frobenius norm)."""
@@ -214,9 +211,7 @@ class RotorTable:
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""
-        return self._in_range(as_columns(points))
-
-    def _in_range(self, columns: Array) -> NDArray[np.bool_]:
+        columns = as_columns(points)
         outside = np.ones(columns.shape[1], bool)
         for magnet in self.magnets:
             near = squared_distance(columns, magnet.body.center) < magnet.body.circumradius**2
