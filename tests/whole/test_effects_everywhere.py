@@ -1,0 +1,128 @@
+"""Each effect changes each answer: equilibria, modes, trajectories, ensembles, maps, sweeps and live flights.
+
+The same walk is the table in docs/architecture.md.
+"""
+
+import re
+
+import numpy as np
+import pytest
+from places import DOCS
+
+import spinlev as sl
+
+BASE = """
+frequency_hz = 130.0
+[rotor]
+configuration = "tilt"
+angle_deg = 10.0
+edge_mm = 10.0
+remanence_T = 1.305
+recoil_permeability = 1.05
+[floater]
+diameter_mm = 12.7
+remanence_T = 1.305
+density_kg_m3 = 7500.0
+[drag]
+linear_N_s_m = 2.2e-6
+angular_N_m_s = 1.2e-10
+"""
+PLATE = """
+[plate]
+size_mm = [100.0, 240.0, 30.0]
+center_mm = [0.0, 0.0, -52.0]
+conductivity_S_m = 3.5e7
+"""
+START = """
+[start]
+position_mm = [0.0, 0.0, -18.9]
+velocity_mm_s = [0.0, 0.0, 5.0]
+"""
+DIPOLE = sl.Models("dipole", "none", interaction="rigid")
+EFFECTS = {
+    "mutual magnetisation": (BASE, BASE, sl.Models("fem", "none", 1e-3, interaction="rigid"), "mutual"),
+    "currents in the rotor": (BASE, BASE.replace("recoil", "conductivity_S_m = 6.7e6\nrecoil"), DIPOLE, "rigid"),
+    "currents in the floater": (BASE, BASE.replace("density", "conductivity_S_m = 6.7e6\ndensity"), DIPOLE, "rigid"),
+    "air beyond Stokes": (BASE, BASE.partition("linear")[0] + 'model = "air"\n', DIPOLE, "rigid"),
+    "eddy currents in a plate": (BASE, BASE + PLATE, DIPOLE, "rigid"),
+    "a floater that is no sphere": (
+        BASE, BASE.replace("diameter_mm", 'shape = "cylinder"\nheight_mm = 11.0\ndiameter_mm'), DIPOLE, "rigid",
+    ),
+}  # fmt: skip
+
+
+def models(effect, there):
+    """The models of a scene with or without an effect."""
+    *_, alone, interaction = EFFECTS[effect]
+    over = "slab" if "plate" in effect and there else "none"
+    return sl.Models(alone.model, over, alone.rtol, interaction=interaction if there else "rigid")
+
+
+def levitation(text, asked):
+    return sl.Levitation(sl.parse_scene(text), asked)
+
+
+def equilibria(text, asked):
+    found = levitation(text, asked).equilibria[0]
+    return np.append(found.position, found.growth_per_s)  # a floater that turns with the metal leaves no currents in it
+
+
+def modes(text, asked):
+    return np.sort([mode.growth_per_s for mode in levitation(text, asked).stability.modes])
+
+
+def trajectory(text, asked):
+    return levitation(text + START, asked).flight(0.1).lab.position[-1]
+
+
+def ensemble(text, asked):
+    starts = {"position_mm": [[0.0, 0.0, -18.9]], "velocity_mm_s": [0.0, 0.0, 5.0]}
+    chosen = {"model": asked.model, "rtol": asked.rtol, "interaction": asked.interaction}
+    return sl.ensemble(sl.parse_scene(text), starts, 0.1, plate_model=asked.plate_model, **chosen).position.values[0]
+
+
+def sweep(text, asked):
+    """Over frequencies, whose equilibria are those of one map."""
+    chosen = {"model": asked.model, "rtol": asked.rtol, "interaction": asked.interaction}
+    scene, over = sl.parse_scene(text), {"frequency_hz": [129.0, 130.0]}
+    return sl.sweep(scene, over, "equilibria", plate_model=asked.plate_model, **chosen).growth.values
+
+
+def live_flight(text, asked):
+    return levitation(text + START, asked).live_flight().onward(0.1).lab.position[-1]
+
+
+USES = (equilibria, modes, trajectory, ensemble, sweep, live_flight)
+REFUSED = {
+    ("a floater that is no sphere", "ensemble"): "many fly side by side",
+}
+"""What is refused in a sentence; all else answers, and otherwise than without the effect."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("use", USES, ids=lambda use: use.__name__)
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_the_effect_is_in_the_answer(effect, use):
+    without, text, *_ = EFFECTS[effect]
+    refused = REFUSED.get((effect, use.__name__))
+    if refused:
+        with pytest.raises(sl.InputError, match=refused):
+            use(text, models(effect, True))
+        return
+    bare, whole = use(without, models(effect, False)), use(text, models(effect, True))
+    assert np.isfinite(whole).any()
+    apart = np.nanmax(np.abs(np.asarray(whole) - bare)) / np.nanmax(np.abs(bare))
+    assert apart > 1e-9, (effect, use.__name__)
+
+
+def test_the_table_in_the_docs_is_this_walk():
+    """One row an effect, one column a use, a dash and a note where it is refused."""
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    head, rows = re.search(r"\| effect \|(.*)\|\n\|[- |]*\|\n((?:\|.*\n)+)", text).groups()
+    columns = [name.strip() for name in head.split("|")]
+    assert columns == [use.__name__.replace("_", " ") for use in USES]
+    found = [[cell.strip() for cell in row.strip().strip("|").split("|")] for row in rows.splitlines()]
+    assert [row[0] for row in found] == list(EFFECTS)
+    for name, *cells in found:
+        for column, cell in zip(columns, cells, strict=True):
+            assert (cell != "yes") == ((name, column) in REFUSED), (name, column)
