@@ -15,16 +15,10 @@ from .uniform import attraction, newton_potential
 
 @dataclass(frozen=True, eq=False)
 class Dipole:
-    """A point dipole, A = (μ0/4π) m × r/r³.
+    """A point dipole, A = (μ0/4π) m × r/r³."""
 
-    Parameters
-    ----------
-    position : (3,) m
-    moment : (3,) A m²
-    """
-
-    position: Array
-    moment: Array
+    position: Array  # (3,) m
+    moment: Array  # (3,) A m²
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", frozen_array(self.position, (3,)))
@@ -50,16 +44,10 @@ class HomogeneousField:
 
 @dataclass(frozen=True, eq=False)
 class PolarizedCuboid:
-    """A cuboid with uniform polarisation: A = (1/4π) J × ∫ r/r³ dV, exact outside and inside.
+    """A cuboid with uniform polarisation: A = (1/4π) J × ∫ r/r³ dV, exact outside and inside."""
 
-    Parameters
-    ----------
-    box : shape and pose
-    polarization : (3,) T, in the frame in which the box is placed
-    """
-
-    box: Box
-    polarization: Array
+    box: Box  # shape and pose
+    polarization: Array  # (3,) T, in the frame in which the box is placed
 
     @classmethod
     def of_magnet(cls, magnet: Magnet) -> Self:
@@ -84,23 +72,15 @@ QUARTERS = ((1, 1, 0.0), (-1, 1, np.pi / 2), (-1, -1, np.pi), (1, -1, 1.5 * np.p
 
 @dataclass(frozen=True, eq=False)
 class Racetrack:
-    """A rectangular coil with rounded corners, axis along z, current counter-clockwise seen from +z.
+    """A rectangular coil with rounded corners, axis along z, current counter-clockwise seen from +z."""
 
-    Parameters
-    ----------
-    center : (3,) m
-    outer : outer edge lengths along x and y, m
-    height : length along z, m
-    inner_radius, outer_radius : of the corners, m; their difference is the width of the winding
-    ampere_turns : total current, A
-    """
-
-    center: Array
-    outer: tuple[float, float]
-    height: float
+    center: Array  # (3,) m
+    outer: tuple[float, float]  # outer edge lengths along x and y, m
+    height: float  # length along z, m
+    # inner_radius, outer_radius: of the corners, m; their difference is the width of the winding
     inner_radius: float
     outer_radius: float
-    ampere_turns: float
+    ampere_turns: float  # total current, A
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen_array(self.center, (3,)))

@@ -152,42 +152,25 @@ SIZES = tuple(zip((1.0, 0.8, 0.5), OTHERWISE, strict=True))
 
 @dataclass(frozen=True)
 class Refinement:
-    """How fine a solution is.
+    """How fine a solution is."""
 
-    Parameters
-    ----------
-    order : of the elements
-    mesh : the mesh's settings
-    boundary_degree : to which the outer boundary is exactly open
-    """
-
-    order: int
-    mesh: MeshSettings
-    boundary_degree: int
+    order: int  # of the elements
+    mesh: MeshSettings  # the mesh's settings
+    boundary_degree: int  # to which the outer boundary is exactly open
 
 
 @dataclass(frozen=True, eq=False)
 class RotorSolution:
-    """Expansions of ψ's field outside, in the rotor's frame.
+    """Expansions of ψ's field outside, in the rotor's frame."""
 
-    Parameters
-    ----------
-    coefficients : c_lm (T), one per cell of every piece about its centre in `split`, one about the mesh's in `direct`
-    spheres : centre (3,) m and radius m of every expansion, in the rotor's frame
-    mesh : of the part of space that the mirror planes leave, in their frame
-    unknowns : number of unknowns
-    layers : of elements at the edges; fewer than asked for where the mesher cannot match more
-    symmetry : the frame of the mesh and its mirror planes
-    parts : the potentials of every parity
-    """
-
+    # c_lm (T), one per cell of every piece about its centre in `split`, one about the mesh's in `direct`
     coefficients: tuple[Coefficients, ...]
-    spheres: tuple[tuple[Array, float], ...]
-    mesh: MagnetMesh
-    unknowns: int
-    layers: int
-    symmetry: Symmetry
-    parts: tuple[Solution, ...]
+    spheres: tuple[tuple[Array, float], ...]  # centre (3,) m and radius m of every expansion, in the rotor's frame
+    mesh: MagnetMesh  # of the part of space that the mirror planes leave, in their frame
+    unknowns: int  # number of unknowns
+    layers: int  # of elements at the edges; fewer than asked for where the mesher cannot match more
+    symmetry: Symmetry  # the frame of the mesh and its mirror planes
+    parts: tuple[Solution, ...]  # the potentials of every parity
 
     def expansions(self, coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
         """Expansions about the same spheres with other coefficients."""

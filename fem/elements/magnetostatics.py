@@ -32,25 +32,16 @@ BOUNDARY_DEGREE = 8  # harmonics up to this degree see an exactly open boundary;
 
 @dataclass(frozen=True, eq=False)
 class PermeableRegions:
-    """Bodies, their matrix and its factors; made by `assemble_regions`.
+    """Bodies, their matrix and its factors; made by `assemble_regions`."""
 
-    Parameters
-    ----------
-    names : of the bodies
-    owner : (n,) number of the body of each integration point
-    points, weights : (n, 3) and (n,) in the mesh's coordinates
-    susceptibility : (n, 3, 3) μ - 1 at each
-    slopes : (3n, unknowns) gradients of the basis at the points
-    factor : of the matrix
-    """
-
-    names: tuple[str, ...]
-    owner: NDArray[np.intp]
+    names: tuple[str, ...]  # of the bodies
+    owner: NDArray[np.intp]  # (n,) number of the body of each integration point
+    # points, weights: (n, 3) and (n,) in the mesh's coordinates
     points: Array
     weights: Array
-    susceptibility: Array
-    slopes: scipy.sparse.csr_matrix
-    factor: OpenFactor
+    susceptibility: Array  # (n, 3, 3) μ - 1 at each
+    slopes: scipy.sparse.csr_matrix  # (3n, unknowns) gradients of the basis at the points
+    factor: OpenFactor  # of the matrix
 
     def magnetization(self, field: Array) -> Array:
         """μ0 M (n, 3) T at the points for a given field H0 (n, 3) T there."""
@@ -100,19 +91,13 @@ WAY_OUT = "Allow a larger error of the field (--rtol)"
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The assembled left-hand side on one mesh.
+    """The assembled left-hand side on one mesh."""
 
-    Parameters
-    ----------
-    mesh, order : as given to `assemble`
-    space : H1
-    stiffness : condensed, with the Robin term of the outer sphere
-    """
-
+    # mesh, order: as given to `assemble`
     mesh: MagnetMesh
     order: int
-    space: Any
-    stiffness: Any
+    space: Any  # H1
+    stiffness: Any  # condensed, with the Robin term of the outer sphere
 
     @property
     def unknowns(self) -> int:
@@ -122,19 +107,13 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A potential of one parity and what belongs to it.
+    """A potential of one parity and what belongs to it."""
 
-    Parameters
-    ----------
-    system, signs : as given to `solve`
-    potential : ψ, T times mesh unit (an NGSolve function)
-    boundary : the open boundary
-    """
-
+    # system, signs: as given to `solve`
     system: System
     signs: tuple[int, ...]
-    potential: Any
-    boundary: OpenBoundary
+    potential: Any  # ψ, T times mesh unit (an NGSolve function)
+    boundary: OpenBoundary  # the open boundary
 
 
 def assemble(mesh: MagnetMesh, order: int) -> System:

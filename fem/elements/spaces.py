@@ -24,14 +24,9 @@ from ...geometry.common import Array
 
 @dataclass(frozen=True)
 class Parity:
-    """The mirrors of a geometry.
+    """The mirrors of a geometry."""
 
-    Parameters
-    ----------
-    mirrors : axes whose plane through the origin is a mirror
-    """
-
-    mirrors: tuple[int, ...]
+    mirrors: tuple[int, ...]  # axes whose plane through the origin is a mirror
 
     @property
     def flips(self) -> Array:
@@ -59,20 +54,12 @@ class Parity:
 
 @dataclass(frozen=True, eq=False)
 class IntegrationPoints:
-    """Points and weights of one region.
+    """Points and weights of one region."""
 
-    Parameters
-    ----------
-    space : NGSolve space with one unknown per point
-    region : NGSolve region
-    measure : differential symbol that integrates over the region with exactly these points
-    weights : (n,)
-    """
-
-    space: Any
-    region: Any
-    measure: Any
-    weights: Array
+    space: Any  # NGSolve space with one unknown per point
+    region: Any  # NGSolve region
+    measure: Any  # differential symbol that integrates over the region with exactly these points
+    weights: Array  # (n,)
 
     @cached_property
     def points(self) -> Array:

@@ -180,16 +180,10 @@ def _real_values(degree: int) -> Array:
 
 @dataclass(frozen=True)
 class BallField:
-    """The field in a ball that runtime parameters describe: centre (m), 1/radius (1/m; 0: no ball), weights.
+    """The field in a ball that runtime parameters describe: centre (m), 1/radius (1/m; 0: no ball), weights."""
 
-    Parameters
-    ----------
-    first : number of the first of these parameters
-    degree : of the potential: 7, 8 and 9 ask for 613, 780 and 966 operations where the table of a cube has 1824
-    """
-
-    first: int
-    degree: int
+    first: int  # number of the first of these parameters
+    degree: int  # of the potential: 7, 8 and 9 ask for 613, 780 and 966 operations where the table of a cube has 1824
 
     @property
     def count(self) -> int:

@@ -64,16 +64,10 @@ DIRECT_DIGITS = 16.0  # as `grid.DIGITS`, for the direct part of the response
 
 @dataclass(frozen=True, eq=False)
 class RotorResponse:
-    """A rotor that responds to fields; made by `rotor_response`.
+    """A rotor that responds to fields; made by `rotor_response`."""
 
-    Parameters
-    ----------
-    mesh : of the magnets
-    regions : their finite elements, or None where every μ = 1
-    """
-
-    mesh: MagnetMesh
-    regions: PermeableRegions | None
+    mesh: MagnetMesh  # of the magnets
+    regions: PermeableRegions | None  # their finite elements, or None where every μ = 1
 
     @property
     def magnets(self) -> tuple[Magnet, ...]:
@@ -219,30 +213,19 @@ class Wrench:
 
 @dataclass(frozen=True, eq=False)
 class TwoBody:
-    """A rotor and a floater in mutual equilibrium of their magnetisation.
+    """A rotor and a floater in mutual equilibrium of their magnetisation."""
 
-    Parameters
-    ----------
-    ball : the floater's centre and radius
-    rigid : rotor's own field on the rigid dipole
-    floater_answer : what the sphere's answer to the rotor's own field adds
-    rotor_answer : what the rotor's answer to the rigid dipole adds
-    total : both bodies answer to both; the sum of the three but for products of two answers
-    own, incident, sources : a_lm (T) of the rotor alone, a_lm and c_lm (T) of the total
-    terms : of the series
-    tail : estimated relative error by the degrees left out, of what the answers add
-    """
-
-    ball: Ball
-    rigid: Wrench
-    floater_answer: Wrench
-    rotor_answer: Wrench
-    total: Wrench
+    ball: Ball  # the floater's centre and radius
+    rigid: Wrench  # rotor's own field on the rigid dipole
+    floater_answer: Wrench  # what the sphere's answer to the rotor's own field adds
+    rotor_answer: Wrench  # what the rotor's answer to the rigid dipole adds
+    total: Wrench  # both bodies answer to both; the sum of the three but for products of two answers
+    # own, incident, sources: a_lm (T) of the rotor alone, a_lm and c_lm (T) of the total
     own: Coefficients
     incident: Coefficients
     sources: Coefficients
-    terms: int
-    tail: float
+    terms: int  # of the series
+    tail: float  # estimated relative error by the degrees left out, of what the answers add
 
 
 def two_body(

@@ -179,17 +179,11 @@ def _scaled(place: Sequence[Any], point: Sequence[Any], inverse: Any) -> list[An
 
 @dataclass(frozen=True, eq=False)
 class EnergySum:
-    """Σ formula(place, moment, row) over rows: written out for equations of motion, or evaluated with derivatives.
+    """Σ formula(place, moment, row) over rows: written out for equations of motion, or evaluated with derivatives."""
 
-    Parameters
-    ----------
-    formula : of one row
-    rows : (n, k) numbers of the formula
-    origin, axes : (3,) m and (3, 3) by columns, of the frame in which the formula is written
-    """
-
-    formula: Formula
-    rows: Array
+    formula: Formula  # of one row
+    rows: Array  # (n, k) numbers of the formula
+    # origin, axes: (3,) m and (3, 3) by columns, of the frame in which the formula is written
     origin: Array = field(default_factory=lambda: np.zeros(3))
     axes: Array = field(default_factory=lambda: np.eye(3))
 
@@ -248,26 +242,15 @@ def _kernel(formula: Formula, width: int) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class ResponseGrid:
-    """Points of one magnet with their energies, see `point_energy`.
+    """Points of one magnet with their energies, see `point_energy`."""
 
-    Parameters
-    ----------
-    box : of the magnet, see `response_box`
-    axis : (3,) direction of its remanence along the body's axes; zero: none
-    radius : of the floater, m
-    counts : points along each body axis
-    strengths : (n, 3) λ, A m²/T, along the body's axes
-    degrees : (n, 3, 2) v and w of each power, J
-    returned : (n, 2, 2) s and t of each power, T
-    """
-
-    box: Box
-    axis: Array
-    radius: float = field(metadata={"units": "m"})
-    counts: tuple[int, int, int]
-    strengths: Array = field(metadata={"units": "A m2/T"})
-    degrees: Array = field(metadata={"units": "J"})
-    returned: Array = field(metadata={"units": "T"})
+    box: Box  # of the magnet, see `response_box`
+    axis: Array  # (3,) direction of its remanence along the body's axes; zero: none
+    radius: float = field(metadata={"units": "m"})  # of the floater, m
+    counts: tuple[int, int, int]  # points along each body axis
+    strengths: Array = field(metadata={"units": "A m2/T"})  # (n, 3) λ, A m²/T, along the body's axes
+    degrees: Array = field(metadata={"units": "J"})  # (n, 3, 2) v and w of each power, J
+    returned: Array = field(metadata={"units": "T"})  # (n, 2, 2) s and t of each power, T
 
     @cached_property
     def points(self) -> Array:
@@ -359,31 +342,22 @@ def point_counts(box: Box, clearance: float, digits: float = DIGITS) -> tuple[in
 
 @dataclass(frozen=True, eq=False)
 class MutualTable:
-    """What rotor and floater add to each other's magnetisation: U = -½ α B0² + Σ -½ λ b² - u - V·M, M = m + α B0.
+    """What rotor and floater add to each other's magnetisation: U = -½ α B0² + Σ -½ λ b² - u - V·M, M = m + α B0."""
 
-    Parameters
-    ----------
-    magnets : of the rotor
-    grids : of those magnets that respond or are magnetised
-    coupling : (3k, 3k) A m²/T: energies of the fields at the grids' inner points, -½ bᵀ coupling b
-    pairs : (n, n) J: energies of the sphere by what two magnets' fields, as those of charges, do in it together
-    mixed : (n, n) T: fields by which the second magnet responds to the sphere's response to the first
-    images : (3,) weights of the images that stand for its response to charges
-    polarizability : α, A m²/T
-    gaps, errors : (k,) m between the bodies, and (k, 2) the largest relative errors of force and torque found there
-    provenance : how the table was made; texts and numbers
-    """
-
-    magnets: tuple[Magnet, ...]
-    grids: tuple[ResponseGrid, ...]
+    magnets: tuple[Magnet, ...]  # of the rotor
+    grids: tuple[ResponseGrid, ...]  # of those magnets that respond or are magnetised
+    # (3k, 3k) A m²/T: energies of the fields at the grids' inner points, -½ bᵀ coupling b
     coupling: Array = field(metadata={"units": "A m2/T"})
+    # (n, n) J: energies of the sphere by what two magnets' fields, as those of charges, do in it together
     pairs: Array = field(metadata={"units": "J"})
+    # (n, n) T: fields by which the second magnet responds to the sphere's response to the first
     mixed: Array = field(metadata={"units": "T"})
-    images: Array
-    polarizability: float = field(metadata={"units": "A m2/T"})
+    images: Array  # (3,) weights of the images that stand for its response to charges
+    polarizability: float = field(metadata={"units": "A m2/T"})  # α, A m²/T
+    # gaps, errors: (k,) m between the bodies, and (k, 2) the largest relative errors of force and torque found there
     gaps: Array = field(default_factory=lambda: np.array([1.0]), metadata={"units": "m"})
     errors: Array = field(default_factory=lambda: np.zeros((1, 2)))
-    provenance: dict[str, str | float] = field(default_factory=dict)
+    provenance: dict[str, str | float] = field(default_factory=dict)  # how the table was made; texts and numbers
 
     @cached_property
     def _sums(self) -> list[EnergySum]:

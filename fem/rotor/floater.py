@@ -30,16 +30,12 @@ SHARE = 0.4  # least radius of the sphere of charges, in circumradii
 
 @dataclass(frozen=True, eq=False)
 class FloaterSources:
-    """Dipoles and magnetic charges in a floater, along its own axes from its centre.
+    """Dipoles and magnetic charges in a floater, along its own axes from its centre."""
 
-    Parameters
-    ----------
-    places, moments : (n, 3) m and A m², of dipoles
-    corners, charges : (k, 3) m and (k,) A m, of magnetic charges
-    """
-
+    # places, moments: (n, 3) m and A m², of dipoles
     places: Array
     moments: Array
+    # corners, charges: (k, 3) m and (k,) A m, of magnetic charges
     corners: Array
     charges: Array
 

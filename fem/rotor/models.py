@@ -37,16 +37,11 @@ class AccuracyError(InputError):
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What a table must reach.
+    """What a table must reach."""
 
-    Parameters
-    ----------
-    rtol : relative error of B
-    nearest : distance from the magnets' faces from which on `rtol` holds, m, `NEAREST` of the largest magnet's edge at
-        least; None: 0.8 of that edge, if it were a cube
-    """
-
-    rtol: float = 3e-6
+    rtol: float = 3e-6  # relative error of B
+    # Distance from the magnets' faces from which on `rtol` holds, m, `NEAREST` of the largest magnet's edge at least;
+    # None: 0.8 of that edge, if it were a cube
     nearest: float | None = None
 
     def __post_init__(self) -> None:

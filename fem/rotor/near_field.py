@@ -112,26 +112,15 @@ OFF_FACE = 1e-10  # distance (m) from a face below which a point counts as just 
 
 @dataclass(frozen=True, eq=False)
 class NearField:
-    """B, H and M at points.
+    """B, H and M at points."""
 
-    Parameters
-    ----------
-    flux_density : B (n, 3) T
-    field : μ0 H (n, 3) T
-    gradient : ∂B_i/∂x_j (n, 3, 3) T/m, of one side on a face
-    error : estimated error (n,) of B and of μ0 H, T
-    gradient_error : estimated error (n,) of the gradient (Frobenius norm), T/m
-    magnet : number of the magnet (n,) in which a point lies, -1 in air and on faces
-    order : of the elements; 0 where none were needed
-    """
-
-    flux_density: Array
-    field: Array
-    gradient: Array
-    error: Array
-    gradient_error: Array
-    magnet: NDArray[np.intp]
-    order: int
+    flux_density: Array  # B (n, 3) T
+    field: Array  # μ0 H (n, 3) T
+    gradient: Array  # ∂B_i/∂x_j (n, 3, 3) T/m, of one side on a face
+    error: Array  # estimated error (n,) of B and of μ0 H, T
+    gradient_error: Array  # estimated error (n,) of the gradient (Frobenius norm), T/m
+    magnet: NDArray[np.intp]  # number of the magnet (n,) in which a point lies, -1 in air and on faces
+    order: int  # of the elements; 0 where none were needed
 
     @property
     def magnetization(self) -> Array:

@@ -31,30 +31,17 @@ PHASES = 72  # places of the floater about the axis, while the rotor turns alone
 
 @dataclass(frozen=True, eq=False)
 class WorkingPoint:
-    """The field along a magnet's easy axis: μ0 H · e.
+    """The field along a magnet's easy axis: μ0 H · e."""
 
-    Parameters
-    ----------
-    lowest : T, at all places that keep `clear` from edges
-    place : (3,) m where that is, rotor's frame
-    error : estimated, T
-    lowest_turning : T, as `lowest` if the floater stays behind for a whole turn and the rotor turns alone
-    clear : m
-    knee : T, or None where the magnet has no coercivity
-    share_below : of the volume that is below the knee; 0 without a knee
-    share_error : estimated
-    levels : (n,) T, from low to high: between two of them lie equal parts of the volume
-    """
-
-    lowest: float
-    place: Array
-    error: float
-    lowest_turning: float
-    clear: float
-    knee: float | None
-    share_below: float
-    share_error: float
-    levels: Array
+    lowest: float  # T, at all places that keep `clear` from edges
+    place: Array  # (3,) m where that is, rotor's frame
+    error: float  # estimated, T
+    lowest_turning: float  # T, as `lowest` if the floater stays behind for a whole turn and the rotor turns alone
+    clear: float  # m
+    knee: float | None  # T, or None where the magnet has no coercivity
+    share_below: float  # of the volume that is below the knee; 0 without a knee
+    share_error: float  # estimated
+    levels: Array  # (n,) T, from low to high: between two of them lie equal parts of the volume
 
     @property
     def margin(self) -> float | None:
