@@ -204,8 +204,8 @@ def field_map_job(
     apart = {m: float(np.nanmedian(found["difference"].sel(model=m))) for m in MODELS[:2]}
     values = {"model": "fem", "error_estimate": error, "median_difference": apart, "files": files}
     return values, [
-        f"B, H and M on the plane {plane}: half of the places differ by more than {apart['dipole']:.1e} (dipole) and "
-        f"{apart['cuboid']:.1e} (closed form) from the finite elements, whose largest error is {error:.1e}.",
+        f"Median deviation from finite elements on the plane {plane}: point dipole {apart['dipole']:.2%}, cuboid "
+        f"(μr = 1) {apart['cuboid']:.2%}. Largest error of the finite elements: {error:.2%}.",
         f"In {', '.join(files)}",
     ]
 

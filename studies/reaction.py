@@ -55,7 +55,7 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
         "tables_from_cache": from_cache,
     }
     write_whole(out / "plate.json", f"{to_json(values)}\n".encode())
-    lines = [f"Reaction tensor at {frequency:g} Hz, T/(A m²), phasors e^(+iωt), laboratory frame:"]
+    lines = [f"Response tensor at {frequency:g} Hz, T/(A m²), phasors e^(+iωt), laboratory frame:"]
     lines += ["  ".join(f"{g.real: .6e} {g.imag:+.6e}i" for g in row) for row in tensor]
     return values, [*lines, f"Model {name}; estimated relative error {error:.1e}"]
 
@@ -74,7 +74,7 @@ def response(
         found = plate_reaction(plate, place, frequency, rtol)
         return model, found.tensors[0], float(found.error_estimate[0]), []
     if model == "reduced":
-        note("Plate table ...")
+        note("Reduced plate model ...")
         reach = NEARBY * float(plate.box.distance(place))
         frequencies = LOWEST, max(HIGHEST, frequency)
         table, cached = cached_plate_table(plate, Region(body - reach, body + reach), frequencies, rtol, note)
