@@ -200,7 +200,7 @@ def test_a_plate_below_damps_what_is_neutral_without_it():
     assert abs(there.growth_per_s) < 1e-6
     assert float(tried["plate_distance"]) == pytest.approx(there.distance, abs=2e-3)
     assert float(tried["plate_growth"]) < -0.1
-    assert float(tried["plate_error"]) <= stability_map.PLATE_RTOL
+    assert float(tried["plate_error"]) <= regions.PLATE_RTOL
     assert np.isnan(found["plate_frequency"].values[1:]).all()
 
 
