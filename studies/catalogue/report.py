@@ -17,10 +17,10 @@ from ...geometry.common import InputError
 from ...geometry.files import file_content
 from ..figures.pictures import seen_from
 from ..figures.renderer import RenderError, rendered, turnable_page
-from ..figures.run import question_lines
+from ..figures.run import question_figure, question_lines
 from ..figures.style import figure_bytes
 from .entries import CATALOGUE
-from .runner import QUESTION, failure_lines, figures_of, flight_of, read_result
+from .runner import DRAWN, QUESTION, failure_lines, figures_of, flight_of, read_result
 
 REFERENCES = {
     "effect": "J. M. Hermansen, F. L. Durhuus, R. Bjørk, Appl. Phys. Lett. 127, 012402 (2025), doi 10.1063/5.0267494 "
@@ -76,13 +76,7 @@ PLACE = b"the scene comes here"
 LONGEST = 400  # Characters of a value that are shown
 MOST = 100_000_000  # Bytes of a file beside a result
 LARGEST = 2_500_000  # Bytes of pictures on a page; what comes later is named, not shown
-CAPTIONS = {
-    "field": "Field on the axis below the rotor by each model, and how far the models are apart.",
-    "force": "Axial force on the floater where all else is balanced. It floats where the curve meets its weight.",
-    "trajectory": "The flight: distance and polar angle (smallest, mean, largest in time), and a closer look.",
-    "modes": "Growth and frequency of the small motions about each equilibrium; negative growth dies out.",
-    "scene": "Rotor, floater, plate and field, in the frame that turns with the rotor.",
-}
+SCENE = "Rotor, floater, plate and field, in the frame that turns with the rotor."
 
 
 def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
@@ -120,19 +114,16 @@ def _part(path: Path) -> dict[str, Any]:
     result = read_result(path)
     kind = str(result.attrs["study"])
     study = CATALOGUE.get(kind)
-    drawers = study.figures if study else {}
+    drawers = study.figures if study else {**dict(DRAWN.values()), QUESTION: question_figure}
     captions = {name: (getattr(draw, "func", draw).__doc__ or "").split("\n")[0] for name, draw in drawers.items()}
     pictures = [
-        (captions.get(name, _caption(name)), _embedded(figure_bytes(figure, "png"), "png"))
-        for name, figure in figures_of(result).items()
+        (captions[name], _embedded(figure_bytes(figure, "png"), "png")) for name, figure in figures_of(result).items()
     ]
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
-    pictures += [
-        (_caption(f.stem), _embedded(file_content(f, MOST, "picture", "a file"), f.suffix[1:]))
-        for f in beside
-        if f.exists()
-    ]
+    for file in filter(Path.exists, beside):
+        picture = _embedded(file_content(file, MOST, "picture", "a file"), file.suffix[1:])
+        pictures.append((SCENE if file.stem.endswith("scene") else file.stem, picture))
     summary = _summary(path) if kind == "run" else {}
     told = ("headline", "equilibria")  # by themselves
     answers = {key: json.dumps(value, ensure_ascii=False) for key, value in summary.items() if key not in told}
@@ -165,10 +156,6 @@ def _view(result: xr.Dataset) -> dict[str, str]:
 
 def _embedded(content: bytes, kind: str) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
-
-
-def _caption(name: str) -> str:
-    return next((text for word, text in CAPTIONS.items() if name == word or name.endswith(f"-{word}")), name)
 
 
 def _fit(parts: list[dict[str, Any]]) -> None:

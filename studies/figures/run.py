@@ -110,7 +110,7 @@ def _with_plate(result: xr.Dataset) -> xr.DataArray:
 
 @styled
 def trajectory_figure(result: xr.Dataset) -> Figure:
-    """Distance and polar angle of a flight as envelopes, and a closer look at its beginning, or at its end if lost."""
+    """Distance and polar angle of a trajectory as envelopes, and a closer look at its beginning, or its end if lost."""
     figure, ((far, look), (tilt, above)) = panels(2, 2, (PAGE, 4.8))
     seconds, moment = result["time"].values, result["moment"].values
     time, unit = (seconds / 3600, "h") if seconds[-1] > HOURS else (seconds, "s")
