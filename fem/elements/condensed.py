@@ -240,6 +240,7 @@ def solve_open(stiffness: Any, inverse: Any, free_dofs: Any, load: Any, boundary
         shape, matvec=lambda x: multiply(stiffness.mat, x) + np.where(free, boundary.apply(x), 0.0), dtype=float
     )
     preconditioner = scipy.sparse.linalg.LinearOperator(shape, matvec=lambda x: multiply(inverse, x), dtype=float)
+    # the factor of the ball with the Robin term is nearly the inverse: some ten iterations
     right_hand_side = np.where(free, load.vec.FV().NumPy(), 0.0)
     result, failed = scipy.sparse.linalg.cg(full, right_hand_side, rtol=1e-12, maxiter=100, M=preconditioner)
     if failed:

@@ -60,6 +60,7 @@ def reaction_moments(solution: Solution, degree: int) -> Array:
             part = moments_of_magnetization(*_share(solution, k), body.center, body.circumradius, degree)
         owners = np.array([owner for owner, _ in _image_numbers(mesh.magnets, k, mesh.planes)])
         for place, coefficients in _images(centers[k], part, mesh.planes, signs):
+            # images of one magnet's share are shares of others, or of itself
             result[owners[np.argmin(np.linalg.norm(centers[owners] - place, axis=1))]] += coefficients
     return result
 
@@ -295,6 +296,7 @@ def potential_slopes(solution: RotorSolution, points: Array) -> tuple[Array, Arr
     for plane in solution.mesh.planes:
         flips[:, plane] = np.where(places[:, plane] < 0, -1.0, 1.0)
     assert set(solution.mesh.planes) <= set(planes)
+    # the mesh has one side of the planes: points are mirrored there, and each parity gets its signs back
     found = mesh.mesh(*(flips * places).T)
     first, second = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
     for part in solution.parts:
@@ -363,6 +365,7 @@ def refined(
         new = [b - a for a, b in zip(coarse.coefficients, fine.coefficients, strict=True)]
         field = sum(e.evaluate(points)[0] for e in fine.expansions(new))
         size = float(np.max(np.linalg.norm(field, axis=1) / scale))
+        # geometric: what is left is rate/(1 - rate) of the last step; the one before, scaled, stands for its direction
         rate = FIRST_RATE
         if np.isfinite(before):
             rate = min(max(size / before, _fastest(fine, order, settings)) if before else 0.0, SLOWEST_RATE)

@@ -101,6 +101,7 @@ def value_matrix(
     form = ng.BilinearForm(trialspace=space, testspace=components)
     form += integral(basis * ng.CF(tuple(components.TestFunction())))
     form.Assemble()
+    # integrals with one point each: the weight taken off, they are the basis's values there
     rows, columns, values = (np.asarray(part) for part in form.mat.COO())
     component, point = np.divmod(rows, len(weights))
     return scipy.sparse.csr_matrix(

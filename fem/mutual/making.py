@@ -110,7 +110,7 @@ def _at_poles(magnets: Sequence[Magnet], distance: float) -> list[Array]:
 NEAREST = 0.16
 PART = "a part from a STEP file, whose remanence has no closed form. Choose --interaction rigid, or give it a shape."
 OBLIQUE = (
-    "one with two permeabilities and an easy axis along none of its edges, which its points cannot answer with. Choose "
+    "one with two permeabilities and an easy axis along none of its edges, which its points cannot follow. Choose "
     "--interaction rigid, give it one recoil_permeability, or turn the body with its magnetisation."
 )
 EACH, EACH_OF_MANY = 16, 6  # places of dipoles for each gap and magnet; of rotors of `MANY` magnets
@@ -142,7 +142,7 @@ def mutual_table(
     for magnet in magnets:
         if reason := without_response(magnet):
             raise InputError(
-                "Input magnets must be of the kinds that answer to the floater where both magnetise each other; "
+                "Input magnets must be of the kinds that respond to the floater where both magnetise each other; "
                 f"instead one is {reason}"
             )
         box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))

@@ -197,7 +197,7 @@ MOST_TERMS = 60
 
 
 class TwoBodyError(ComputationError):
-    """The bodies overlap, or the answers of one to the other do not settle."""
+    """The bodies overlap, or their responses to each other do not settle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,15 +217,15 @@ class TwoBody:
 
     ball: Ball  # the floater's centre and radius
     rigid: Wrench  # rotor's own field on the rigid dipole
-    floater_answer: Wrench  # what the sphere's answer to the rotor's own field adds
-    rotor_answer: Wrench  # what the rotor's answer to the rigid dipole adds
-    total: Wrench  # both bodies answer to both; the sum of the three but for products of two answers
+    floater_answer: Wrench  # what the sphere's response to the rotor's own field adds
+    rotor_answer: Wrench  # what the rotor's response to the rigid dipole adds
+    total: Wrench  # both respond to both; the sum of the three but for products of two responses
     # own, incident, sources: a_lm (T) of the rotor alone, a_lm and c_lm (T) of the total
     own: Coefficients
     incident: Coefficients
     sources: Coefficients
     terms: int  # of the series
-    tail: float  # estimated relative error by the degrees left out, of what the answers add
+    tail: float  # estimated relative error by the degrees left out, of what the responses add
 
 
 def two_body(
@@ -266,7 +266,7 @@ def two_body(
     limit = rtol * np.abs(permanent).max()
     while np.abs(change).max() > limit:
         if terms == MOST_TERMS:
-            raise TwoBodyError(f"The answers of rotor and floater to each other did not settle in {terms} terms.")
+            raise TwoBodyError(f"The responses of rotor and floater to each other did not settle in {terms} terms.")
         back = rotor.answer(change, ball, degree)
         incident, sources, terms = incident + back, sources + change, terms + 1
         change = induced_sources(back, floater.recoil_permeability)

@@ -17,10 +17,10 @@ from .table import ResponseGrid, induced_sources, reflection
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
 # Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets
 NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
-# Part of the largest energy of a field in the magnets below which one counts as none: 6e-5 of an answer in contact
+# Part of the largest energy of a field in the magnets below which one counts as none: 6e-5 of a response in contact
 ALIKE = 1e-4
 CHUNK = 512  # points in the magnets at once, so that the fields of all dipoles there take some megabytes
-# Part of the sphere's answer that the degrees left out may hold, and the most degrees of the small parts
+# Part of the sphere's response that the degrees left out may hold, and the most degrees of the small parts
 TAIL, MOST_ADDED, MOST_RETURNED = 1e-4, 16, 24
 
 

@@ -62,7 +62,7 @@ class RotorTable:
 
     Parameters
     ----------
-    model : "dipole", "cuboid", "fem", or of what else it is made: "moments" (a body's answer), "map"
+    model : "dipole", "cuboid", "fem", or of what else it is made: "moments" (a body's response), "map"
     magnets : the bodies, for the range: the field is known outside them
     uniform : those whose closed form (μr = 1) is part of the field
     expansions : what the closed forms leave out
