@@ -42,7 +42,7 @@ from .work import context
 LOOPBACK = "127.0.0.1"
 PAGES = ("/", "/ws")  # For which the token is asked
 BOKEH = re.compile(r"/static/js/bokeh(-[a-z]+)?(\.min)?\.js")  # Bokeh's own programs
-NOTEBOOKS = "'self' http://127.0.0.1:* http://localhost:* http://[::1]:* vscode-webview:"
+NOTEBOOKS = "'self' http://127.0.0.1:* http://localhost:* vscode-webview:"  # a source has no place for [::1]
 """Where a page may be in a frame: in notebooks on the reader's own machine."""
 REFUSALS = {
     403: "The address needs the right token: the first line that spinlev said.",

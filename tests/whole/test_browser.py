@@ -98,7 +98,7 @@ def report(tmp_path_factory):
     report_job(folder, folder)
     result = read_result(folder / "trajectory.nc")
     scene, motion = flight_of(result, "trajectory.nc")
-    view = last_view(scene, rotor_table(scene.rotor, "dipole"), motion)
+    view = last_view(scene, rotor_table(scene.rotor, "dipole"), result["time"].values, motion)
     (folder / "trajectory-view.html").write_bytes(turnable_page(rendered(replace(view, turnable=True))))
     return folder
 

@@ -1,5 +1,6 @@
 """The live page in a browser: everything its reader can do, two pages at once, and what a closed page leaves behind."""
 
+import html
 import json
 import statistics
 import subprocess
@@ -99,10 +100,12 @@ def workers(process):
 def test_everything_that_can_be_done(server, browser, tmp_path):
     tab = opened(browser, server.address)
     values, lines = equilibria_job(load_scene(OVER_PLATE), Models("dipole", "slab"), 0.0, tmp_path)
-    assert said(tab, "model('headline').text") == lines[0]
+    assert html.unescape(said(tab, "model('headline').text")) == lines[0]
     shown = said(tab, "model('table').text.replaceAll(/<[^>]*>/g, ' ')").split()
     rows = len(values["equilibria"])
-    assert shown == " ".join(lines[1 : 2 + rows]).split()
+    listed = " ".join(lines[1 : 2 + rows]).split()
+    assert shown[: len(listed)] == listed
+    assert html.unescape(" ".join(shown[len(listed) :])) in lines  # what was left out
     eigenvalues = said(tab, "model('modes').text.replaceAll(/<[^>]*>/g, ' ')").split()
     for mode in values["equilibria"][0]["modes"]:
         assert f"{mode['growth_per_s']:.6g}" in eigenvalues
