@@ -38,9 +38,9 @@ FORMATS = {
     "mutual": 5,
     "map": 3,
     "plate": 2,
-    "driven-plate": 2,
+    "driven-plate": 3,
     "plate-currents": 2,
-    "slab": 2,
+    "slab": 3,
     "edges": 2,
     "rotor-losses": 2,
     "equilibria": 4,
@@ -156,19 +156,12 @@ class TableKind(Generic[Table]):
 
         Raises TableFileError: the file is not of this kind and key, or its content is not what was written.
         """
-        _check(path, self.format)
-        import h5py  # xarray decodes for 50 ms a file, and loads dask for that
-
+        dataset = read_checked(path, self.format)
+        if key and dataset.attrs.get("key") != key:
+            raise TableFileError(f"Input {path} must be what its name says; instead it is the table of other inputs.")
         try:
-            with h5py.File(path) as file:
-                if (received := file.attrs.get("format")) != self.format:
-                    raise TableFileError(f"Input {path} must be a '{self.format}'; instead received '{received}'.")
-                if key and file.attrs.get("key") != key:
-                    raise TableFileError(
-                        f"Input {path} must be what its name says; instead it is the table of other inputs."
-                    )
-                return from_dataset(file, self.form)
-        except (CodecError, OSError) as error:
+            return from_dataset(dataset, self.form)
+        except CodecError as error:
             raise TableFileError(f"Input {path} must be a '{self.format}'; instead: {error}") from error
 
     def cached(
@@ -218,20 +211,6 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
     `file_format`: that it must have; None for any, and for files that others have written or changed. Raises
     TableFileError: the file is missing, no file, too large, damaged, no netCDF, or not of this format.
     """
-    _check(path, file_format)
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            dataset = opened.load()
-    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
-        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {error}.") from error
-    if file_format and dataset.attrs.get("format") != file_format:
-        received = dataset.attrs.get("format")
-        raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")
-    return dataset
-
-
-def _check(path: str | Path, file_format: str | None) -> None:
-    """Raises TableFileError where a file is not as it was written, before any library tries to make sense of it."""
     try:
         whole = sealed(Path(path))
     except InputError as error:
@@ -242,6 +221,15 @@ def _check(path: str | Path, file_format: str | None) -> None:
         raise TableFileError(f"Input {path} must be a whole '{file_format}'; instead it does not end in its checksum.")
     if whole is None and (reason := hdf5_fault(Path(path))):
         raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {reason}.")
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            dataset = opened.load()
+    except Exception as error:  # the HDF5 layer raises many kinds on a damaged file
+        raise TableFileError(f"Input {path} must be a readable netCDF file; instead: {error}.") from error
+    if file_format and dataset.attrs.get("format") != file_format:
+        received = dataset.attrs.get("format")
+        raise TableFileError(f"Input {path} must be a '{file_format}'; instead received '{received}'.")
+    return dataset
 
 
 def cache_folder() -> Path:

@@ -67,17 +67,15 @@ def to_dataset(value: Any) -> xr.Dataset:
     return xr.Dataset(variables | {CONTENT: xr.Variable((), content, about)})
 
 
-def from_dataset(dataset: Any, form: type[Table]) -> Table:
-    """The object of a type, or of `tuple[...]`, that `to_dataset` made a data set of, or that file opened by h5py.
+def from_dataset(dataset: xr.Dataset, form: type[Table]) -> Table:
+    """The object of a type, or of `tuple[...]`, that `to_dataset` made a data set of.
 
     Raises CodecError: the data set holds something else.
     """
     classes, left = _classes(form, {}), dict[str, np.ndarray]()
 
     def taken(name: str, shape: list[int]) -> np.ndarray:
-        rest = left[name] if name in left else np.asarray(dataset[name]).ravel()
-        if dataset[name].attrs.get("dtype") == "bool":  # netCDF has none: they are written as 0 and 1
-            rest = rest.astype(bool)
+        rest = left[name] if name in left else dataset[name].values.ravel()
         size = int(np.prod(shape))
         found, left[name] = rest[:size], rest[size:]
         return found.reshape(shape).astype(float if found.dtype.kind == "f" else found.dtype)
@@ -100,7 +98,7 @@ def from_dataset(dataset: Any, form: type[Table]) -> Table:
         return float(taken(inner, [1])[0]) if kind == "number" else taken(inner[0], inner[1:])
 
     try:
-        return unpacked(json.loads(np.asarray(dataset[CONTENT]).item()))  # type: ignore[no-any-return]
+        return unpacked(json.loads(str(dataset[CONTENT].item())))  # type: ignore[no-any-return]
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         name = getattr(form, "__name__", form)
         raise CodecError(f"Input dataset must hold a {name}; instead {type(error).__name__}: {error}.") from error

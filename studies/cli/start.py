@@ -22,8 +22,6 @@ def main() -> None:
     _open_streams()
     _listen(stop)
     os.environ["PYTHONSAFEPATH"] = "1"  # no process begun here loads what lies in the folder that it is begun in
-    if "xarray" not in sys.modules and not any(argument.startswith("--scheduler") for argument in sys.argv):
-        sys.modules["dask"] = None  # type: ignore[assignment]  # else xarray loads it with any array, for 0.4 s
     try:
         from .console import make_readable
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -81,7 +80,8 @@ def same(one, other):
 
 def through_a_file(dataset, folder):
     dataset.to_netcdf(folder / "t.nc", engine="h5netcdf")
-    return h5py.File(folder / "t.nc")
+    with xr.open_dataset(folder / "t.nc", engine="h5netcdf") as opened:
+        return opened.load()
 
 
 def test_everything_survives(tmp_path):
