@@ -8,8 +8,9 @@ import threading
 from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
-from ..geometry.common import SpinlevError
+from ..geometry.common import ComputationError, SpinlevError
 from ..geometry.scene.contents import Scene
+from .cli.console import missing_extra
 from .scene_tables import SceneLike, given_scene
 
 if TYPE_CHECKING:
@@ -62,10 +63,14 @@ def explore(scene: SceneLike, port: int = 0) -> LivePage:
     SceneError
         The scene cannot be used.
     ComputationError
-        The port is taken.
+        The libraries of the page are missing, or the port is taken.
     """
-    from .page.server import serve
-
+    try:
+        from .page.server import serve
+    except ModuleNotFoundError as error:
+        if needed := missing_extra(error):
+            raise ComputationError(needed) from None
+        raise
     loaded = given_scene(scene)
     source = "scene" if isinstance(scene, Scene) else str(scene)
     begun: Future[tuple[Pages, asyncio.AbstractEventLoop]] = Future()

@@ -20,7 +20,7 @@ import xarray as xr
 from ..fem.cache import program_digest
 from ..fem.files import seal, unsealed, write_whole
 from ..geometry.common import ComputationError, InputError
-from .cli.console import note, progress, to_json
+from .cli.console import missing_extra, note, progress, to_json
 from .cli.options import Workers
 from .processes import Death, NoProcessError, program, results
 from .study import Batch, Point, Prepared, Study
@@ -96,7 +96,7 @@ def forget(study: Study, points: Sequence[Point], out: Path) -> None:
 
 
 class Journal:
-    """One checked file for each finished point; its name says of which sweep it is, so that several share a folder.
+    """One sealed file for each finished point; its name, which it repeats, says of which sweep it is.
 
     Parameters
     ----------
@@ -127,16 +127,20 @@ class Journal:
                 content = unsealed(path)
             except InputError:
                 content = None
+            name, _, text = (content or b"").partition(b"\n")
             if content is None:
                 note(f"The finished point {path} is damaged and is computed anew.")
+            elif name != path.name.encode():
+                note(f"The finished point {path} is of another sweep or point and is computed anew.")
             else:
-                found[int(path.name.partition("-")[0])] = _unpacked(json.loads(content))
+                found[int(path.name.partition("-")[0])] = _unpacked(json.loads(text))
         return found
 
     def keep(self, number: int, result: xr.Dataset) -> None:
         """Keep the result of a point. Raises OSError where the folder cannot be written."""
+        path = self.folder / f"{number:06}-{self._sweep}.json"
         text = json.dumps(_packed(result), default=lambda value: value.tolist())
-        write_whole(self.folder / f"{number:06}-{self._sweep}.json", seal(text.encode()))
+        write_whole(path, seal(f"{path.name}\n{text}".encode()))
 
 
 def _program(study: Study) -> str:
@@ -223,7 +227,7 @@ def attempts(
             try:
                 yield k, job()
             except Exception as error:  # a sweep lives longer than its points: the reason is kept with the result
-                yield k, f"{type(error).__name__}: {error}"
+                yield k, missing_extra(error) or f"{type(error).__name__}: {error}"
 
 
 def _completed(

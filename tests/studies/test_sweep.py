@@ -215,6 +215,19 @@ def test_points_of_another_sweep_are_not_used_and_not_lost(tmp_path, caplog):
     assert {path: path.read_bytes() for path in (tmp_path / "roots.points").iterdir()} == before
 
 
+def test_a_point_of_another_sweep_under_this_ones_name_is_not_used(tmp_path, caplog):
+    """Each point's file says what it is of: also one that was put there, or written late by another process."""
+    caplog.set_level(logging.INFO, "spinlev")
+    swept(STUDY, points(1.0, 4.0), Workers(workers=1), tmp_path)
+    swept(STUDY, points(9.0, 16.0), Workers(workers=1), tmp_path / "other")
+    files, others = (sorted((tmp_path / name / "roots.points").iterdir()) for name in (".", "other"))
+    for path, other in zip(files, others, strict=True):
+        path.write_bytes(other.read_bytes())
+    result = swept(STUDY, points(1.0, 4.0), Workers(workers=1), tmp_path)
+    assert caplog.text.count("is of another sweep or point and is computed anew") == 2
+    np.testing.assert_array_equal(result["root"], [1.0, 2.0])
+
+
 def test_a_failed_point_is_named_and_the_rest_goes_on(tmp_path):
     result = swept(STUDY, points(4.0, -1.0, 9.0), Workers(workers=1), tmp_path)
     np.testing.assert_array_equal(result["root"], [2.0, 3.0])

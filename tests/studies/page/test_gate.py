@@ -1,4 +1,4 @@
-"""Who is let in, and what is served."""
+"""Who is let in, what is served, and what is said where the page's libraries are missing."""
 
 import asyncio
 import contextlib
@@ -6,6 +6,7 @@ import http.client
 import io
 import re
 import socket
+import sys
 from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
@@ -209,3 +210,12 @@ def test_it_listens_on_this_machine_alone(page):
 def test_a_port_that_is_taken(page):
     with pytest.raises(ComputationError, match=r"Cannot listen on 127\.0\.0\.1, port \d+: .* Take another --port"):
         sl.explore(OVER_PLATE, port=urlsplit(page.address).port)
+
+
+def test_the_libraries_are_missing(monkeypatch):
+    for name in [name for name in sys.modules if name.startswith(("bokeh", "spinlev.studies.page"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delattr(sys.modules["spinlev.studies"], "explore", raising=False)
+    monkeypatch.setitem(sys.modules, "bokeh", None)
+    with pytest.raises(ComputationError, match=r"bokeh is needed.*pip install 'spinlev\[explore\]'"):
+        sl.explore(OVER_PLATE)
