@@ -27,6 +27,8 @@ MARGINAL = 0.004
 
 # The slower and the faster of each kind, in the rotor's frame.
 SIDE, TILT = ("side, backward", "side, forward"), ("precession", "nutation")
+# What a reader is told of modes whose names in data are older.
+MODE_NAMES = {"bounce": "axial", SIDE[0]: "backward whirl", SIDE[1]: "forward whirl"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,26 +162,26 @@ class Equilibrium:
     Where a plate or tilted gravity forces the floater once a turn it is a periodic motion, and `state` its mean.
     """
 
-    state: State  # position m, velocity m/s, moment direction, spin rad/s
-    spin: float  # body spin s = Ω·m̂/ω
-    residual: float  # largest unbalanced acceleration, as a part of gravity (or of ω²R without gravity)
-    position_error: float  # estimated error of the position, from round-off and from the table's own error, m
-    stable: bool  # whether no mode grows; with drag, whether all decay
-    growth_per_s: float  # largest growth rate of a mode, 1/s
-    growth_error_per_s: float  # what round-off may do to it, 1/s
-    frequencies_hz: Array  # (k,) frequencies of the modes in the rotor's frame
-    modes: tuple[Mode, ...] = ()  # by name
-    # (n, 3) the motion at equal intervals of a turn, the first at t = 0; None where it is at rest in this frame
+    state: State  #: position m, velocity m/s, moment direction, spin rad/s
+    spin: float  #: body spin s = Ω·m̂/ω
+    residual: float  #: largest unbalanced acceleration, as a part of gravity (or of ω²R without gravity)
+    position_error: float  #: estimated error of the position, from round-off and from the table's own error, m
+    stable: bool  #: whether no mode grows; with drag, whether all decay
+    growth_per_s: float  #: largest growth rate of a mode, 1/s
+    growth_error_per_s: float  #: what round-off may do to it, 1/s
+    frequencies_hz: Array  #: (k,) frequencies of the modes in the rotor's frame
+    modes: tuple[Mode, ...] = ()  #: by name
+    #: (n, 3) the motion at equal intervals of a turn, the first at t = 0; None where it is at rest in this frame
     turn: State | None = None
-    # (n, k) states of the plate then, √J; None where the plate's currents are not modelled
+    #: (n, k) states of the plate then, √J; None where the plate's currents are not modelled
     currents: Array | None = None
-    # the fixed point that it would be without the plate and with gravity along the axis
+    #: the fixed point that it would be without the plate and with gravity along the axis
     without: Equilibrium | None = None
-    # (5, 5) derivatives of the scaled balances, see `Balance`; NaN for a periodic motion
+    #: (5, 5) derivatives of the scaled balances, see `Balance`; NaN for a periodic motion
     slope: Array = field(default_factory=lambda: np.full((5, 5), np.nan))
-    # (12, 12) derivatives of the scaled state's rates by the state; NaN for a periodic motion
+    #: (12, 12) derivatives of the scaled state's rates by the state; NaN for a periodic motion
     jacobian: Array = field(default_factory=lambda: np.full((12, 12), np.nan))
-    steady_frame: bool = False  # whether the rotor is at rest, so that its frame is the laboratory's
+    steady_frame: bool = False  #: whether the rotor is at rest, so that its frame is the laboratory's
 
     @property
     def stability(self) -> str:
@@ -284,7 +286,9 @@ class Equilibrium:
             "polar angle": f"{self.polar_angle_deg:.3f}°",
             "body spin": f"{self.spin:g}",
             "growth rate": f"{self.growth_per_s:.3g} s⁻¹",
-            "modes": ", ".join(f"{mode.name} {mode.frequency_hz:.4g} Hz" for mode in self.modes),
+            "modes": "; ".join(
+                f"{MODE_NAMES.get(mode.name, mode.name)} {mode.frequency_hz:.4g} Hz" for mode in self.modes
+            ),
         }
         return html_table(f"Equilibrium, {self.stability}", rows)
 
@@ -303,9 +307,9 @@ def _extremes(values: Array) -> Array:
 class ForceCurve:
     """Axial force where everything else is balanced: figure "force against distance"."""
 
-    position: Array = field(metadata={"units": "m"})  # (n, 3) m, rotor's frame
-    moment: Array  # (n, 3) direction
-    magnetic_force: Array = field(metadata={"units": "N"})  # (n,) along +z, N
+    position: Array = field(metadata={"units": "m"})  #: (n, 3) m, rotor's frame
+    moment: Array  #: (n, 3) direction
+    magnetic_force: Array = field(metadata={"units": "N"})  #: (n,) along +z, N
 
 
 @dataclass(frozen=True, eq=False)

@@ -206,7 +206,7 @@ WEIGHTS = np.array([5, 8, 5]) / 18
 
 
 def floquet_modes(orbit: Orbit) -> Modes:
-    """Small motions about an orbit that keep |m̂| and the body spin: growth and frequencies over a turn.
+    """Modes of an orbit that keep |m̂| and the body spin: growth and frequencies over a turn.
 
     A multiplier ρ leaves a frequency open to whole multiples of the rotor's; each mode is given at the one that is
     strongest in its motion along the rotor's axes.  The error is that of the steps (twice as long for comparison) and

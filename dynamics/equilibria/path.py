@@ -93,14 +93,14 @@ class BalanceCurve(AtRest, ABC):
 class Steps:
     """Step control along a curve."""
 
-    # longest, shortest: steps along the curve, in floater radii, rad and units of the parameters
+    #: longest, shortest: steps along the curve, in floater radii, rad and units of the parameters
     longest: float = 0.05
     shortest: float = 1e-7
-    turn: float = 0.1  # largest angle between the tangents at the ends of a step, rad
-    most: int = 2000  # how many steps are tried at most
-    first: float = 1 / 8  # the first step, as a part of the longest
-    # where the first three unknowns are a position farther than this from the origin, in floater radii, the longest
-    # step grows with the distance, as the scale of the field does
+    turn: float = 0.1  #: largest angle between the tangents at the ends of a step, rad
+    most: int = 2000  #: how many steps are tried at most
+    first: float = 1 / 8  #: the first step, as a part of the longest
+    #: where the first three unknowns are a position farther than this from the origin, in floater radii, the longest
+    #: step grows with the distance, as the scale of the field does
     far: float = np.inf
 
     def limits(self, points: Array) -> Array:
@@ -108,8 +108,8 @@ class Steps:
         return np.asarray(self.longest * np.maximum(1.0, np.linalg.norm(points[:, :3], axis=1) / self.far))
 
 
-# Told which curves (n,) have come to what points (n, k + 1) with what tangents (n, k + 1) by steps (n,), all of which
-# came out well; says of them `ON`, `SHORTER` or `END`: one answer, or one of each.
+# Called with the numbers of curves (n,), the points (n, k + 1) that they have come to, tangents (n, k + 1) there and
+# the steps (n,) taken, all of which came out well; says `ON`, `SHORTER` or `END` of them: one answer, or one of each.
 Watch = Callable[[Indices, Array, Array, Array], int | NDArray[np.int_]]
 
 

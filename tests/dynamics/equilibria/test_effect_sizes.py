@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
+from spinlev.dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_answers
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
@@ -18,7 +19,6 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
 from spinlev.geometry.rotor import horizontal
 from spinlev.geometry.scene.contents import Drag, Scene
-from spinlev.studies.effects import growth_by_floater, growth_by_rotor, shift_by_answers
 
 SCENE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))
 CONDUCTING = replace(SCENE, floater=replace(PERMEABLE, conductivity=6.7e5))
