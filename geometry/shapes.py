@@ -67,7 +67,10 @@ class Body:
     @property
     @abstractmethod
     def shape_numbers(self) -> Array:
-        """Numbers (n,) m that tell it from another, but for its pose; how many they are tells the shape."""
+        """Numbers (n,) m that distinguish it from others but for its pose; how many they are tells the shape.
+
+        A cuboid has three, its edges; a sphere one; a cylinder two; a ring four; a part eight, of its file's digest.
+        """
 
     @property
     @abstractmethod

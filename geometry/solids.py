@@ -30,7 +30,7 @@ ALONG, STRAIGHT, KNOWN_FACES = 1e-6, 1e-9, 40
 class Part(Body):
     """A solid read from a file, its middle that of the box about it."""
 
-    file: Path  # where it was read
+    file: Path = field(compare=False)  # where it was read; keys count its text
     step: str  # the file's text
     brep: str  # the solid as OpenCASCADE writes it for itself, mm
     # (n, 3, 3) m, corners of triangles on the surface, outwards, from the middle along the body axes
@@ -191,18 +191,6 @@ def places_off(body: Solid, directions: Array, distance: float) -> Array:
 def moved(body: Solid, center: Array, rotation: Array | None = None) -> Solid:
     """The `body` with its `center` (3,) m elsewhere, and with other body axes, a `rotation` (3, 3), if it is given."""
     return replace(body, center=center, rotation=body.rotation if rotation is None else rotation)
-
-
-def solid_of(numbers: Array, center: Array, rotation: Array) -> Solid:
-    """The body of its `shape_numbers`, but for a part, which they do not tell, with a `center` and a `rotation`."""
-    sizes = [float(number) for number in numbers]
-    if len(sizes) == 3:
-        return Box(numbers, center, rotation)
-    if len(sizes) == 1:
-        return Sphere(sizes[0], center, rotation)
-    if len(sizes) == 2:
-        return Cylinder(sizes[0], sizes[1], center, rotation)
-    return Ring(sizes[0], sizes[1], sizes[2], center, rotation)
 
 
 def known_shape(part: Part) -> Solid | None:

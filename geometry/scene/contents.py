@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..common import MU_0, Array, InputError, frozen_array, html_table, listed, millimetres
 from ..magnets import Magnet, polarizability
@@ -131,9 +132,9 @@ class Lowering:
     speed: float
     distance: float
 
-    def depth(self, time: float) -> float:
-        """Way of the plate down at `time`, m."""
-        return min(max(time - self.start, 0.0) * self.speed, self.distance)
+    def depth(self, time: ArrayLike) -> Array:
+        """Distance (m) by which the plate is lowered at each `time`, s."""
+        return np.clip((np.asarray(time) - self.start) * self.speed, 0.0, self.distance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +147,7 @@ class Plate:
 
     @property
     def way(self) -> float:
-        """How far it goes down, m."""
+        """Distance by which it is lowered, m; 0 if it is not."""
         return self.lowering.distance if self.lowering else 0.0
 
     def __repr__(self) -> str:

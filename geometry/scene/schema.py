@@ -71,18 +71,19 @@ class Table(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    def solid(self) -> Solid:
-        """The body of a table's shape, in its place if the table has one."""
-        given = dict(self)
-        pose = MILLI * np.array(given.get("center_mm", ORIGIN)), rotation_matrix(given.get("rotation_deg", ORIGIN))
-        shape, radius = given.get("shape", "cuboid"), (given.get("diameter_mm") or 0.0) * MILLI / 2
-        if shape == "sphere":
-            return Sphere(radius, *pose)
-        if shape == "cylinder":
-            return Cylinder(radius, given["height_mm"] * MILLI, *pose)
-        if shape == "ring":
-            return Ring(radius, given["inner_diameter_mm"] * MILLI / 2, given["height_mm"] * MILLI, *pose)
-        return Box(np.array([given["edge_mm"]] * 3 if shape == "cube" else given["size_mm"]) * MILLI, *pose)
+
+def solid_of(table: Table) -> Solid:
+    """The body of a table that has a shape, in its place if it has one."""
+    given = dict(table)
+    pose = MILLI * np.array(given.get("center_mm", ORIGIN)), rotation_matrix(given.get("rotation_deg", ORIGIN))
+    shape, radius = given.get("shape", "cuboid"), (given.get("diameter_mm") or 0.0) * MILLI / 2
+    if shape == "sphere":
+        return Sphere(radius, *pose)
+    if shape == "cylinder":
+        return Cylinder(radius, given["height_mm"] * MILLI, *pose)
+    if shape == "ring":
+        return Ring(radius, given["inner_diameter_mm"] * MILLI / 2, given["height_mm"] * MILLI, *pose)
+    return Box(np.array([given["edge_mm"]] * 3 if shape == "cube" else given["size_mm"]) * MILLI, *pose)
 
 
 class _Placed(Table):
@@ -102,7 +103,7 @@ class ConductorTable(_Placed):
     conductivity_S_m: Metal
 
     def conductor(self) -> Conductor:
-        return Conductor(self.solid(), self.conductivity_S_m)
+        return Conductor(solid_of(self), self.conductivity_S_m)
 
 
 class MagnetTable(_Placed):
@@ -124,7 +125,7 @@ class MagnetTable(_Placed):
         material = along, across, conductivity, 1e3 * knee if knee else None
         polarization = np.array(self.polarization_T)
         if part is None:
-            return Magnet(self.solid(), polarization, *material)
+            return Magnet(solid_of(self), polarization, *material)
         turn = rotation_matrix(self.rotation_deg)
         part = replace(part, center=MILLI * np.array(self.center_mm) - turn @ part.origin, rotation=turn)
         body = known_shape(part) or part
@@ -166,7 +167,9 @@ class DisplacedRotor(ArticleRotor):
 
     def in_si(self, parts: Mapping[int, Part]) -> Rotor:
         build = horizontal if self.configuration == "horizontal" else vertical
-        return self._of(build(self.displacement_mm * MILLI, self.solid(), self.remanence_T, *self.recoil_permeability))
+        return self._of(
+            build(self.displacement_mm * MILLI, solid_of(self), self.remanence_T, *self.recoil_permeability)
+        )
 
 
 class TiltRotor(ArticleRotor):
@@ -177,7 +180,7 @@ class TiltRotor(ArticleRotor):
 
     def in_si(self, parts: Mapping[int, Part]) -> Rotor:
         angle = float(np.radians(self.angle_deg))
-        return self._of(tilt(angle, self.solid(), self.remanence_T, *self.recoil_permeability))
+        return self._of(tilt(angle, solid_of(self), self.remanence_T, *self.recoil_permeability))
 
 
 class ExplicitRotor(AnyRotor):
@@ -210,7 +213,7 @@ class FloaterTable(Table):
 
     def floater(self) -> Floater:
         material = self.remanence_T, self.recoil_permeability, self.density_kg_m3, self.conductivity_S_m
-        body = self.solid()
+        body = solid_of(self)
         return Floater(body.circumradius, *material, body if isinstance(body, Box | Cylinder) else None)
 
 
@@ -234,7 +237,7 @@ class PlateTable(Table):
     def plate(self) -> Plate:
         down = self.lowering
         lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-        return Plate(self.solid().box, self.conductivity_S_m, lowering)
+        return Plate(solid_of(self).box, self.conductivity_S_m, lowering)
 
 
 class DragTable(Table):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import netgen.occ as occ
 import numpy as np
 import pytest
 
@@ -22,6 +23,7 @@ from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.rotor import Conductor, horizontal
 from spinlev.geometry.scene.contents import Drag, Floater, Lowering, MapReading, Plate, Scene
 from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere
+from spinlev.geometry.step_file import read_part
 
 BOX = Box((0.01, 0.02, 0.03), (1e-3, 0, 0))
 MAGNET = Magnet(BOX, (0, 0, 1.3), 1.05, 1.2, 6e5, 1e6)
@@ -138,6 +140,17 @@ def test_what_decides_nothing_does_not_count():
         remark: str = field(default="", compare=False)
 
     assert key(Input(1.0, "a")) == key(Input(1.0, "b")) != key(Input(2.0, "a"))
+
+
+def test_of_a_part_the_text_counts_and_not_where_it_was_read(tmp_path):
+    """A table is found again where the file was changed or removed since the part was read."""
+    path = tmp_path / "part.step"
+    occ.Box(occ.Pnt(0, 0, 0), occ.Pnt(1, 2, 3)).WriteStep(str(path))
+    part = read_part(path)
+    before = ROTOR.key((Magnet(part, (0, 0, 1)),), "fem", 1e-5)
+    path.unlink()
+    assert ROTOR.key((Magnet(part, (0, 0, 1)),), "fem", 1e-5) == before
+    assert ROTOR.key((Magnet(replace(part, step=part.step + " "), (0, 0, 1)),), "fem", 1e-5) != before
 
 
 def test_what_cannot_be_counted_is_refused():
