@@ -30,12 +30,12 @@ UNREPEATABLE = (
     "file",
     "time_s",
     "cpu",
-    "field_changes",
-    "growth_error",
 )
 """Words in the names of numbers that are measured, or round-off, and differ from run to run."""
-NOTHING = 1e-12
-"""Differences that are none, in any unit: spin rates of 1e-13 are zeros."""
+ROUNDED = {"growth_error": 1e-4, "field_changes": 1e-6}
+"""Tolerance, by a word in their names, of estimates that are differences of near numbers."""
+ZERO = {"spin": 1e-12}
+"""Differences that are none, rad/s or Hz, likewise: spin rates of 1e-13 are zeros."""
 SAMPLES = 24
 """Numbers kept of an array: its ends and some between them."""
 
@@ -97,7 +97,9 @@ def differences(kept: dict[str, list[float]], new: dict[str, list[float]]) -> li
             lines.append(f"{key}: {before.size} numbers before, {now.size} now")
             continue
         scale = max(np.nanmax(np.abs(before), initial=0.0), np.finfo(float).tiny)
-        if not np.allclose(before, now, rtol=0, atol=TOLERANCE * scale + NOTHING, equal_nan=True):
+        allowed = max([TOLERANCE, *(size for word, size in ROUNDED.items() if word in key)]) * scale
+        allowed = max([allowed, *(size for word, size in ZERO.items() if word in key)])
+        if not np.allclose(before, now, rtol=0, atol=allowed, equal_nan=True):
             worst = np.nanargmax(np.abs(now - before)) if np.isfinite(now - before).any() else 0
             lines.append(f"{key}[{worst}]: {before[worst]:.15g} before, {now[worst]:.15g} now")
     return lines
