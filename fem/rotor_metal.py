@@ -186,7 +186,7 @@ class CurrentPatterns:
 def current_patterns(
     metals: Sequence[Metal], positions: Array, left_out: float, watch: Watch = unwatched
 ) -> CurrentPatterns:
-    """Patterns in `metals` that dipoles at `positions` (n, 3) m drive, but for a part `left_out` of any loss.
+    """Patterns that dipoles at `positions` (n, 3) m drive in `metals`, but for a part `left_out` of any loss.
 
     `watch` is a progress callback.
     """
@@ -367,7 +367,10 @@ def sparse(weights: Array) -> Array:
 
 
 def places_around(bodies: Sequence[Solid], distance: float, seed: int = 0, directions: int = DIRECTIONS) -> Array:
-    """Places (n, 3) m at a `distance` (m) from the nearest face of `bodies`, in `directions` random by `seed`."""
+    """Places (n, 3) m at a `distance` (m) from the nearest face of `bodies`, along random lines.
+
+    They are so many `directions` of an octant, by `seed`, and their mirror images.
+    """
     octant = np.abs(np.random.default_rng(seed).normal(size=(directions, 3)))
     mirrored = np.concatenate([octant * signs for signs in product((1, -1), repeat=3)])
     mirrored /= np.linalg.norm(mirrored, axis=1)[:, None]

@@ -6,35 +6,24 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.equilibria.balance import tangent_basis
-from ..dynamics.equilibria.equilibrium import Equilibrium, left_eigenvectors, tangent_spaces
-from ..dynamics.motion.effect import Interaction
+from ..dynamics.equilibria.equilibrium import Equilibrium
+from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_answers
 from ..dynamics.motion.effects import NOTHING_ANSWERS
-from ..dynamics.motion.equations import parameters
 from ..dynamics.motion.floater_effects import (
     FLOATER_CURRENTS,
     REAL_AIR,
     SLOW_ENOUGH,
-    FloaterCurrents,
     reynolds,
     slow_error,
     swinging,
 )
-from ..dynamics.motion.rates import Rates
-from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS, Mutual, brake_slope, rough_force
-from ..dynamics.motion.state import Parameter, Scales
-from ..fem.harmonics.interior import Ball, BallField
-from ..fem.mutual.table import MutualTable
-from ..fem.rotor.table import FieldTable
-from ..fem.rotor_metal import RotorLosses, ball_losses, pieces_of, slow_error as metal_error
-from ..geometry.common import MAGNET_CONDUCTIVITY, Array
-from ..geometry.scene.contents import Scene
+from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS
+from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
+from ..geometry.common import MAGNET_CONDUCTIVITY
 from .levitation import Levitation
 
 PLATE_NEGLECTED = "The plate's eddy currents are neglected: the plate is only an obstacle."
 OF_SPHERES = "known for spherical floaters alone"
-EXACT_SLOPES = 4  # degree of a potential that has all derivatives which the slopes of the floater's currents ask for
-AROUND = 1 / 32  # radius of the ball of that expansion, in radii of the floater
 CLEARLY_SLOW = 0.02  # relative error of what an effect adds to the growth of modes that goes without saying
 
 
@@ -138,60 +127,3 @@ def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     h = float(swinging(reynolds(scene.floater.radius, scene.angular_velocity)))
     why = f'drag.model is not "air"; it would make the torque on a swing {h:.2g} times Stokes\''
     return ListedEffect(REAL_AIR, False, 0.0, None, why)
-
-
-def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
-    """Shift of an equilibrium by mutual magnetisation, m.
-
-    To first order by `answers` in the field `table` of the `scene`; without them to a factor of two.
-    """
-    fixed = equilibrium.without or equilibrium
-    place, moment, scales = fixed.position[None], fixed.state.moment[None], Scales.of(scene)
-    if answers is None:
-        force, torque = rough_force(scene.rotor, scene.floater, table, place[0], moment[0]), np.zeros(3)
-    else:
-        effect = Mutual(answers, scene.floater.moment)
-        force, torque = (part[0] for part in effect.wrench(place, moment, *table.evaluate(place)))
-    units = scales.time**2 / np.array([scene.floater.mass * scales.length, scene.floater.inertia])
-    pushed = np.concatenate([force * units[0], tangent_basis(moment)[0] @ torque * units[1]])
-    return float(np.linalg.norm(np.linalg.solve(fixed.slope, pushed)[:3]) * scales.length)
-
-
-def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium, included: bool) -> float:
-    """Change of the growth rate (1/s) of the mode that grows fastest with the floater's own currents.
-
-    `included`: whether the motion of the `equilibrium`, in the field `table` of the `scene`, had them.
-    """
-    fixed = equilibrium.without or equilibrium
-    # In the field's expansion about the place, whose derivatives there are the field's, code is compiled in a tenth of
-    # the time that the table's own expressions take.
-    formula, scales = BallField(len(Parameter), EXACT_SLOPES), Scales.of(scene)
-    numbers, _ = formula.fit(table.evaluate, Ball(fixed.state.position, AROUND * scene.floater.radius))
-    values = np.concatenate([parameters(scene, scales, frozen_spin=True), numbers])
-    still = values.copy()
-    still[Parameter.TILT_EDDY] = 0.0
-    rates = Rates(Interaction(formula, (FloaterCurrents(),)))
-    slopes = [rates(scales.pack(fixed.state)[None], each)[1][0] for each in (values, still)]
-    return _growth(scene, fixed, slopes[0] - slopes[1], included)
-
-
-def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:
-    """Change of the growth rate (1/s) of the mode that grows fastest with the losses in the rotor.
-
-    `included`: whether the motion of the `equilibrium` of the `scene` had these `losses`.
-    """
-    fixed = equilibrium.without or equilibrium
-    return _growth(scene, fixed, brake_slope(losses, scene, fixed.state), included)
-
-
-def _growth(scene: Scene, fixed: Equilibrium, brake: Array, included: bool) -> float:
-    """Change of the growth rate (1/s) by a part (12, 12) of the Jacobian, which has it or has not."""
-    # To first order, of the mode that grows fastest with it: the fastest one without it may be another mode, and the
-    # difference of their growth rates is no effect.
-    scales = Scales.of(scene)
-    tangents, projections = (found[0] for found in tangent_spaces(scales.pack(fixed.state)[None]))
-    whole = fixed.jacobian if included else fixed.jacobian + brake
-    values, right = np.linalg.eig(projections @ whole @ tangents)
-    leading = int(np.argmax(values.real))
-    added = left_eigenvectors(right)[leading] @ (projections @ brake @ tangents) @ right[:, leading]
-    return float(added.real) / scales.time

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -20,7 +19,7 @@ from ..geometry.common import InputError
 from ..geometry.scene.files import scene_text
 from .catalogue.entries import CATALOGUE
 from .catalogue.runner import figures_of, question_study
-from .cli.console import heard, note
+from .cli.console import heard
 from .cli.options import (
     FieldModel,
     InteractionModel,
@@ -304,10 +303,8 @@ def ensemble(
     interaction: InteractionModel = "auto",
     workers: int | None = 1,
     progress: bool = False,
-    plate_model: PlateModel = "none",
-    plate_rtol: float = Models.plate_rtol,
 ) -> xr.Dataset:
-    """Endings of very many trajectories of one scene, in SIMD batches.
+    """Endings of very many trajectories of one scene, in SIMD batches; a plate is an obstacle without eddy currents.
 
     Parameters
     ----------
@@ -335,19 +332,14 @@ def ensemble(
         Processes, None for one a core.
     progress : bool
         Whether messages go to standard error.
-    plate_model : {"none", "slab", "fem", "reduced", "auto"}
-        Model of the plate's eddy currents; with "none" the plate is an obstacle alone.
-    plate_rtol : float
-        Relative accuracy asked of them.
 
     Returns
     -------
     xarray.Dataset
         Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
         the end and, as ``start_...``, at the beginning, in the laboratory frame as in `simulate`;
-        `position_rotor_frame` is where the end is in the frame that turns with the rotor; `left_plate_table` tells
-        which trajectories left the range of the plate's precomputed field, where it is a continuation.
-        Accuracy: the field errs by 1e-6 of its gradient, steps by round-off, over a plate by 1e-9 each.
+        `position_rotor_frame` is where the end is in the frame that turns with the rotor.
+        Accuracy: the field errs by 1e-6 of its gradient, steps by round-off.
 
     Raises
     ------
@@ -371,24 +363,18 @@ def ensemble(
         raise InputError("Input starts must be given, or n with spread; instead received both or neither.")
     number = Workers(workers).checked().workers or os.cpu_count() or 1
     with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol=plate_rtol, interaction=interaction))
+        levitation = Levitation(scene, Models(model, "none", rtol, interaction=interaction))
         if starts is not None:
             begun, drawn = given_starts(levitation, starts), dict[str, Any]()
         else:
             begun, drawn = drawn_starts(levitation, n, seed, spread or {}), {"seed": seed, "spread": repr(spread)}
         together = min(TOGETHER, -(-len(begun.position) // number))
         asked = levitation.scene, levitation.interaction, begun, duration
-        found = flown(*asked, map if number == 1 else mapped(number), together, levitation.plate)
-        if found.left_plate_table.any():
-            note(
-                f"{np.sum(found.left_plate_table)} of {len(found.left_plate_table)} trajectories left the range of the "
-                "plate's precomputed field, where it is a continuation (left_plate_table)."
-            )
+        found = flown(*asked, map if number == 1 else mapped(number), together)
     last = found.last.to_lab(levitation.scene.angular_velocity * found.levitated_s)
     data = {
         "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),
         "ended_by": (("flight",), found.ended_by),
-        "left_plate_table": (("flight",), found.left_plate_table),
         "position_rotor_frame": variable(
             ("flight", "axis"), found.last.position, "m", "position, rotor's frame, at the end"
         ),

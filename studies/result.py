@@ -132,7 +132,7 @@ class Result:
         levitation, lines = self.levitation, [self.failed] if self.failed else []
         if self.survey is not None and not self.failed:
             lines += equilibria_words(levitation, self.survey)
-        lines += comparison_words(self.comparison)
+        lines += comparison_words(self.comparison, levitation.scene.plate is not None)
         if self.flight is not None:
             lines.append(flight_words(levitation, self.flight))
         if self.flight is not None or not self.failed:

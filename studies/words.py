@@ -8,6 +8,7 @@ from ..dynamics.equilibria.equilibrium import (
     FOLD,
     IN_PLATE,
     IN_ROTOR,
+    MODE_NAMES,
     NOT_CONVERGED,
     PAST_TABLE,
     Equilibrium,
@@ -26,8 +27,6 @@ SAME = 1e-6
 CLEAR = 0.5  # share of the decay rate that must be gone without the plate before it is called the plate's
 FINEST = 0.01  # of distances from the axis, mm
 SWINGS = 0.1  # polar angles that differ by more in a turn (°) are told with their extremes
-# Names of modes where the field's are others than the data's.
-MODE_NAMES = {"bounce": "axial", "side, backward": "backward whirl", "side, forward": "forward whirl"}
 COLUMNS = (
     "distance (mm)", "lateral offset (mm)", "polar angle (°)", "phase lag (°)", "least stable mode",
     "growth rate (s⁻¹)", "",
@@ -175,13 +174,14 @@ def left_out_words(levitation: Levitation, left_out: Sequence[LeftOut]) -> list[
     return said
 
 
-def comparison_words(compared: Mapping[str, Any] | None) -> list[str]:
-    """Levitation distance by the point dipole against that by the field of the finite magnets."""
+def comparison_words(compared: Mapping[str, Any] | None, plate: bool = False) -> list[str]:
+    """Levitation distance by the point dipole against the finite magnets', both without a `plate` where one is."""
     if compared is None:
         return []
     apart, error = compared["difference_mm"], compared["difference_error_mm"]
     kinds = "" if compared["dipole_stability"] == compared["true_stability"] else f" ({compared['dipole_stability']})"
-    said = f"Point-dipole model, same conditions: levitation distance {compared['dipole_distance_mm']:.2f} mm{kinds}, "
+    conditions = "same conditions without the plate" if plate else "same conditions"
+    said = f"Point-dipole model, {conditions}: levitation distance {compared['dipole_distance_mm']:.2f} mm{kinds}, "
     if abs(apart) <= max(error, SAME):
         return [f"{said}no difference beyond its error of {max(error, SAME):.0e} mm."]
     more = "more" if apart > 0 else "less"

@@ -41,14 +41,14 @@ def spins(scene: Scene) -> Problem:
 class BranchPoint:
     """One equilibrium of a branch."""
 
-    parameter: float  # where on the axis of the parameter
-    spin: float  # body spin s
-    position: Array  # (3,) m, rotor's frame
-    state: Array  # (12,) scaled
-    tangent: Array  # (7,) unit direction of the branch: scaled position, moment, and the parameter by its unit
-    motion: Modes  # its modes, in scaled time
-    time_unit: float  # s
-    kind: str = ""  # what is marked here: "fold", "oscillatory", "real"; "" at an ordinary point
+    parameter: float  #: where on the axis of the parameter
+    spin: float  #: body spin s
+    position: Array  #: (3,) m, rotor's frame
+    state: Array  #: (12,) scaled
+    tangent: Array  #: (7,) unit direction of the branch: scaled position, moment, and the parameter by its unit
+    motion: Modes  #: its modes, in scaled time
+    time_unit: float  #: s
+    kind: str = ""  #: what is marked here: "fold", "oscillatory", "real"; "" at an ordinary point
 
     @property
     def distance(self) -> float:
@@ -80,9 +80,9 @@ class BranchPoint:
 class Family(BalanceCurve):
     """The equilibria of a problem with one parameter, as a curve."""
 
-    rates: Rates  # compiled once for all values of the parameter
-    problem: Problem  # what the parameter does
-    unit: float = 1.0  # of the parameter, a typical change over which the equilibrium moves by its radius
+    rates: Rates  #: compiled once for all values of the parameter
+    problem: Problem  #: what the parameter does
+    unit: float = 1.0  #: of the parameter, a typical change over which the equilibrium moves by its radius
 
     def balance(self, parameter: float) -> Balance:
         """Forces and torques at one value of the parameter."""

@@ -154,19 +154,19 @@ def _starts(grid: Grid, point: int, random: np.random.Generator | None) -> tuple
 class EquilibriumMap:
     """Equilibria (k,) of a map, point by point; rotor's frame."""
 
-    # frequencies, measures: axes of the map, Hz and m or rad
+    #: frequencies, measures: axes of the map, Hz and m or rad
     frequencies: Array
     measures: Array
-    # row, column: (k,) place of each equilibrium on them
+    #: row, column: (k,) place of each equilibrium on them
     row: Indices
     column: Indices
-    # position, moment: (k, 3) m and direction
+    #: position, moment: (k, 3) m and direction
     position: Array
     moment: Array
-    eigenvalues: NDArray[np.complex128]  # (k, 10) of the modes, 1/s
-    errors: Array  # (k,) what round-off may do to them, 1/s
-    stable: NDArray[np.bool_]  # (k,) whether no mode grows
-    searches: int  # points of the map at which all was searched for
+    eigenvalues: NDArray[np.complex128]  #: (k, 10) of the modes, 1/s
+    errors: Array  #: (k,) what round-off may do to them, 1/s
+    stable: NDArray[np.bool_]  #: (k,) whether no mode grows
+    searches: int  #: points of the map at which all was searched for
 
     @property
     def growth_per_s(self) -> Array:

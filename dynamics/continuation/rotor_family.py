@@ -126,7 +126,7 @@ class MovedEffect:
         return self.effect.count
 
     def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """See `Placed`: not by `field`, but by the part's own, for `position`, `moment` and `values` seen from it."""
+        """See `Placeable`; by the part's own table, for `position`, `moment` and `values` seen from the part."""
         measure, length = values[:, Parameter.MEASURE], values[:, [Parameter.LENGTH]]
         place = np.transpose(self.move.place(list((position * length).T), measure)) / length
         return self.effect.numbers(self.alone, place, np.transpose(self.move.into(list(moment.T), measure)), values)
@@ -136,11 +136,11 @@ class MovedEffect:
 class RotorFamily:
     """A scene with frequency and one measure of its rotor left open."""
 
-    scene: Scene  # all else; its plate is left out
-    rotor: tuple[Magnet, ...]  # magnets as they are at measure zero
-    moves: tuple[Move, ...]  # how each of them moves
-    field: MovableField  # of the rotor, with `Parameter.MEASURE`
-    # mutual magnetisation and currents in the rotor's magnets, with `Parameter.MEASURE`
+    scene: Scene  #: all else; its plate is left out
+    rotor: tuple[Magnet, ...]  #: magnets as they are at measure zero
+    moves: tuple[Move, ...]  #: how each of them moves
+    field: MovableField  #: of the rotor, with `Parameter.MEASURE`
+    #: mutual magnetisation and currents in the rotor's magnets, with `Parameter.MEASURE`
     effects: tuple[Effect, ...] = ()
 
     def at(self, frequency: float, measure: float) -> Scene:

@@ -1,6 +1,7 @@
 """Slow drift of the body spin: torques along the floater's own moment, on which magnetic torque has no part.
 
-That of air goes beyond Stokes' range (`effects.air`): 8πηR³Ω times f for a steady spin, times h for a small swing.
+That of air goes beyond Stokes' range (`motion.floater_effects`): 8πηR³Ω times f for a steady spin, times h for
+a small swing.
 """
 
 from collections.abc import Callable
@@ -51,7 +52,7 @@ class SlowTorque:
     second order in θ the swing also drives a steady flow, but none about the axis: the mean of a × (a × r) over a turn,
     with a the turning rate of a shell of air, has no such part.
 
-    The field's gradient adds to κ as in `effects.floater_currents`, which is compiled and evaluated here: that of a
+    The field's gradient adds to κ as in `FloaterCurrents`, which is compiled and evaluated here: that of a
     dipole at distance d, which turns across its way, (12/7) (R/d)² of it on a small θ, 8 % at 30 mm.  A plating of
     copper and nickel, t thick, adds 5 σ't/(σR) to 1: a half for 5 µm of each of Ni, Cu and Ni.
     """
@@ -89,13 +90,13 @@ class SlowTorque:
 class Drift:
     """An averaged flight."""
 
-    time: Array  # (n,) s
-    spin: Array  # (n,) body spin s
-    distance: Array  # (n,) from the rotor's origin, m
-    growth_per_s: Array  # (n,) largest growth of a mode
-    ended_by: str  # "balance", "fold", "instability", "contact" or "duration"
-    balance_spin: float  # the spin s* at which the slow torques balance, if the branch reaches it, else NaN
-    last_fall_s: float = 0.0  # time from the fold to the loss, s; 0 unless the flight ended by a fold
+    time: Array  #: (n,) s
+    spin: Array  #: (n,) body spin s
+    distance: Array  #: (n,) from the rotor's origin, m
+    growth_per_s: Array  #: (n,) largest growth of a mode
+    ended_by: str  #: "balance", "fold", "instability", "contact" or "duration"
+    balance_spin: float  #: the spin s* at which the slow torques balance, if the branch reaches it, else NaN
+    last_fall_s: float = 0.0  #: time from the fold to the loss, s; 0 unless the flight ended by a fold
 
     @property
     def levitated_s(self) -> float:
@@ -244,7 +245,7 @@ def lasting_frequencies(
     e_folds: float = E_FOLDS,
     resolution: float = 0.5,
 ) -> Lasting:
-    """Where a floater that is let go with body spin 0 stays up, by its averaged flights along a branch of equilibria.
+    """Where a floater let go with body spin 0 remains levitated, by its averaged motion along a branch of equilibria.
 
     A flight is over where a mode has grown by `e_folds`: seven are 3 µm, what is left of a launch over a plate,
     to 3 mm.  Growth is added up along the drift of the body spin.

@@ -224,7 +224,6 @@ def ensemble(
     duration: float,
     mapped: Callable[[Callable[[State], Endings], Iterable[State]], Iterable[Any]] = map,
     together: int = 512,
-    memory: PlateMemory | None = None,
 ) -> Endings:
     """Fly a scene's floater from many starts for `duration` (s) each, or until contact or loss.
 
@@ -237,15 +236,12 @@ def ensemble(
     starts : states (n, 3) at t = 0, SI units; the moments are made unit vectors
     mapped : as the built-in `map`; `concurrent.futures.ProcessPoolExecutor(2).map` uses two cores
     together : flights that a worker gets at once
-    memory : the plate's currents, see `launched`; without them it is an obstacle alone
 
     Accuracy: that of a flight in balls, whose field errs by 1e-6 of its gradient.
     """
     _check(scene, starts, duration)
     pieces = [slice(first, first + together) for first in range(0, len(starts.position), together)]
-    over = memory and partial(launched, scene, table, memory, duration=duration)
-    each = over or partial(_ended, scene, table, duration)
-    parts = mapped(each, [starts[p] for p in pieces])
+    parts = mapped(partial(_ended, scene, table, duration), [starts[p] for p in pieces])
     return Endings.joined(list(parts))
 
 

@@ -54,9 +54,9 @@ from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Recorder
 class Checkpoint:
     """The file in which a `Course` is kept while it lasts."""
 
-    path: Path  # where it is
-    identity: str  # everything that the flight depends on, as text; another flight's checkpoint is refused
-    every: float = 5.0  # seconds between two writings
+    path: Path  #: where it is
+    identity: str  #: everything that the flight depends on, as text; another flight's checkpoint is refused
+    every: float = 5.0  #: seconds between two writings
 
     @property
     def _key(self) -> str:
@@ -77,7 +77,9 @@ class Checkpoint:
             return None
         whole = unsealed(self.path)  # so that no library meets a damaged archive
         if whole is None:
-            raise InputError(f"Input {self.path} must be a checkpoint; instead it is damaged: delete it.")
+            raise InputError(
+                f"Input {self.path} must be a checkpoint; instead it is damaged or of an older version: delete it."
+            )
         with np.load(io.BytesIO(whole)) as data:
             content = dict(data)
         if str(content.pop("key")) != self._key:
@@ -94,7 +96,9 @@ class Checkpoint:
 LEFT = "left"
 # Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps.
 TOLERANCE = 1e-16
-PLATE_TOLERANCE = 1e-12  # Of a Taylor step with a plate, whose table is known to 1e-4 at best
+# Of a Taylor step with a plate: energy is balanced to 1e-7 in 20 s (3e-9 at 1e-13, which is 1.4 times as slow), while
+# the plate's table is known to 5e-3 by default and to 1e-5 at best.
+PLATE_TOLERANCE = 1e-12
 # A step's error is relative to the largest of states and events: 250 and more by the event of loss, 3 in a ball.
 # Measured: in a ball J drifts by 3e-14 in 1100 turns at 3e-14, and by 2e-14 in the table's field at 1e-16.
 LOOSER = 300
@@ -223,7 +227,6 @@ class Flight:
         self, start: State, duration: float, currents: Array | None = None, interval: float | None = None
     ) -> Course:
         """The course of `duration` (s) from a start (rotor's frame, t = 0), the plate's states being `currents` (k,).
-
 
         It is sampled at multiples of `interval`, scaled; None: not at all.
         """
@@ -412,8 +415,8 @@ def integrate(
     checkpoint : where the course is kept while it lasts; it goes on from there if there is something. Remove it when
         the trajectory is safe.
 
-    Accuracy: a step errs by round-off, so that energy and |m̂| drift by about 1e-14 in a thousand turns;
-    `Trajectory.energy_error` tells.
+    Accuracy: without a plate's currents a step errs by round-off, so that energy and |m̂| drift by about 1e-14 in a
+    thousand turns; over a plate see `PLATE_TOLERANCE`. `Trajectory.energy_error` tells.
     """
     began, known = perf_counter(), flight.compile_seconds
     course = flight.begin(start, duration, currents, flight.interval(duration))

@@ -58,9 +58,8 @@ class FieldChanges:
     """What changes of the field's representation did in a flight through balls."""
 
     count: int = 0  # of the changes
-    energy: float = (
-        0.0  # their sum U_new - U_old, each at the place of the change; relative, as the error of the energy balance
-    )
+    # Their sum U_new - U_old, each at the place of the change; relative, as the error of the energy balance
+    energy: float = 0.0
     total: float = 0.0  # sum of |U_new - U_old|, relative
     error: float = 0.0  # largest error of a ball's field or gradient against the table, relative
 
@@ -69,19 +68,19 @@ class FieldChanges:
 class Trajectory:
     """Samples of a flight and how it ended."""
 
-    time: Array  # (n,) s, at equal intervals but for the last
-    lab: State  # motion (n, 3) along the laboratory's axes, SI units
-    angular_velocity: float  # of the rotor, rad/s
-    ended_by: str  # "duration", "contact" or "lost"; "stopped" by the user
-    energy_error: float  # largest relative violation of the energy balance or of |m̂| = 1
-    realtime_factor: float  # simulated seconds per second of integration, compilation left out
-    steps: int  # number of Taylor steps
-    compile_seconds: float  # time spent on compilation (little where heyoka's cache knows the system)
-    # part of the samples at which the floater was out of the range of the plate's table
+    time: Array  #: (n,) s, at equal intervals but for the last
+    lab: State  #: motion (n, 3) along the laboratory's axes, SI units
+    angular_velocity: float  #: of the rotor, rad/s
+    ended_by: str  #: "duration", "contact" or "lost"; "stopped" by the user
+    energy_error: float  #: largest relative violation of the energy balance or of |m̂| = 1
+    realtime_factor: float  #: simulated seconds per second of integration, compilation left out
+    steps: int  #: number of Taylor steps
+    compile_seconds: float  #: time spent on compilation (little where heyoka's cache knows the system)
+    #: part of the samples at which the floater was out of the range of the plate's table
     beyond_plate_table: float = 0.0
-    # whether it ended, as "lost", where that range does: the plate's field is not known farther on
+    #: whether it ended, as "lost", where that range does: the plate's field is not known farther on
     left_plate_table: bool = False
-    # from one representation of the rotor's field to another; the energy balance is that of the motion between them
+    #: from one representation of the rotor's field to another; the energy balance is that of the motion between them
     field_changes: FieldChanges = field(default_factory=FieldChanges)
 
     def __repr__(self) -> str:

@@ -18,7 +18,9 @@ NEAR = 2.0  # Distance from the rotor, in floater radii, at which induced forces
 
 
 def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> tuple[bool, str]:
-    """Whether it is in `scene` and `table`, for `asked` "rigid", "mutual" or "auto" (if worth `rtol`); and why.
+    """Whether mutual magnetisation is in the motion of `scene` in the field of `table`, and why.
+
+    `asked` is "rigid", "mutual" or "auto": included where it is worth `rtol`.
 
     Raises InputError: "mutual" is asked for with a measured map, or with magnets whose response is not known.
     """

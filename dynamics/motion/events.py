@@ -102,10 +102,8 @@ def rotor_gap(scene: Scene, position: Array, moment: Array | None = None) -> flo
 
 
 def plate_depth(plate: Plate, time: Array) -> Array:
-    """How far the plate has gone down at `time` (n,) s, in m."""
-    if plate.lowering is None:
-        return np.zeros(len(time))
-    return np.clip((time - plate.lowering.start) * plate.lowering.speed, 0.0, plate.lowering.distance)
+    """Distance (n,) m by which the plate is lowered at `time` (n,) s."""
+    return np.zeros(len(time)) if plate.lowering is None else plate.lowering.depth(time)
 
 
 def plate_legs(plate: Plate | None, duration: float) -> list[tuple[float, float, float]]:

@@ -52,6 +52,7 @@ from numpy.typing import ArrayLike
 from ...fem.closed_forms.eddy_sphere import skin_number
 from ...fem.rotor.floater import FloaterSources, force_and_torque
 from ...fem.rotor.table import FieldFormula, FieldTable
+from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AIR_VISCOSITY, Floater, Scene
 from .effect import Added, Motion, dissipative
@@ -163,7 +164,7 @@ class FloaterShape:
         return Added(force, turn, energy=energy)
 
     def missed(self, table: FieldTable, position: Array, moment: Array) -> Array:
-        """(2, n) what they miss of torque, T, and force, T/m, in `table`, of `moment` (n, 3) at `position` (n, 3) m."""
+        """(n, 2) what the dipoles miss of torque, T, and force, T/m, at `position` (n, 3) m and `moment` (n, 3)."""
         axes = np.array([self.floater.axes(m) for m in moment])
         force, torque = force_and_torque(self.sources, table, position, axes)
         for height, dipole in zip(self.heights, self.dipoles + (self.heights == 0), strict=True):
@@ -188,7 +189,6 @@ THINNEST = 300.0
 
 # Largest `slow_error` beside a remanence, which makes motions fast: there it would be a growth rate's error.
 SLOW_ENOUGH = 0.25
-ROUNDED = 0.995  # What is named as the most that would do is less by so much, so that its three digits will do
 
 FLOATER_CURRENTS = "currents in the floater"
 

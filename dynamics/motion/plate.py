@@ -38,11 +38,11 @@ from .state import Parameter, Vector, cross, dot, dotted, subtract, turned, turn
 class PlateMemory:
     """A plate in the motion."""
 
-    plate: Plate  # pose and way in the laboratory
-    table: PlateTable  # its currents and their fields, in its own frame
-    share: RotorShare  # what the turning rotor adds to the signals
-    model: str = "reduced"  # name of the plate's model
-    neglected: float = 0.0  # estimated relative error of the model itself: of a slab, what its edges would change
+    plate: Plate  #: pose and way in the laboratory
+    table: PlateTable  #: its currents and their fields, in its own frame
+    share: RotorShare  #: what the turning rotor adds to the signals
+    model: str = "reduced"  #: name of the plate's model
+    neglected: float = 0.0  #: estimated relative error of the model itself: of a slab, what its edges would change
 
     @property
     def error(self) -> float:

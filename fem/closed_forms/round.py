@@ -24,8 +24,8 @@ import numpy as np
 
 from ...geometry.common import Array
 from ...geometry.shapes import Cylinder, Ring, Sphere
+from ..harmonics.solid import FOUR_PI
 
-FOUR_PI = 4 * np.pi
 # Nodes of the rule for distances from the mantle of at least so many radii: round-off
 RULES = ((1e-2, 56), (1e-5, 100), (0.0, 220))
 WIDEST, NARROWEST = 3.0, 1e-14

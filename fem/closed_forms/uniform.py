@@ -30,11 +30,11 @@ from ...geometry.shapes import Box, Cylinder, Ring, Sphere
 from ...geometry.solids import Part, Solid
 from ..harmonics.expansion import turned_expressions, turned_field, uniform_moments
 from ..harmonics.expressions import CompiledField, FieldExpressions, Number
+from ..harmonics.solid import FOUR_PI
 from .round import resolved_distance, round_slope, round_tensor, segments_field
 
 Expression = Any  # A heyoka expression
 SIGNS = (-1, 1)
-FOUR_PI = 4 * np.pi
 
 
 class _Corners:
@@ -50,7 +50,7 @@ class _Corners:
         self.inverse = {corner: 1.0 / r for corner, r in self.distance.items()}
 
     def edge(self, first: int, second: int, i: int, j: int) -> tuple[Expression, Expression]:
-        """Of the edge parallel to the third axis with the signs i and j across the others: L / (r1 + r2), ∂Λ/∂u over u.
+        """L / (r1 + r2) and ∂Λ/∂u over u of the edge along the third axis with signs i and j across the others.
 
         u is a coordinate across the edge. Both are written with (r1 + r2)² - L² and one reciprocal.
         """
@@ -207,7 +207,7 @@ def cuboid_tensor(points: Array, half_edges: Array) -> Array:
         b, c = (a + 1) % 3, (a + 2) % 3
         for signs, r in distance.items():
             u, v, w = (offset[axis][signs[axis]] for axis in (a, b, c))
-            with np.errstate(divide="ignore", invalid="ignore"):  # on a face the mean of both sides
+            with np.errstate(divide="ignore", invalid="ignore"):  # on a face: its side towards + of that axis; 0/0 is 0
                 tensor[:, a, a] -= np.prod(signs) * np.nan_to_num(np.arctan(v * w / (u * r)))
         tensor[:, a, b] = sum(i * j * edges[_corner(c, 0, i, j)] for i, j in product(SIGNS, repeat=2))
         tensor[:, b, a] = tensor[:, a, b]
@@ -315,7 +315,7 @@ def remanent_field(magnets: Sequence[Magnet], points: Array) -> Array:
 def remanent_potential(magnets: Sequence[Magnet], points: Array) -> Array:
     """Potential (n,) T m of cuboids with μr = 1 at points (n, 3) m; continuous everywhere, as t log t at an edge."""
     boxes = [attraction(m.box.to_body(points), m.box.half_edges) @ m.polarization for m in magnets]
-    return np.asarray(sum(boxes)) / (4 * np.pi)
+    return np.asarray(sum(boxes)) / FOUR_PI
 
 
 Fields = tuple[Array, Array]  # H and M, each (n, 3) A/m; B = μ0 (H + M)
@@ -355,5 +355,5 @@ def fields_of_sphere(moment: Array, center: Array, radius: float, points: Array)
     within = distance <= radius
     magnetization = np.where(within, moment / (4 / 3 * np.pi * radius**3), 0.0)
     unit = away / np.maximum(distance, radius)  # of length 1 outside, where it is used
-    outside = (3 * unit * (unit @ moment)[:, None] - moment) / (4 * np.pi * np.maximum(distance, radius) ** 3)
+    outside = (3 * unit * (unit @ moment)[:, None] - moment) / (FOUR_PI * np.maximum(distance, radius) ** 3)
     return np.where(within, -magnetization / 3, outside), magnetization

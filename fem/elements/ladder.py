@@ -153,7 +153,7 @@ SIZES = tuple(zip((1.0, 0.8, 0.5), OTHERWISE, strict=True))
 
 @dataclass(frozen=True)
 class Refinement:
-    """How fine a solution is."""
+    """Refinement of a solution: order, mesh and boundary."""
 
     order: int  # of the elements
     mesh: MeshSettings  # the mesh's settings

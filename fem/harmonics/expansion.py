@@ -12,7 +12,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.shapes import Box, Cylinder, Ring, Sphere
 from ...geometry.solids import Part as SolidPart, Solid
-from .expressions import UPPER, FieldExpressions, Number, harmonic_sums
+from .expressions import UPPER, FieldExpressions, Number, harmonic_sums, whole_gradient
 from .interior import Ball, moment
 from .solid import (
     FOUR_PI,
@@ -142,9 +142,7 @@ class MultipoleExpansion:
             return turned_field(self.axes, own.expressions(seen, number), number)
         scaled = [component * number(1.0 / self.radius) for component in place]
         sums = harmonic_sums(scaled, [real_terms(part) for part in self._derivatives[: 3 + len(UPPER)]], number)
-        upper = dict(zip(UPPER, sums[3:], strict=True))
-        upper[2, 2] = -upper[0, 0] - upper[1, 1]
-        return sums[:3], [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
+        return sums[:3], whole_gradient(sums[3:])
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""

@@ -31,6 +31,13 @@ FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
 
 
+def whole_gradient(entries: Sequence[hy.expression]) -> list[list[hy.expression]]:
+    """Symmetric traceless gradient (3 × 3) from its entries in `UPPER`."""
+    upper = dict(zip(UPPER, entries, strict=True))
+    upper[2, 2] = -upper[0, 0] - upper[1, 1]
+    return [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
+
+
 def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], number: Number) -> list[hy.expression]:
     """Σ weight Re Θ_lm or Im Θ_lm, one expression for each of `sums`.
 

@@ -19,7 +19,7 @@ import heyoka as hy
 import numpy as np
 
 from ...geometry.common import MU_0, Array
-from .expressions import UPPER, FieldExpressions, regular_harmonics
+from .expressions import UPPER, FieldExpressions, regular_harmonics, whole_gradient
 from .solid import CHUNK, FOUR_PI, Coefficients, factorials, members, regular_values, weighted_sums
 
 
@@ -205,9 +205,7 @@ class BallField:
         start = self.first + 4
         field = [weighted(start + i * size, size) for i in range(3)]
         slopes = [weighted(start + 3 * size + k * less, less) for k in range(len(UPPER))]
-        upper = dict(zip(UPPER, slopes, strict=True))
-        upper[2, 2] = -upper[0, 0] - upper[1, 1]
-        return field, [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
+        return field, whole_gradient(slopes)
 
     def fit(self, evaluate: Callable[[Array], tuple[Array, Array]], ball: Ball) -> tuple[Array, float]:
         """Values (count,) of the parameters for a field, points (n, 3) m -> B, ∇B; and the error of the expansion.

@@ -114,18 +114,6 @@ def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) ->
     return [(plus - minus) / 2, (plus + minus) / 2j, -harmonics[l + 1, m]]
 
 
-def regular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) -> list[Any]:
-    """Gradient (three complex arrays) of Υ_lm, m ≥ 0, from `harmonics` of `regular_values`."""
-
-    def at(n: int, k: int) -> Any:
-        if n < 0 or abs(k) > n:
-            return 0.0
-        return harmonics[n, k] if k >= 0 else (-1) ** k * np.conj(harmonics[n, -k])
-
-    plus, minus = at(l - 1, m + 1), -at(l - 1, m - 1)
-    return [(plus + minus) / 2, (plus - minus) / 2j, at(l - 1, m)]
-
-
 def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
     """Σ c_lm Θ_lm (n, k) at points (n, 3), for k arrays c of one size."""
     stacked = np.stack(coefficients, axis=-1)

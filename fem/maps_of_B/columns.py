@@ -26,11 +26,11 @@ class FieldMap:
     FieldMapError : wrong shapes, a point or field that is infinite, a point that is NaN, an error that is not positive
     """
 
-    points: Array  # (n, 3) m, rotor's frame
-    field: Array  # (n, 3) T; NaN where a component was not observed
-    # (n, 3) standard errors of `field`, T, or what broadcasts to it; None if they are not known
+    points: Array  #: (n, 3) m, rotor's frame
+    field: Array  #: (n, 3) T; NaN where a component was not observed
+    #: (n, 3) standard errors of `field`, T, or what broadcasts to it; None if they are not known
     errors: Array | None = None
-    read_as: tuple[str, str] = ("m", "T")  # units of length and of B that the file was taken to have
+    read_as: tuple[str, str] = ("m", "T")  #: units of length and of B that the file was taken to have
 
     def __post_init__(self) -> None:
         points, field = np.asarray(self.points, float), np.asarray(self.field, float)

@@ -30,6 +30,7 @@ from .samples import (
 from .table import (
     OF_RETURN,
     OF_SPHERE,
+    PARALLEL,
     POWERS,
     RETURNED,
     EnergySum,
@@ -47,7 +48,6 @@ SMALL = 1e-9  # relative size of a singular value that is none
 MANY = 4
 # What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
 HELD, FREE = 1e-3, 1e-6
-PARALLEL = 1e-9
 # Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole
 GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
 DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end

@@ -59,7 +59,7 @@ def enough_degree(magnets: Sequence[Magnet], ball: Ball, rtol: float = 1e-9) -> 
 
 # Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off
 NODES = 24
-DIRECT_DIGITS = 16.0  # as `grid.DIGITS`, for the direct part of the response
+DIRECT_DIGITS = 16.0  # as `table.DIGITS`, for the direct part of the response
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,6 +240,7 @@ def two_body(
 
     Parameters
     ----------
+    rotor, floater : the bodies; of the floater radius, remanence and recoil permeability count
     position : (3,) floater's centre, m, rotor's frame
     direction : (3,) unit vector of its remanent polarisation
     degree : highest degree about the floater's centre; None: from the distance of the nearest edge

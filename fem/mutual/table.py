@@ -27,11 +27,12 @@ from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Solid
 from ..compiled_code import compiled
-from ..harmonics.solid import Coefficients, factorials
+from ..harmonics.solid import FOUR_PI, Coefficients, factorials
 
 # β of the images, and the degree up to which their weights are fitted from 2 on: to 7e-4 of t_l
 IMAGES, FITTED = (0.95, 0.73, 0.3), 14
-UNIT = MU_0 / (4 * np.pi)
+PARALLEL = 1e-9  # entry of a unit vector, or of μ along the body's axes, that is round-off
+UNIT = MU_0 / FOUR_PI
 # Edges of the boxes that stand for a sphere and for the section of a cylinder, in diameters
 IN_SPHERE, IN_CIRCLE = 0.64, 0.8
 # Along an edge of a face; the first meet what two magnets' fields do in the sphere to 1e-3 of all that is added
@@ -275,7 +276,7 @@ class ResponseGrid:
         """
         nodes, weights = np.polynomial.legendre.leggauss(number)
         along, places, amounts = list(zip(nodes, weights / 2, strict=True)), [np.zeros((0, 3))], []
-        for k in np.flatnonzero(np.abs(self.axis) > 1e-9):
+        for k in np.flatnonzero(np.abs(self.axis) > PARALLEL):
             for side, (u, first), (v, second) in product((-1.0, 1.0), along, along):
                 places.append(np.roll([[side, u, v]], k, axis=1) * self.box.half_edges)
                 amounts.append(side * self.axis[k] * first * second)
@@ -342,7 +343,7 @@ def point_counts(box: Box, clearance: float, digits: float = DIGITS) -> tuple[in
 
 @dataclass(frozen=True, eq=False)
 class MutualTable:
-    """What rotor and floater add to each other's magnetisation: U = -½ α B0² + Σ -½ λ b² - u - V·M, M = m + α B0."""
+    """Mutual magnetisation of rotor and floater, as an energy: U = -½ α B0² + Σ -½ λ b² - u - V·M, M = m + α B0."""
 
     magnets: tuple[Magnet, ...]  # of the rotor
     grids: tuple[ResponseGrid, ...]  # of those magnets that respond or are magnetised
@@ -406,7 +407,7 @@ class MutualTable:
         return total
 
     def added(self, places: Array, moments: Array, field: Array, gradient: Array) -> tuple[Array, Array, Array]:
-        """What mutual magnetisation adds to energy (n,) J, force (n, 3) N and torque (n, 3) N m.
+        """Energy (n,) J, force (n, 3) N and torque (n, 3) N m added by mutual magnetisation.
 
         Parameters
         ----------

@@ -108,7 +108,7 @@ def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: com
 
 
 def dipole_images(parity: Parity, points: Array, places: Array) -> Iterator[Array]:
-    """The same, at `points`, of unit moments along x, y and z at each of `places` (m, 3) m.
+    """Parity parts at `points`, as of `source_images`, of unit moments along x, y and z at each of `places` (m, 3) m.
 
     A mirrored potential e_j × K is that of the mirrored kernel K = μ0/4π r/r³ but for a sign that depends on component
     and moment, so that one kernel's parity parts serve all three moments of a place.
@@ -383,7 +383,7 @@ class PlateSolution:
     probes : (n, 3) m, places in the boxes that were not trained
     angular_frequencies : (k,) rad/s
     residuals : (k, 3n, 3n) products of the residuals ρ of unit moments at the probes, whose norms bound the errors of
-        their fields (`shift_basis`)
+        their fields (`Residuals`)
     seconds : time spent
     """
 

@@ -34,9 +34,9 @@ from .table import OPTION
 
 # ωμ0σL² below which the response is resistive: A = a0 + iω a1, with a0 (charges) and a1 (currents) real and constant.
 # The slowest current of a plate decays in less than μ0σL²/100, so that this is exact to RESISTIVE²/1e4 = 1e-8.
-CHUNK = 16  # Sources handled at a time: bounds the memory
 RESISTIVE = 1e-2
 SILENT = 1e-9  # Parity parts smaller than this share of the whole source are not solved for
+CHUNK = 16  # Sources handled at a time: bounds the memory
 
 
 class Source(Protocol):

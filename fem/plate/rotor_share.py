@@ -40,7 +40,9 @@ UNNOTICED = 1e-2  # Share of the series' tolerance for degrees of the rotor's mu
 MOST_TERMS = 15  # Highest number of harmonics, and of points along the way
 TOGETHER = 12  # Places whose signals are computed at once
 NOISE = 1e-10  # Amplitudes below this share of the largest signal are what symmetry forbids
-MISSED = 0.3  # Share of a table's tolerance for the harmonics left out
+# Share of a table's tolerance for the sum of what left-out harmonics have in the field of the rotor's currents or in
+# its gradient, at any place and frequency of the table; with SHARE_PART it stays below the tolerance.
+MISSED = 0.3
 # Places in the region, and depths of a plate that is lowered, where the field of the rotor's currents is looked at.
 POINTS, DEPTHS = (3, 3, 3), 7
 # Networks are trained with the rotor at so many angles of a turn and depths of the plate; probes lie between them.

@@ -190,7 +190,7 @@ def slab_modes(slab: Slab, wave_numbers: Array, count: int) -> SlabModes:
 
 
 def modes_needed(slab: Slab, wave_number: float, frequency: float, tolerance: float) -> int:
-    """How many modes of `slab` leave out `tolerance` of the reflection up to `wave_number` (1/m) and `frequency` (Hz).
+    """Modes that leave out less than `tolerance` of the reflection up to `wave_number` (1/m) and `frequency` (Hz).
 
     What N modes leave out is 4 k κ² t³ / (3 π⁴ N³), κ² = ωμ0σ, of a reflection near 1, and 16 (kt)³ / (3 π⁴ N³) of one
     in the limit of slow changes; in between the sum is enough.

@@ -88,8 +88,7 @@ def floater_sources(
     if floater.recoil_permeability == 1:
         return _joined([magnet], [], degree)
     table, _ = cached_rotor_table((magnet,), "fem", RTOL, report, floater.radius)
-    least = max(floater.inner_radius, SHARE * floater.radius)
-    # charges farther in would be large and cancel
+    # Charges farther in would be large and cancel
     least = max(floater.inner_radius, SHARE * floater.radius)
     return _joined(table.uniform, [_charges(e, least) for e in table.expansions], degree)
 

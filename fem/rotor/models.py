@@ -37,7 +37,7 @@ class AccuracyError(InputError):
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What a table must reach."""
+    """Accuracy asked of a table, and from which distance on."""
 
     rtol: float = 3e-6  # relative error of B
     # Distance from the magnets' faces from which on `rtol` holds, m, `NEAREST` of the largest magnet's edge at least;

@@ -1,6 +1,6 @@
 """What finite and permeable magnets change: levitation by dipoles and by the true field, and mutual magnetisation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -10,8 +10,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ...dynamics.continuation.frequencies import StableRange, at_frequency, reference_state, stable_range
-from ...dynamics.equilibria.balance import CONVERGED_STEP, Balance, moved_pose, solve, tangent_basis
+from ...dynamics.equilibria.balance import Balance
 from ...dynamics.equilibria.equilibrium import Equilibrium, named_modes
+from ...dynamics.equilibria.perturbed import balanced_directions, shifted_equilibrium
 from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates
@@ -244,8 +245,6 @@ DIPOLE_VS_FEM = Study(
 # When is the floater a rigid dipole? Force and torque with and without mutual magnetisation.
 LEVELS = (0.1, 0.01, 1e-3, 1e-4)
 FARTHEST = 0.05  # Depth that the study reaches below the rotor's origin, m
-TILTS = np.array([3, 4])  # of the unknowns of a `Balance`
-MOST_STEPS = 20  # of the quasi-Newton method
 FORCE_PARTS = ("rigid", "floater_answer", "rotor_answer", "total")
 
 
@@ -347,76 +346,6 @@ def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, sta
         "shift_error": (doubt, "m", "its estimated error"),
     }
     return xr.Dataset({name: variable(("axis",), *row) for name, row in rows.items()}, {"axis": list(AXIS)})
-
-
-def balanced_directions(scene: Scene, balance: Balance, places: Array, start: float, guess: Array) -> Array:
-    """Moment directions (n, 3) whose torque is balanced, followed downwards and upwards from `start` (m) below.
-
-    Parameters
-    ----------
-    scene, balance : a scene's
-    places : (n, 3) m
-    start : distance below the rotor's origin, m
-    guess : (3,) for the first ones; each other begins at its neighbour's, which stays where no balance is near
-    """
-    result, depths = np.zeros_like(places), -places[:, 2]
-    order = np.argsort(depths)
-    for chain in (order[depths[order] >= start], order[::-1][depths[order[::-1]] < start]):
-        direction = guess
-        for k in chain:
-            _, moment, step = solve(balance, places[None, k] / scene.floater.radius, direction[None], TILTS)
-            direction = result[k] = moment[0] if step[0] < CONVERGED_STEP else direction
-    return result
-
-
-def shifted_equilibrium(
-    scene: Scene,
-    balance: Balance,
-    position: Array,
-    moment: Array,
-    extra: Callable[[Array, Array], tuple[Array, Array]],
-    tolerance: float = 1e-7,
-) -> tuple[Array, Array]:
-    """Follow an equilibrium to where additional forces put it.
-
-    Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577).
-
-    Parameters
-    ----------
-    scene, balance : a scene's, without the additional forces
-    position, moment : (3,) m and direction of the equilibrium
-    extra : of a position (3,) m and a direction (3,): additional force (3,) N and torque (3,) N m, rotor's frame
-    tolerance : of the place, in radii of the floater
-
-    Returns
-    -------
-    The shift (3,) m to first order, and the new position (3,) m; NaN if none was reached.
-    """
-    scales, floater = Scales.of(scene), scene.floater
-
-    def residual(position: Array, moment: Array) -> Array:
-        value = balance(position[None], moment[None])[0][0]
-        force, torque = extra(position * scales.length, moment)
-        value[:3] += force * scales.time**2 / (floater.mass * scales.length)
-        value[3:] += tangent_basis(moment[None])[0] @ torque * scales.time**2 / floater.inertia
-        return np.asarray(value)
-
-    position = position / scales.length
-    inverse, left = np.linalg.inv(balance(position[None], moment[None])[1][0]), residual(position, moment)
-    step = -inverse @ left
-    linear = step[:3] * scales.length
-    for _ in range(MOST_STEPS):
-        (position,), (moment,) = moved_pose(position[None], moment[None], step[None])
-        place = position * scales.length
-        if np.linalg.norm(step) < tolerance:
-            return linear, place
-        if np.linalg.norm(step) > 1.0 or any(body.distance(place) <= floater.radius for body in scene.turning_bodies):
-            break
-        new = residual(position, moment)
-        change = inverse @ (new - left)
-        inverse = inverse + np.outer(step - change, step @ inverse) / (step @ change)
-        left, step = new, -inverse @ new
-    return linear, np.full(3, np.nan)
 
 
 def _depths(scene: Scene, number: int) -> Array:

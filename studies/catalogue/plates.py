@@ -14,14 +14,12 @@ from numpy.typing import ArrayLike
 
 from ...dynamics.continuation.frequencies import StableRange, at_frequency
 from ...dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
-from ...dynamics.motion.equations import parameters
-from ...dynamics.motion.plate import PlateForce, PlateMemory
-from ...dynamics.motion.state import Scales, State
+from ...dynamics.equilibria.perturbed import plate_action
 from ...fem.closed_forms.potentials import Dipole, Racetrack
 from ...fem.plate.eddy import solve_eddy
 from ...geometry.common import Array
 from ...geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex_mesh, skin_depth
-from ...geometry.scene.contents import Plate, Scene
+from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box, rotation_matrix
 from ..cli.options import PlateModel
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
@@ -190,25 +188,6 @@ COLUMNS: Columns = {
     "loss": ((), "W", "heat in the plate, by floater and rotor"),
     "error": ((), "1", "estimated relative error of the plate's table"),
 }
-
-
-def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) -> dict[str, ArrayLike]:
-    """The plate's mean force (3,) N and torque (3,) N m, along the laboratory's axes, and the heat in it, W.
-
-    Raises ValueError for an `equilibrium` of the `scene` that was found without the plate's currents (`memory`).
-    """
-    if equilibrium.turn is None or equilibrium.currents is None:
-        raise ValueError("Input equilibrium must have been found with the plate's currents; instead received none.")
-    scales, floater, count = Scales.of(scene), scene.floater, len(equilibrium.currents)
-    times = 2 * np.pi * np.arange(count) / count
-    coupling = PlateForce(memory, parameters(scene, scales, frozen_spin=True))(times, scales.pack(equilibrium.turn))
-    root_energy = np.sqrt(floater.mass) * scales.length / scales.time
-    currents = equilibrium.currents / root_energy - coupling.signals
-    push = np.einsum("aix,ai->ax", coupling.fields, currents) / scales.time**2
-    force, torque = push[:, :3] * floater.mass * scales.length, push[:, 3:] * floater.inertia
-    lab = State(force, force, torque, torque).to_lab(times)
-    loss = np.einsum("ai,i,ai->a", currents, memory.table.rates, currents).mean() * root_energy**2
-    return {"force": lab.position.mean(axis=0), "torque": lab.moment.mean(axis=0), "loss": loss}
 
 
 def _damping_row(levitation: Levitation, start: Equilibrium) -> dict[str, ArrayLike]:

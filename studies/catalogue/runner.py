@@ -192,7 +192,7 @@ def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
     """The scene at the end of the flight that a result holds, and its motion along the rotor's axes."""
     scene = parse_scene(str(result.attrs["scene"]), source)
     if (plate := scene.plate) is not None and plate.lowering is not None:
-        down = np.array([0.0, 0.0, plate.lowering.depth(float(result["time"][-1]))])
+        down = np.array([0.0, 0.0, float(plate.lowering.depth(result["time"].values[-1]))])
         box = replace(plate.box, center=plate.box.center - down)
         scene = replace(scene, plate=replace(plate, box=box, lowering=None))
     laboratory = State(*(result[name].values for name in ("position", "velocity", "moment", "spin")))

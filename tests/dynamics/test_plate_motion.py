@@ -12,6 +12,7 @@ from second_opinions.plate_tables import reaction_gradient
 
 from spinlev.dynamics.equilibria.equilibrium import Survey, resampled
 from spinlev.dynamics.equilibria.orbits import differentiation, floquet_modes, periodic_orbit
+from spinlev.dynamics.equilibria.perturbed import plate_action
 from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
 from spinlev.dynamics.flights.flight import Flight, integrate, simulate
 from spinlev.dynamics.motion.equations import parameters
@@ -24,7 +25,6 @@ from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Drag, Lowering, OffsetStart, Plate, Scene
 from spinlev.geometry.shapes import Box
-from spinlev.studies.catalogue.plates import plate_action
 
 SetNumThreads(1)
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)

@@ -7,6 +7,7 @@ import pytest
 
 from spinlev.dynamics.continuation.frequencies import at_frequency, levitating_ranges, reference_state, stable_range
 from spinlev.dynamics.equilibria.balance import Balance
+from spinlev.dynamics.equilibria.perturbed import shifted_equilibrium
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.equations import parameters
@@ -18,7 +19,7 @@ from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.studies.catalogue.article import FLOATER
-from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem, shifted_equilibrium
+from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem
 from spinlev.studies.catalogue.margins import PARAMETERS, QUANTITIES, designed, levitation, nominal, scene_of, slope_by
 from spinlev.studies.catalogue.regions import stability_map
 from spinlev.studies.catalogue.scenes import article_scene

@@ -15,7 +15,7 @@ import spinlev as sl
 from spinlev.studies.cli.console import PACKAGES
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
-NAMED = re.compile(r"`((?:geometry|fem|dynamics|studies|tests|benchmarks|scenes|docs)/[\w/.-]+\.(?:py|toml|md))")
+NAMED = re.compile(r"(?:`|pytest )((?:geometry|fem|dynamics|studies|tests|benchmarks|scenes|docs)/[\w/.-]*\w)")
 
 
 def test_files_that_are_named_exist():
@@ -23,7 +23,7 @@ def test_files_that_are_named_exist():
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
         links = re.findall(r"\]\((?!https?:)([^)#]+)", text)
-        missing += [f"{page.name}: {name}" for name in NAMED.findall(text) if not (ROOT / name).is_file()]
+        missing += [f"{page.name}: {name}" for name in NAMED.findall(text) if not (ROOT / name).exists()]
         missing += [f"{page.name}: {link}" for link in links if not (page.parent / link).exists()]
     assert missing == []
 

@@ -22,6 +22,6 @@ def test_a_notebook_shows_tables():
     assert list(rows) == ["magnet 1", "floater", "gravity"]
     title, rows = shown(levitation.stability)
     assert title == "Equilibrium, stable"
-    assert "bounce" in rows["modes"]
+    assert "axial" in rows["modes"]
     assert shown(levitation.table)[0].startswith("RotorTable 'dipole'")
     assert shown(levitation.flight(0.05))[1]["ended by"] == "duration"

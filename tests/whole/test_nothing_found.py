@@ -12,6 +12,7 @@ from spinlev.dynamics.continuation.frequencies import way_out
 from spinlev.dynamics.continuation.slow_drift import drift
 from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
 from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
+from spinlev.dynamics.equilibria.perturbed import TILTS, balanced_directions, shifted_equilibrium
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
@@ -23,7 +24,6 @@ from spinlev.geometry.cutting import CONVERGENCE, cut_magnets
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex_mesh
 from spinlev.geometry.shapes import Box, rotation_matrix
-from spinlev.studies.catalogue.finite_magnets import TILTS, balanced_directions, shifted_equilibrium
 
 TABLE = rotor_table(SCENE.rotor, "dipole")
 WEAK = replace(SCENE, floater=replace(FLOATER, remanence=1e-3))

@@ -6,6 +6,7 @@ import xarray as xr
 from places import SCENES
 
 from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
+from spinlev.dynamics.equilibria.perturbed import shifted_equilibrium
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
@@ -19,7 +20,6 @@ from spinlev.studies.catalogue.finite_magnets import (
     floater_lines,
     floater_permeability,
     missed,
-    shifted_equilibrium,
     sufficient,
 )
 

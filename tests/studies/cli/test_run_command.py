@@ -25,7 +25,9 @@ def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path, poin
     status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
     assert status == 0, err
     assert re.search(
-        r"Point-dipole model, same conditions: levitation distance [\d.]+ mm, 0\.16\(1\) mm more than", out
+        r"Point-dipole model, same conditions without the plate: levitation distance [\d.]+ mm, "
+        r"0\.16\(1\) mm more than",
+        out,
     )
     made = {path.name for path in (tmp_path / "out").iterdir()}
     drawn = set() if unavailable() else {"scene.png"}
