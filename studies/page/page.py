@@ -296,8 +296,13 @@ class Flight:
         self.held = self.ended = False
         x, z = (1e-3 * float(self.layout.floater.data[key][0]) for key in "xz")
         self._begin()
-        self.worker.ask(object(), lambda: (work.wish, "put", [x, 0.0, z]), self._flown)
-        self._play()
+        self.worker.ask(object(), lambda: (work.wish, "put", [x, 0.0, z]), self._put)
+
+    def _put(self, frame: Frame) -> None:
+        """Fly on from there; where it cannot be the page waits, so that the reason can be read."""
+        self._flown(frame)
+        if not frame.message:
+            self._play()
 
     def _drawn(self) -> None:
         """A pose has been drawn: the next one may come, one at a time; a page too slow for its speed falls behind."""

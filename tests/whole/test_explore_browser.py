@@ -159,22 +159,36 @@ def test_everything_that_can_be_done(server, browser, tmp_path):
 
 
 def assert_dragged(tab):
-    """The ball, dragged a long way down and let go, is lost or falls on something, and the page says so."""
+    """The ball, dragged a long way: out of reach of the plate's response, the page waits and says so; else it falls."""
     where = """(() => { const view = Bokeh.index.find_one(model('side')), ball = model('side').renderers
       .map(one => one.data_source.data).find(data => 'r' in data), frame = view.canvas_view.el.getBoundingClientRect();
       return [frame.x + view.frame.x_scale.compute(ball.x[0]), frame.y + view.frame.y_scale.compute(ball.z[0])]; })()"""
     said(tab, "Bokeh.index.find_one(model('side')).el.scrollIntoView({block: 'center'})")
-    x, y = said(tab, where)
     scales = said(
         tab,
         "['x', 'y'].map(k => Bokeh.index.find_one(model('side')).frame[k + '_scale'])"
         ".map(scale => Math.abs(scale.compute(1) - scale.compute(0)))",
     )
     assert abs(scales[0] - scales[1]) < 0.01 * scales[0]  # a ball looks round
-    tab.mouse((x, y), (x + 20, y + 5), (x + 60, y + 15), (x + 90, y + 25))
+
+    def drag():
+        said(tab, "Bokeh.index.find_one(model('side')).el.scrollIntoView({block: 'center'})")
+        x, y = said(tab, where)
+        tab.mouse((x, y), (x + 20, y + 5), (x + 60, y + 15), (x + 90, y + 25))
+
+    drag()
+    refused = "/field of the plate.* currents was computed/.test(model('says').text) && model('play').label === 'Play'"
+    wait(tab, refused)
+    tab.run("new Promise(done => setTimeout(done, 1000))")
+    assert said(tab, refused)
+    said(tab, "model('plate_model').value = 'none'")
+    wait(tab, f"{COMPLETE} && /without the plate/.test(model('sign').text)")
+    drag()
     wait(tab, "/^After .* s (touched|lost)/.test(model('says').text)")
     click(tab, "again")
     wait(tab, "model('says').text === ''")
+    said(tab, "model('plate_model').value = 'slab'")
+    wait(tab, f"{COMPLETE} && /infinite slab/.test(model('sign').text)")
 
 
 def assert_downloaded(tab, folder):
