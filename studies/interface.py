@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any, Unpack
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -19,8 +19,8 @@ from ..geometry.common import InputError
 from ..geometry.scene.files import scene_text
 from .catalogue.entries import CATALOGUE
 from .catalogue.runner import figures_of, question_study
-from .cli.console import heard
 from .cli.options import (
+    Asked,
     FieldModel,
     InteractionModel,
     Models,
@@ -29,6 +29,7 @@ from .cli.options import (
     Workers,
     checked_values,
     combinations,
+    documented,
     finite,
     positive,
 )
@@ -45,14 +46,7 @@ from .sweep import forget, swept
 TOGETHER = 512  # trajectories that a worker gets at once, at most
 
 
-class Asked(TypedDict, total=False):
-    """Further fields of `Models` that the functions take by name."""
-
-    rtol: float
-    plate_rtol: float
-    interaction: InteractionModel
-
-
+@documented
 def equilibria(
     scene: SceneLike,
     model: FieldModel = "auto",
@@ -65,16 +59,7 @@ def equilibria(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model, plate_model : str
-        Models of the rotor's field and of the plate, see `Models`.
-    spin : float
-        Body spin S = Ω·m̂/ω of the floater about its own moment.
-    progress : bool
-        Whether messages go to standard error.
-    **asked
-        `rtol`, `plate_rtol` and `interaction`, see `Models`.
+    scene, model, plate_model, spin, progress, **asked
 
     Returns
     -------
@@ -89,12 +74,12 @@ def equilibria(
     InputError
         A model, a tolerance or a file that cannot be used.
     """
-    with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
-        found = Result(levitation, levitation.survey).dataset()
-        return found.assign_attrs(study="equilibria", scene=scene_text(levitation.scene))
+    levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
+    found = Result(levitation, levitation.survey).dataset()
+    return found.assign_attrs(study="equilibria", scene=scene_text(levitation.scene))
 
 
+@documented
 def stability(
     scene: SceneLike,
     model: FieldModel = "auto",
@@ -107,16 +92,7 @@ def stability(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model, plate_model : str
-        Models of the rotor's field and of the plate, see `Models`.
-    spin : float
-        Body spin S = Ω·m̂/ω of the floater about its own moment.
-    progress : bool
-        Whether messages go to standard error.
-    **asked
-        `rtol`, `plate_rtol` and `interaction`, see `Models`.
+    scene, model, plate_model, spin, progress, **asked
 
     Returns
     -------
@@ -132,12 +108,12 @@ def stability(
     InputError
         A model, a tolerance or a file that cannot be used.
     """
-    with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
-        found = found_dataset((levitation.stability,)).isel(equilibrium=0, drop=True).drop_vars("number")
-        return found.assign_attrs(study="stability", scene=scene_text(levitation.scene), **levitation.labels)
+    levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
+    found = found_dataset((levitation.stability,)).isel(equilibrium=0, drop=True).drop_vars("number")
+    return found.assign_attrs(study="stability", scene=scene_text(levitation.scene), **levitation.labels)
 
 
+@documented
 def simulate(
     scene: SceneLike,
     duration: float,
@@ -150,16 +126,9 @@ def simulate(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
+    scene, model, plate_model, progress, **asked
     duration : float
         Simulated time, s.
-    model, plate_model : str
-        Models of the rotor's field and of the plate, see `Models`.
-    progress : bool
-        Whether messages go to standard error.
-    **asked
-        `rtol`, `plate_rtol` and `interaction`, see `Models`.
 
     Returns
     -------
@@ -173,12 +142,12 @@ def simulate(
     InputError
         A model, a tolerance or a file that cannot be used.
     """
-    with heard(progress):
-        levitation = Levitation(scene, Models(model, plate_model, **asked))
-        flown = Result(levitation, flight=levitation.flight(duration)).dataset()
-        return flown.assign_attrs(scene=scene_text(levitation.scene))
+    levitation = Levitation(scene, Models(model, plate_model, **asked))
+    flown = Result(levitation, flight=levitation.flight(duration)).dataset()
+    return flown.assign_attrs(scene=scene_text(levitation.scene))
 
 
+@documented
 def rotor_table(
     scene: SceneLike, model: FieldModel = "auto", rtol: float = Models.rtol, progress: bool = False
 ) -> FieldTable:
@@ -186,14 +155,7 @@ def rotor_table(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    rtol : float
-        Relative accuracy asked of the field.
-    progress : bool
-        Whether messages go to standard error.
+    scene, model, rtol, progress
 
     Returns
     -------
@@ -209,11 +171,11 @@ def rotor_table(
     AccuracyError
         The accuracy cannot be reached.
     """
-    with heard(progress):
-        table = Levitation(scene, Models(model, rtol=rtol)).table
-        return complete(table, max(rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
+    table = Levitation(scene, Models(model, rtol=rtol)).table
+    return complete(table, max(rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
 
 
+@documented
 def plate_table(
     scene: SceneLike,
     model: FieldModel = "auto",
@@ -225,14 +187,7 @@ def plate_table(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model, plate_model : str
-        Models of the rotor's field and of the plate, see `Models`.
-    progress : bool
-        Whether messages go to standard error.
-    **asked
-        `rtol`, `plate_rtol` and `interaction`, see `Models`.
+    scene, model, plate_model, progress, **asked
 
     Returns
     -------
@@ -245,10 +200,10 @@ def plate_table(
     InputError
         A model, a tolerance or a file that cannot be used.
     """
-    with heard(progress):
-        return Levitation(scene, Models(model, plate_model, **asked)).plate
+    return Levitation(scene, Models(model, plate_model, **asked)).plate
 
 
+@documented
 def working_point(
     scene: SceneLike,
     model: FieldModel = "auto",
@@ -260,20 +215,12 @@ def working_point(
 
     Frequency-locked, the floater's field in the magnets is the same all over a turn; `lowest_turning` is the
     lowest if the floater lags by up to a whole turn. No hysteresis: parts below the knee are reported, not followed.
-    On an edge the field can be infinite; `lowest` keeps 2 % of the edge of a cube of the magnet's volume off all edges.
+    The models place the floater; in the magnets the field is of finite elements, mutual magnetisation included.
+    On an edge it can be infinite; `lowest` keeps 2 % of the edge of a cube of the magnet's volume off all edges.
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field that places the floater; in the magnets the field is always of finite elements.
-    rtol : float
-        Relative accuracy asked of that field.
-    interaction : {"auto", "rigid", "mutual"}
-        Whether rotor and floater magnetise each other where the floater is placed; in the magnets they always do.
-    progress : bool
-        Whether messages go to standard error.
+    scene, model, rtol, interaction, progress
 
     Returns
     -------
@@ -286,11 +233,11 @@ def working_point(
     InputError
         No magnet has a polarisation, or a model, a tolerance or a file that cannot be used.
     """
-    with heard(progress):
-        levitation = Levitation(scene, Models(model, rtol=rtol, interaction=interaction))
-        return working_point_dataset(levitation).assign_attrs(study="working-point", scene=scene_text(levitation.scene))
+    levitation = Levitation(scene, Models(model, rtol=rtol, interaction=interaction))
+    return working_point_dataset(levitation).assign_attrs(study="working-point", scene=scene_text(levitation.scene))
 
 
+@documented
 def ensemble(
     scene: SceneLike,
     starts: Mapping[Any, Any] | None = None,
@@ -308,8 +255,7 @@ def ensemble(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
+    scene, model, rtol, interaction, workers, progress
     starts : dict or xarray.Dataset, optional
         By key of the scene file's `[start]`, three numbers for each trajectory (n, 3), or three for all: "offset_mm"
         from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
@@ -322,16 +268,6 @@ def ensemble(
     spread : dict, optional
         Standard deviations of "offset_mm" (at rest in the turning frame), "velocity_mm_s", "moment_deg" and "spin_hz",
         each one number or three.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    rtol : float
-        Relative accuracy asked of the field.
-    interaction : {"auto", "rigid", "mutual"}
-        Whether rotor and floater magnetise each other.
-    workers : int or None
-        Processes, None for one a core.
-    progress : bool
-        Whether messages go to standard error.
 
     Returns
     -------
@@ -362,15 +298,14 @@ def ensemble(
     if (starts is None) == (n is None):
         raise InputError("Input starts must be given, or n with spread; instead received both or neither.")
     number = Workers(workers).checked().workers or os.cpu_count() or 1
-    with heard(progress):
-        levitation = Levitation(scene, Models(model, "none", rtol, interaction=interaction))
-        if starts is not None:
-            begun, drawn = given_starts(levitation, starts), dict[str, Any]()
-        else:
-            begun, drawn = drawn_starts(levitation, n, seed, spread or {}), {"seed": seed, "spread": repr(spread)}
-        together = min(TOGETHER, -(-len(begun.position) // number))
-        asked = levitation.scene, levitation.interaction, begun, duration
-        found = flown(*asked, map if number == 1 else mapped(number), together)
+    levitation = Levitation(scene, Models(model, "none", rtol, interaction=interaction))
+    if starts is not None:
+        begun, drawn = given_starts(levitation, starts), dict[str, Any]()
+    else:
+        begun, drawn = drawn_starts(levitation, n, seed, spread or {}), {"seed": seed, "spread": repr(spread)}
+    together = min(TOGETHER, -(-len(begun.position) // number))
+    asked = levitation.scene, levitation.interaction, begun, duration
+    found = flown(*asked, map if number == 1 else mapped(number), together)
     last = found.last.to_lab(levitation.scene.angular_velocity * found.levitated_s)
     data = {
         "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),
@@ -386,6 +321,7 @@ def ensemble(
     )
 
 
+@documented
 def sweep(
     scene: SceneLike,
     values: Mapping[str, Sequence[float] | Sequence[str]],
@@ -403,33 +339,22 @@ def sweep(
 ) -> xr.Dataset:
     """Any quantity of a scene over a grid of its parameters; each key becomes a dimension.
 
+    Models and `spin` hold at all points unless they are varied.
+
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
+    scene, model, plate_model, spin, workers, scheduler, progress, **asked
     values : dict of str to list
         By key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
         `spin`, names for `model`, `plate_model` and `interaction`.
     ask : {"equilibria", "flight", "field"}
         What is computed at each point.
-    model, plate_model : str
-        Models of the rotor's field and of the plate at all points, unless they are varied.
-    spin : float
-        Body spin S = Ω·m̂/ω, likewise.
     duration : float
         Duration of a trajectory, s.
     place : sequence of 3 floats
         Where the field is asked for, m, rotor's frame.
-    workers : int or None
-        Processes here, None for one a core.
-    scheduler : str or None
-        Address of a dask scheduler that computes instead.
     out : str or Path
         Folder in which finished points are kept until all are done; the same sweep goes on there.
-    progress : bool
-        Whether messages and a progress bar go to standard error.
-    **asked
-        `rtol`, `plate_rtol` and `interaction`, see `Models`.
 
     Returns
     -------
@@ -450,10 +375,10 @@ def sweep(
         raise InputError(f"Input place must be three numbers, m; instead received {place!r}.")
     question = Question(loaded, "scene", ask, models, finite("spin", spin), finite("duration", duration), where)
     grid = checked_values(values)
-    with heard(progress):
-        return _computed(question_study(question, grid), combinations(grid), Workers(workers, scheduler), Path(out))
+    return _computed(question_study(question, grid), combinations(grid), Workers(workers, scheduler), Path(out))
 
 
+@documented
 def run_study(
     name: str,
     quick: bool = True,
@@ -466,18 +391,13 @@ def run_study(
 
     Parameters
     ----------
+    workers, scheduler, progress
     name : str
         Name of the study, as `spinlev study --list` has it.
     quick : bool
         Coarser, in less than a minute.
-    workers : int or None
-        Processes here, None for one a core.
-    scheduler : str or None
-        Address of a dask scheduler that computes instead.
     out : str or Path
         Folder in which finished points are kept until all are done.
-    progress : bool
-        Whether messages and a progress bar go to standard error.
 
     Returns
     -------
@@ -494,8 +414,7 @@ def run_study(
     if name not in CATALOGUE:
         raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
     study = CATALOGUE[name]
-    with heard(progress):
-        return _computed(study, study.points(quick), Workers(workers, scheduler), Path(out))
+    return _computed(study, study.points(quick), Workers(workers, scheduler), Path(out))
 
 
 def _computed(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> xr.Dataset:

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import csv
+import difflib
+import inspect
 import io
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from importlib.resources import files
 from itertools import product
 from numbers import Real
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, ParamSpec, Self, TypedDict, TypeVar, get_args
 
 import numpy as np
 from cyclopts import Parameter
 
 from ...geometry.common import Array, InputError, shown
 from ...geometry.files import file_content
+from .console import heard
 
 COLUMNS = ("x_mm", "y_mm", "z_mm")
 MOST = 50_000_000  # bytes of a file of points: a million of them
@@ -143,17 +148,17 @@ class Models:
 
     Parameters
     ----------
-    model
+    model : {"auto", "dipole", "cuboid", "fem", "map"}
         Field model of the motion. dipole and cuboid take the rotor's moment as Br V/μ0, as the article does: for cubes
         of μr = 1.05 that is 1.6 % too strong. fem has the true one; the floater's always carries its 3/(μr + 2).
-    plate_model
+    plate_model : {"auto", "none", "slab", "fem", "reduced"}
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
-    interaction
+    interaction : {"auto", "rigid", "mutual"}
         rigid (the floater as a rigid dipole), mutual (rotor and floater magnetise each other), or auto: mutual where it
         matters at the accuracy asked for, with the finite elements' field.
-    rtol
+    rtol : float
         Relative accuracy asked of the field wherever the floater can be.
-    plate_rtol
+    plate_rtol : float
         Relative accuracy asked of the plate's reaction.
     """
 
@@ -227,9 +232,9 @@ class Workers:
 
     Parameters
     ----------
-    workers
+    workers : int, optional
         Processes of a local cluster; 1 computes in this process. Left out: one for each core.
-    scheduler
+    scheduler : str, optional
         Address of a dask scheduler that is already there, such as tcp://127.0.0.1:8786.
     """
 
@@ -248,6 +253,59 @@ class Workers:
         if self.workers is not None and self.scheduler is not None:
             raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
         return self
+
+
+# What the functions of `spinlev` have in common
+
+
+class Asked(TypedDict, total=False):
+    """Fields of `Models` that functions take by name only."""
+
+    rtol: float
+    plate_rtol: float
+    interaction: InteractionModel
+
+
+COMMON = """
+scene : Scene, str or Path
+    The scene, or the path of its file.
+spin : float
+    Body spin S = Ω·m̂/ω of the floater about its own moment.
+progress : bool
+    Whether messages and a progress bar go to standard error.
+"""
+SHARED = {
+    entry[1]: entry[0]
+    for text in (COMMON, Models.__doc__ or "", Workers.__doc__ or "")
+    for entry in re.finditer(r"(?m)^(\w+) : .*(?:\n    .*)*", inspect.cleandoc(text))
+}
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def documented(function: Callable[P, T]) -> Callable[P, T]:
+    """A function whose docstring says in full what the shared arguments are that it only names in a line.
+
+    Messages are printed where `progress` is true; of an unknown keyword it says which one it resembles.
+    """
+    signature, doc = inspect.signature(function), inspect.cleandoc(function.__doc__ or "")
+    known = [*signature.parameters, *Asked.__annotations__]
+
+    @wraps(function)
+    def called(*args: P.args, **kwargs: P.kwargs) -> T:
+        for name in kwargs.keys() - known:
+            close = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(signature.parameters)}"
+            raise TypeError(f"{function.__name__}: unknown argument `{name}` ({hint})")
+        with heard(bool(signature.bind(*args, **kwargs).arguments.get("progress"))):
+            return function(*args, **kwargs)
+
+    def entries(line: re.Match[str]) -> str:
+        names = line[0].replace("**asked", ", ".join(Asked.__annotations__))
+        return "\n".join(SHARED[name] for name in names.split(", "))
+
+    called.__doc__ = re.sub(rf"(?m)^(?:(?:{'|'.join(SHARED)}|\*\*asked)(?:, |$))+$", entries, doc)
+    return called
 
 
 MOST_VALUES = 100_000  # points of a sweep, at most

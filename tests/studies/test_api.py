@@ -1,6 +1,7 @@
 """The program from Python gives what the command line gives."""
 
 import dataclasses
+import inspect
 import re
 import subprocess
 import sys
@@ -252,3 +253,12 @@ def test_the_front_door_is_light():
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert not {"numpy", "scipy", "ngsolve", "xarray", "matplotlib", "heyoka", "pydantic"} & set(loaded)
     assert sl.__version__ == version("spinlev")
+
+
+def test_shared_arguments_are_written_out_and_a_slip_gets_a_hint():
+    for function in (sl.equilibria, sl.stability, sl.simulate, sl.plate_table, sl.rotor_table, sl.ensemble, sl.sweep):
+        names = set(inspect.signature(function).parameters) - {"asked"}
+        assert not [name for name in names if f"\n{name} : " not in str(function.__doc__)]
+        assert ("\nplate_rtol : float\n" in str(function.__doc__)) == ("plate_model" in names)
+    with pytest.raises(TypeError, match="did you mean `plate_model`"):
+        sl.equilibria(HORIZONTAL, plate_modl="none")
