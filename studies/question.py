@@ -14,11 +14,9 @@ import xarray as xr
 
 from ..dynamics.continuation.map import surveys
 from ..dynamics.continuation.rotor_family import rotor_family
-from ..dynamics.equilibria.balance import Indices
 from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import fly_together
 from ..dynamics.flights.flight import initial_state
-from ..dynamics.motion.rates import Rates
 from ..fem.rotor.table import canonical
 from ..geometry.common import Array, InputError, SpinlevError
 from ..geometry.scene.contents import Scene
@@ -31,104 +29,64 @@ from .study import Point
 from .words import kind_of_flight
 
 
-def share(levitations: Sequence[Levitation], places: Sequence[tuple[int, ...]], equilibria: Sequence[bool]) -> None:
-    """Let scenes whose rotors have the same field share what it takes; each ends as it would alone.
+def _family(levitation: Levitation) -> tuple[str, str, float]:
+    """All that decides the equations but the displacement or tilt of one of the article's lone magnets.
 
-    Parameters
-    ----------
-    levitations : of the points
-    places : their coordinates in the grid of what is varied
-    equilibria : which of them need theirs without the plate: these are found together, the neighbours' as guesses
+    With it the magnet's configuration, and its displacement (m) or tilt (rad). Raises what the field's table raises.
     """
-    first: dict[str, Levitation] = {}
-    families: dict[str, list[int]] = {}
-    for k, levitation in enumerate(levitations):
-        levitation.share(first.setdefault(levitation.equations_key, levitation))
-        if equilibria[k] and levitation.scene.frequency and levitation.scene.floater.body is None:
-            families.setdefault(_family_key(levitation), []).append(k)
-    for members in families.values():
-        if len(members) > 1:
-            with suppress(SpinlevError):  # what cannot be found here is left to each scene, which says why
-                _find_together([levitations[k] for k in members], np.array([places[k] for k in members]))
+    scene, rotor = levitation.scene, scene_keys(levitation.scene)["rotor"]
+    kind = rotor.get("configuration")
+    if kind is None or len(scene.rotor) > 1 or scene.conductors or scene.field_map:
+        return levitation.equations_key, "", 0.0
+    measure = float(np.radians(rotor["angle_deg"])) if kind == "tilt" else 1e-3 * rotor["displacement_mm"]
+    home = equations_key(replace(scene, rotor=canonical(scene.rotor)), levitation.models)
+    return f"{kind} {levitation.table.model} {levitation.interaction_model} {home}", kind, measure
 
 
-def _family_key(levitation: Levitation) -> str:
-    """All that decides the equations, of a lone magnet of the article but its displacement or tilt."""
-    scene = levitation.scene
-    with suppress(SpinlevError):
-        if len(scene.rotor) == 1 and not scene.conductors and not scene.field_map and (found := _measure(scene)):
-            home = equations_key(replace(scene, rotor=canonical(scene.rotor)), levitation.models)
-            return f"{found[0]} {levitation.table.model} {levitation.interaction_model} {home}"
-    return levitation.equations_key
-
-
-def _measure(scene: Scene) -> tuple[str, float] | None:
-    """Configuration and displacement (m) or tilt (rad) of one of the article's rotors."""
-    rotor = scene_keys(scene)["rotor"]
-    if (configuration := rotor.get("configuration")) is None:
-        return None
-    tilted = configuration == "tilt"
-    return configuration, float(np.radians(rotor["angle_deg"])) if tilted else 1e-3 * rotor["displacement_mm"]
-
-
-def _find_together(alike: Sequence[Levitation], places: Indices) -> None:
-    """Search scenes together that have one rotor or one family of rotors; where a flight begins does not matter."""
-    same: dict[str, list[Levitation]] = {}
-    first_places = []
-    for levitation, place in zip(alike, places, strict=True):
+def _find_together(members: Sequence[tuple[Levitation, str, float, tuple[int, ...]]]) -> None:
+    """Search scenes of one family, each with its configuration, measure and place in the grid of what is varied."""
+    same: dict[str, list[Levitation]] = {}  # scenes that differ in where a flight begins have one survey
+    chosen = []
+    for member in members:
+        one = member[0]
         with suppress(SpinlevError):
-            levitation.interaction  # noqa: B018  # equations are shared, the limits of what acts in each scene are not
-            key = f"{startless_text(levitation.scene)} {levitation.spin!r}"
-            if key not in same:
-                first_places.append(place)
-            same.setdefault(key, []).append(levitation)
-    if not same:
+            one.interaction  # noqa: B018  # equations are shared, the limits of what acts in each scene are not
+            key = f"{startless_text(one.scene)} {one.spin!r}"
+            chosen += [] if key in same else [member]
+            same.setdefault(key, []).append(one)
+    if not chosen:
         return
-    chosen = [some[0] for some in same.values()]
-    near = np.array([np.unique(column, return_inverse=True)[1] for column in np.array(first_places).T]).T
-    spin = np.array([levitation.spin for levitation in chosen])
-    fields = {levitation.equations_key: levitation for levitation in reversed(chosen)}
-    tables = [fields[levitation.equations_key].interaction for levitation in chosen]
-    rates, measures = (chosen[0].rates, 0.0) if len(fields) == 1 else _of_family(chosen, fields)
-    found = surveys([one.scene for one in chosen], tables, spin, near, rates, measures)
+    firsts, kinds, measures, places = zip(*chosen, strict=True)
+    first = firsts[0]
+    if len({one.equations_key for one in firsts}) == 1:
+        rates, measures = first.rates, (0.0,)
+    else:
+        scene, nearest = replace(first.scene, plate=None), nearest_faces(first.scene.floater)
+        field = first.table.model, first.models.rtol, nearest
+        rates = rotor_family(scene, kinds[0], *field, interaction=first.interaction_model).rates
+    near = np.array([np.unique(column, return_inverse=True)[1] for column in np.array(places).T]).T
+    spin, tables = np.array([one.spin for one in firsts]), [one.interaction for one in firsts]
+    found = surveys([one.scene for one in firsts], tables, spin, near, rates, np.array(measures))
     for some, (survey, searched) in zip(same.values(), found, strict=True):
-        for levitation in some:
-            levitation.adopt(survey, searched)
+        for one in some:
+            one.adopt(survey, searched)
 
 
-def _of_family(alike: Sequence[Levitation], different: Mapping[str, Levitation]) -> tuple[Rates, Array]:
-    """The equations of a family of rotors, and the measure of each of its scenes."""
-    known = {key: _measure(levitation.scene) or ("", 0.0) for key, levitation in different.items()}
-    first = alike[0]
-    family = rotor_family(
-        replace(first.scene, plate=None),
-        known[first.equations_key][0],
-        first.table.model,
-        first.models.rtol,
-        nearest_faces(first.scene.floater),
-        interaction=first.interaction_model,
-    )
-    return family.rates, np.array([known[levitation.equations_key][1] for levitation in alike])
-
-
-def fly(levitations: Sequence[Levitation], duration: float) -> None:
-    """Simulate `duration` (s) of motion together; what cannot be here is left to each scene, which says why.
+def _fly_together(levitations: Sequence[Levitation], duration: float) -> None:
+    """Simulate `duration` (s) of motion in SIMD batches of scenes with one field.
 
     Over a plate whose currents may be modelled, and in a field so short that balls do not pay, each flies alone.
     """
     groups: dict[tuple[object, ...], list[Levitation]] = {}
-    for levitation in levitations:
+    for one in levitations:
         with suppress(SpinlevError):
-            still = levitation.scene.plate is None or levitation.models.plate_model == "none"
-            if still and levitation.scene.floater.body is None and is_long(levitation.interaction):
-                tilted = bool(np.any(levitation.scene.gravity[:2]))
-                key = levitation.equations_key, levitation.interaction_model, tilted
-                groups.setdefault(key, []).append(levitation)
+            still = one.scene.plate is None or one.models.plate_model == "none"
+            if still and one.scene.floater.body is None and is_long(one.interaction):
+                key = one.equations_key, one.interaction_model, bool(np.any(one.scene.gravity[:2]))
+                groups.setdefault(key, []).append(one)
     for alike in groups.values():
-        if len(alike) < 2:
-            continue
         ready = []
-        for one in alike:
+        for one in alike if len(alike) > 1 else ():
             with suppress(SpinlevError):
                 known = () if one.absolute else one.equilibria
                 ready.append((one, initial_state(one.scene, one.interaction, known)[0]))
@@ -187,20 +145,28 @@ class Question:
     def prepared(self, points: Sequence[Point]) -> list[Callable[[], xr.Dataset]]:
         """Functions that compute the points, which share what they can; one that cannot be raises when called."""
         jobs: list[Callable[[], xr.Dataset]] = [partial(self, point) for point in points]
-        made = {}
+        axes = {key: sorted({point[key] for point in points}) for key in points[0]}
+        made, first, families = list[Levitation](), dict[str, Levitation](), dict[str, list[Any]]()
         for k, point in enumerate(points):
-            with suppress(SpinlevError):
-                made[k] = self.levitation(point)
-        axes = [sorted({point[key] for point in points}) for key in points[0]]
-        places = [tuple(axis.index(value) for axis, value in zip(axes, points[k].values(), strict=True)) for k in made]
-        flights = self.ask == "flight"  # which begin at equilibria, or whose plate is about one
-        asked = [one.scene.plate is not None or not one.absolute if flights else self.ask == "equilibria"
-                 for one in made.values()]  # fmt: skip
-        share(list(made.values()), places, asked)
-        if flights:
-            fly(list(made.values()), self.duration)
-        for k, levitation in made.items():
-            jobs[k] = partial(self._answer, points[k], levitation)
+            with suppress(SpinlevError):  # what cannot be made or found here is left to each scene, which says why
+                one = self.levitation(point)
+                jobs[k] = partial(self._answer, point, one)
+                made.append(one)
+                one.share(first.setdefault(one.equations_key, one))
+                # Flights begin at equilibria, or have a plate whose table is made about one.
+                asked = self.ask == "equilibria" or (
+                    self.ask == "flight" and (one.scene.plate is not None or not one.absolute)
+                )
+                if asked and one.scene.frequency and one.scene.floater.body is None:
+                    key, *family = _family(one)
+                    place = tuple(axis.index(point[name]) for name, axis in axes.items())
+                    families.setdefault(key, []).append((one, *family, place))
+        for members in families.values():
+            if len(members) > 1:
+                with suppress(SpinlevError):
+                    _find_together(members)
+        if self.ask == "flight":
+            _fly_together(made, self.duration)
         return jobs
 
     def batches(self, points: Mapping[int, Point]) -> list[list[int]]:
