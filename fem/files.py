@@ -80,12 +80,12 @@ def sealed(path: Path) -> bool | None:
     return _as_sealed(content) if content[-LENGTH:-64] == MARK else None
 
 
-def unsealed(path: Path, mine: bool = False) -> bytes | None:
+def unsealed(path: Path, mine: bool = False, name: str = "file") -> bytes | None:
     """What was sealed, if the file is as it was then, else None. Raises InputError, see `regular_file`, and OSError.
 
-    With `mine` it is None too where another user than this one and root may have written it.
+    With `mine` it is None too where another user than this one and root may have written it; messages call it `name`.
     """
-    with regular_file(path, MOST, "file", "a regular file") as stream:
+    with regular_file(path, MOST, name, "a regular file") as stream:
         if mine and not (ours(found := os.fstat(stream.fileno())) and closed(found)):
             return None
         content = stream.read(MOST)

@@ -276,10 +276,13 @@ def way_out(
     are modelled (`memory`).
     """
     kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (e-folding time {1 / e.growth_per_s:.2g} s)" for e in equilibria)
-    found = f"only unstable ones at {', '.join(kinds)}" if kinds else "nor any unstable one below the rotor"
-    other = _levitating_frequency(scene, table, memory)
-    advice = f"About {other:.4g} Hz has one; or" if other else f"None was found within a factor of {WIDEST:g};"
-    return f"At {scene.frequency:g} Hz the floater has no stable equilibrium, {found}. {advice} give start.position_mm."
+    found = f"only unstable ones: {', '.join(kinds)}" if kinds else "nor an unstable one below the rotor"
+    own, other = scene.frequency, _levitating_frequency(scene, table, memory)
+    advice = f"None was found from {own / WIDEST:.4g} to {own * WIDEST:.4g} Hz either."
+    if other is not None:
+        advice = f"Stable levitation is possible at about {other:.4g} Hz."
+    said = f"At {own:g} Hz there is no stable equilibrium, {found}. {advice}"
+    return f"{said} To simulate anyway, set start.position_mm."
 
 
 def _levitating_frequency(scene: Scene, table: FieldTable, memory: PlateMemory | None) -> float | None:

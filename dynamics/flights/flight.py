@@ -75,7 +75,7 @@ class Checkpoint:
         """
         if not os.path.lexists(self.path):
             return None
-        whole = unsealed(self.path)  # so that no library meets a damaged archive
+        whole = unsealed(self.path, name="checkpoint")  # so that no library meets a damaged archive
         if whole is None:
             raise InputError(
                 f"Input {self.path} must be a checkpoint; instead it is damaged or of an older version: delete it."

@@ -30,13 +30,13 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
     if floater.body is not None:
         if asked == "mutual":
             floater.must_be("sphere", where="for --interaction mutual", instead="Choose --interaction rigid.")
-        return False, "the answer of a floater that is no sphere is not known"
+        return False, "known for spherical floaters alone"
     reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := without_response(magnet))}
     if asked == "mutual":
         if table.model == "map":
             raise InputError(
-                "Input --interaction must be rigid or auto with a measured map, which does not tell how the rotor "
-                "answers; instead received mutual. Leave the map out (--model fem) to have the rotor's magnets answer."
+                "Input --interaction must be rigid or auto with a measured map, which does not tell what the "
+                "floater induces in the rotor; instead received mutual. Leave the map out (--model fem) to include it."
             )
         if reasons:
             raise InputError(
@@ -50,7 +50,8 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
     if table.model != "fem":
         return False, f"the field model {table.model} has no permeability"
     if reasons:
-        return False, f"the answer of magnet {min(reasons)} is not known: it is {reasons[min(reasons)].split('.')[0]}"
+        why = reasons[min(reasons)].split(".")[0]
+        return False, f"what is induced in magnet {min(reasons)} is not known: it is {why}"
     part = rough_part(scene, table)
     if part < rtol:
         return False, f"about {part:.0e} of the force near the rotor, less than --rtol asks for"

@@ -74,7 +74,7 @@ def test_gravity_across_the_axis_beyond_what_holds_the_floater(rates, stable):
 def test_no_frequency_helps_a_floater_without_strength(monkeypatch):
     """The way out names no frequency, and a drift has nowhere to begin."""
     monkeypatch.setattr(frequencies, "WIDEST", 1.2)
-    assert "None was found within a factor of 1.2; give start.position_mm" in way_out(WEAK, TABLE, ())
+    assert "from 91.67 to 132 Hz either. To simulate anyway, set start.position_mm" in way_out(WEAK, TABLE, ())
     with pytest.raises(EquilibriumError, match=r"At 110 Hz the floater has no equilibrium with body spin 0\.25"):
         drift(WEAK, TABLE, spin=0.25)
 

@@ -257,7 +257,7 @@ def test_mutual_magnetisation_of_a_part_is_refused_for_what_it_is(folder):
         mutual_choice(made, table, "mutual", 1e-3)
     assert mutual_choice(made, table, "auto", 1e-3) == (
         False,
-        "the answer of magnet 1 is not known: it is a part from a STEP file, whose remanence has no closed form",
+        "what is induced in magnet 1 is not known: it is a part from a STEP file, whose remanence has no closed form",
     )
 
 
