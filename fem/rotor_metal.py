@@ -31,7 +31,7 @@ from ..geometry.meshes.plate import skin_depth
 from ..geometry.meshes.solids import SolidMesh, mesh_metal
 from ..geometry.rotor import Conductor, separate_pieces
 from ..geometry.scene.contents import Scene
-from ..geometry.shapes import Box, Ring
+from ..geometry.shapes import Box, Cylinder
 from ..geometry.solids import Solid, places_off
 from .cache import TableKind
 from .elements.condensed import require_memory
@@ -426,7 +426,7 @@ def check_metal(pieces: Pieces, frequency: float, nearest: float) -> None:
 def refuse_wide_holes(pieces: Pieces, nearest: float) -> None:
     """Refuse rings that the floater fits into: the multipoles lie in their holes, where their fields have no end."""
     for body in (body for bodies, _ in pieces for body in bodies):
-        if isinstance(body, Ring) and body.inner_radius > nearest:
+        if isinstance(body, Cylinder) and body.inner_radius > nearest:
             raise InputError(
                 f"Input conductivity_S_m must be left out of a ring into whose hole the floater fits; instead received "
                 f"a {body.described_size} beside a floater of {2e3 * nearest:.4g} mm. Leave it out."

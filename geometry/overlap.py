@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .common import Array
 from .magnets import Magnet
-from .shapes import Box, Ring, Sphere, rotation_matrix
+from .shapes import Box, Cylinder, Sphere, rotation_matrix
 from .solids import Part, Solid, moved
 
 # Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance.
@@ -26,9 +26,9 @@ def separation(first: Solid, second: Solid) -> tuple[float, Array]:
     filled, but for what lies in its hole or fits in there.
     """
     through = []
-    for ring, other, sign in ((first, second, 1.0), (second, first, -1.0)):
-        if isinstance(ring, Ring):
-            gap, direction, fits = _gap_in_hole(ring, other)
+    for body, other, sign in ((first, second, 1.0), (second, first, -1.0)):
+        if isinstance(body, Cylinder) and body.inner_radius:
+            gap, direction, fits = _gap_in_hole(body, other)
             if gap > -TOUCHING:
                 return gap, sign * direction
             through += [(gap, sign * direction)] if fits else []
@@ -71,7 +71,7 @@ def _convex_separation(first: Solid, second: Solid) -> tuple[float, Array]:
     return float(gap(best[None])[0]), best
 
 
-def _gap_in_hole(ring: Ring, body: Solid) -> tuple[float, Array, bool]:
+def _gap_in_hole(ring: Cylinder, body: Solid) -> tuple[float, Array, bool]:
     """Gap between a convex body and the wall of the endless hole of a ring, the way (3,) off that wall, if it fits."""
     x, y, _ = ring.rotation.T
     offset = body.center - ring.center

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,16 +40,31 @@ def rotation_angles(matrix: Array) -> Array:
     return np.degrees([x, np.arctan2(-matrix[2, 0], across), np.arctan2(-second[0], second[1])])
 
 
-class Body:
-    """A solid with a centre, body axes, and edges of the box about it along those axes."""
+METRES = {"units": "m"}  # of a field of a dataclass
 
+
+def at_origin() -> Array:
+    return np.zeros(3)
+
+
+def unturned() -> Array:
+    return np.eye(3)
+
+
+class Body:
+    """A solid with a centre (3,) m and a rotation (3, 3), whose columns are the body axes.
+
+    `kind` is the shape's name in a scene file, `size` (3,) m the edges of the box about it along the body axes.
+    """
+
+    kind: ClassVar[str]
     center: Array
     rotation: Array
 
     if TYPE_CHECKING:  # fields of some bodies; properties here would be the fields' defaults
 
         @property
-        def size(self) -> Array: ...  # (3,) edges of the box about it, along the body axes, m
+        def size(self) -> Array: ...
         @property
         def volume(self) -> float: ...  # m³
         @property
@@ -130,18 +145,12 @@ def _from_excess(excess: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Box(Body):
-    """A rectangular box.
+    """A rectangular box with edges `size` (3,) m along the body axes."""
 
-    Parameters
-    ----------
-    size : (3,) edge lengths along the body axes, m
-    center : (3,) position of the centre, m
-    rotation : (3, 3) matrix whose columns are the body axes (default: none turned)
-    """
-
-    size: Array = field(metadata={"units": "m"})
-    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
-    rotation: Array = field(default_factory=lambda: np.eye(3))
+    size: Array = field(metadata=METRES)
+    center: Array = field(default_factory=at_origin, metadata=METRES)
+    rotation: Array = field(default_factory=unturned)
+    kind: ClassVar[str] = "cuboid"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -187,15 +196,32 @@ class Box(Body):
         return np.asarray(np.sqrt(np.min(squares, axis=0)))
 
 
-class _Turned(Body):
-    """The solid of revolution of a rectangle beside the body's z axis."""
+@dataclass(frozen=True, eq=False)
+class Cylinder(Body):
+    """A round cylinder about the body's z, solid or with a hole (a ring of rectangular section, or tube).
 
-    if TYPE_CHECKING:
-        radius: float
-        height: float
+    Raises
+    ------
+    ValueError : the inner radius is not smaller than the outer one
+    """
 
-        @property
-        def inner_radius(self) -> float: ...  # of the hole, m; zero where there is none
+    radius: float = field(metadata=METRES)
+    height: float = field(metadata=METRES)
+    center: Array = field(default_factory=at_origin, metadata=METRES)
+    rotation: Array = field(default_factory=unturned)
+    inner_radius: float = field(default=0.0, metadata=METRES)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 <= self.inner_radius < self.radius:
+            raise ValueError(
+                f"Input inner_radius must be zero or positive and less than radius {self.radius}; instead received "
+                f"{self.inner_radius}."
+            )
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        return "ring" if self.inner_radius else "cylinder"
 
     @property
     def size(self) -> Array:
@@ -213,6 +239,16 @@ class _Turned(Body):
     def area(self) -> float:
         hole = self.inner_radius
         return float(2 * np.pi * (self.radius + hole) * (self.radius - hole + self.height))
+
+    @property
+    def shape_numbers(self) -> Array:
+        hole, solid = [self.radius, self.inner_radius, self.height, 0.0], [self.radius, self.height]
+        return np.array(hole if self.inner_radius else solid)
+
+    @property
+    def described_size(self) -> str:
+        name, hole = ("ring ", f" / {self.inner_radius * 2e3:.4g}") if self.inner_radius else ("", "")
+        return f"{name}Ø {self.radius * 2e3:.4g}{hole} × {self.height * 1e3:.4g} mm"
 
     def reach(self, directions: Array) -> Array:
         along = np.abs(directions @ self.rotation[:, 2])
@@ -247,71 +283,19 @@ class _Turned(Body):
         return np.hypot(body[..., 0], body[..., 1]), body[..., 2]
 
 
-@dataclass(frozen=True, eq=False)
-class Cylinder(_Turned):
-    """A straight round cylinder."""
-
-    radius: float = field(metadata={"units": "m"})  # m
-    height: float = field(metadata={"units": "m"})  # m
-    # (3,) position of the centre, m
-    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
-    # (3, 3) matrix whose columns are the body axes; the third is that of the cylinder (default: none turned)
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-
-    inner_radius = 0.0
-
-    @property
-    def shape_numbers(self) -> Array:
-        return np.array([self.radius, self.height])
-
-    @property
-    def described_size(self) -> str:
-        return f"Ø {self.radius * 2e3:.4g} × {self.height * 1e3:.4g} mm"
-
-
-@dataclass(frozen=True, eq=False)
-class Ring(_Turned):
-    """A ring of rectangular section, or tube.
-
-    Raises
-    ------
-    ValueError : the inner radius is not smaller than the outer one
-    """
-
-    radius: float = field(metadata={"units": "m"})  # m
-    inner_radius: float = field(metadata={"units": "m"})  # m
-    height: float = field(metadata={"units": "m"})  # m
-    # (3,) position of the centre, m
-    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
-    # (3, 3) matrix whose columns are the body axes; the third is that of the ring (default: none turned)
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0 < self.inner_radius < self.radius:
-            raise ValueError(
-                f"Input inner_radius must be positive and less than radius {self.radius}; instead received "
-                f"{self.inner_radius}."
-            )
-
-    @property
-    def shape_numbers(self) -> Array:
-        return np.array([self.radius, self.inner_radius, self.height, 0.0])
-
-    @property
-    def described_size(self) -> str:
-        return f"ring Ø {self.radius * 2e3:.4g} / {self.inner_radius * 2e3:.4g} × {self.height * 1e3:.4g} mm"
+def ring(radius: float, inner_radius: float, height: float, *pose: ArrayLike) -> Cylinder:
+    """A cylinder with a hole; `pose` is its centre and rotation."""
+    return Cylinder(radius, height, *pose, inner_radius=inner_radius)  # type: ignore[arg-type, misc]
 
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Body):
     """A ball."""
 
-    radius: float = field(metadata={"units": "m"})  # m
-    # (3,) position of the centre, m
-    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
-    # (3, 3) matrix whose columns are the body axes (default: none turned)
-    rotation: Array = field(default_factory=lambda: np.eye(3))
+    radius: float = field(metadata=METRES)
+    center: Array = field(default_factory=at_origin, metadata=METRES)
+    rotation: Array = field(default_factory=unturned)
+    kind: ClassVar[str] = "sphere"
 
     @property
     def size(self) -> Array:

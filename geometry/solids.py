@@ -6,12 +6,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import permutations
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .common import Array, frozen_array, millimetres
-from .shapes import Body, Box, Cylinder, Ring, Sphere
+from .shapes import METRES, Body, Box, Cylinder, Sphere, at_origin, ring, unturned
 
 CHUNK = 100_000  # Points times triangles at once
 # Cosine between the normals of triangles from which on their common side is no edge.
@@ -33,17 +34,17 @@ class Part(Body):
     file: Path = field(compare=False)  # where it was read; keys count its text
     step: str  # the file's text
     brep: str  # the solid as OpenCASCADE writes it for itself, mm
-    # (n, 3, 3) m, corners of triangles on the surface, outwards, from the middle along the body axes
-    triangles: Array = field(metadata={"units": "m"})
-    extent: Array = field(metadata={"units": "m"})  # (3,) m, edges of the box about it
-    origin: Array = field(metadata={"units": "m"})  # (3,) m, the file's origin, from the middle along the body axes
-    volume: float = field(metadata={"units": "m3"})  # m³
-    area: float = field(metadata={"units": "m2"})  # m², of the surface
-    centroid: Array = field(metadata={"units": "m"})  # (3,) m, from the middle along the body axes
-    # (3,) position of the middle, m
-    center: Array = field(default_factory=lambda: np.zeros(3), metadata={"units": "m"})
-    # (3, 3) matrix whose columns are the body axes (default: none turned)
-    rotation: Array = field(default_factory=lambda: np.eye(3))
+    # (n, 3, 3) corners of triangles on the surface, outwards; extent: (3,) edges of the box about it; origin, centroid:
+    # (3,) of the file and of the volume. All from the middle along the body axes
+    triangles: Array = field(metadata=METRES)
+    extent: Array = field(metadata=METRES)
+    origin: Array = field(metadata=METRES)
+    volume: float = field(metadata={"units": "m3"})
+    area: float = field(metadata={"units": "m2"})  # of the surface
+    centroid: Array = field(metadata=METRES)
+    center: Array = field(default_factory=at_origin, metadata=METRES)
+    rotation: Array = field(default_factory=unturned)
+    kind: ClassVar[str] = "file"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -166,7 +167,7 @@ def _plane(a: Array, b: Array, c: Array) -> Array:
     return np.where(over, np.abs(height), np.inf)
 
 
-Solid = Box | Cylinder | Part | Ring | Sphere  # A body's shape and pose
+Solid = Box | Cylinder | Part | Sphere  # A body's shape and pose
 
 
 def places_off(body: Solid, directions: Array, distance: float) -> Array:
@@ -219,7 +220,7 @@ def _candidates(part: Part) -> Iterator[Solid]:
         yield Cylinder(radius, height, part.centroid, frame)
         hole = radius**2 - part.volume / (np.pi * height)
         if hole > 0:
-            yield Ring(radius, float(np.sqrt(hole)), height, part.centroid, frame)
+            yield ring(radius, float(np.sqrt(hole)), height, part.centroid, frame)
     if len(normals) == 3:
         frame = _frame(normals)
         yield Box(np.ptp(corners @ frame, axis=0), part.centroid, frame)

@@ -65,7 +65,7 @@ def _ends(body: Solid, axes: Array) -> Array:
 def _same_body(body: Solid, other: Solid, flip: Array) -> bool:
     """Whether the mirror image of a body takes the place of another."""
     allowed = SAME_PLACE * max(body.circumradius, float(np.linalg.norm(body.center)))
-    if type(body) is not type(other) or np.linalg.norm(body.center * flip - other.center) > allowed:
+    if body.kind != other.kind or np.linalg.norm(body.center * flip - other.center) > allowed:
         return False
     if isinstance(body, Box):
         distance = np.linalg.norm((body.corners * flip)[:, None] - other.corners, axis=-1)

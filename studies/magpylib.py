@@ -17,7 +17,7 @@ from ..geometry.common import MU_0, Array, InputError
 from ..geometry.meshes.solids import Body, Facets, Segment, lies_within, step_text
 from ..geometry.scene.files import pose_keys, shape_keys
 from ..geometry.scene.making import magnets
-from ..geometry.shapes import Box, Cylinder, Ring, Sphere
+from ..geometry.shapes import Box, Cylinder, Sphere
 from ..geometry.solids import Part, Solid
 
 KINDS = (
@@ -161,9 +161,7 @@ def _ring(segment: Segment) -> Body:
     pose = segment.center, segment.rotation
     if abs(segment.end - segment.start - 360) > SAME_ANGLE:
         return segment
-    if not segment.inner_radius:
-        return Cylinder(segment.radius, segment.height, *pose)
-    return Ring(segment.radius, segment.inner_radius, segment.height, *pose)
+    return Cylinder(segment.radius, segment.height, *pose, inner_radius=segment.inner_radius)
 
 
 def _joined(found: Sequence[_Magnet]) -> list[_Magnet]:
@@ -234,15 +232,15 @@ def _cavities(found: Sequence[_Magnet]) -> list[tuple[_Magnet, list[Body]]]:
     return result
 
 
-def _bored(outer: Body, inner: Body) -> Ring | None:
+def _bored(outer: Body, inner: Body) -> Cylinder | None:
     """The ring that a cylinder within another leaves, where both have the same axis and height."""
-    if not (isinstance(outer, Cylinder) and isinstance(inner, Cylinder)):
+    if not (isinstance(outer, Cylinder) and isinstance(inner, Cylinder)) or outer.inner_radius or inner.inner_radius:
         return None
     apart = float(np.linalg.norm(outer.center - inner.center))
     along = abs(float(outer.rotation[:, 2] @ inner.rotation[:, 2]))
     if apart > SAME * outer.radius or along < 1 - SAME or abs(outer.height - inner.height) > SAME * outer.height:
         return None
-    return Ring(outer.radius, inner.radius, outer.height, outer.center, outer.rotation)
+    return replace(outer, inner_radius=inner.radius)
 
 
 def _file(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, Any]:
@@ -299,8 +297,9 @@ def _source(body: Solid, pose: dict[str, Any]) -> Any:
         raise InputError("Input table must have no part from a file among its closed forms; instead it has one.")
     if isinstance(body, Sphere):
         return magpylib.magnet.Sphere(diameter=2 * body.radius, **pose)
-    if isinstance(body, Ring):
-        return magpylib.magnet.CylinderSegment(dimension=(body.inner_radius, body.radius, body.height, 0, 360), **pose)
     if isinstance(body, Cylinder):
+        if body.inner_radius:
+            ring = (body.inner_radius, body.radius, body.height, 0, 360)
+            return magpylib.magnet.CylinderSegment(dimension=ring, **pose)
         return magpylib.magnet.Cylinder(dimension=(2 * body.radius, body.height), **pose)
     return magpylib.magnet.Cuboid(dimension=body.size, **pose)

@@ -10,7 +10,7 @@ from ...geometry.cutting import Cells, cells_of
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.overlap import separation
-from ...geometry.shapes import Box, Ring, Sphere
+from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Part, Solid, moved
 from ..harmonics.expansion import (
     MultipoleExpansion,
@@ -110,8 +110,7 @@ def volume_rule(body: Solid, others: Sequence[Solid], nodes: int) -> tuple[Array
     if isinstance(body, Sphere):
         radial, other = graded_rule(np.array([0.0, body.radius]), nodes), gauss(-1.0, 1.0, nodes)
     else:
-        inner = body.inner_radius if isinstance(body, Ring) else 0.0
-        radial = graded_rule(np.array([inner, body.radius]), nodes)
+        radial = graded_rule(np.array([body.inner_radius, body.radius]), nodes)
         other = graded_rule(np.array([-0.5, 0.5]) * body.height, nodes)
     return round_rule(body, radial, other, 2 * nodes)
 

@@ -23,7 +23,7 @@ import heyoka as hy
 import numpy as np
 
 from ...geometry.common import Array
-from ...geometry.shapes import Cylinder, Ring, Sphere
+from ...geometry.shapes import Cylinder, Sphere
 from ..harmonics.solid import FOUR_PI
 
 # Nodes of the rule for distances from the mantle of at least so many radii: round-off
@@ -32,7 +32,7 @@ WIDEST, NARROWEST = 3.0, 1e-14
 CHUNK = 400_000  # points times nodes at once
 
 
-def round_tensor(body: Cylinder | Ring | Sphere, points: Array) -> Array:
+def round_tensor(body: Cylinder | Sphere, points: Array) -> Array:
     """T (n, 3, 3) with H = T J in T at points (n, 3) m of a polarisation J, both in the frame of the points.
 
     On the surface it is the mean of both sides, on an edge it is infinite.  Accuracy: 1e-13.
@@ -49,7 +49,7 @@ def round_tensor(body: Cylinder | Ring | Sphere, points: Array) -> Array:
     return np.asarray(turn @ tensor @ turn.T)
 
 
-def round_slope(body: Cylinder | Ring | Sphere, points: Array) -> Array:
+def round_slope(body: Cylinder | Sphere, points: Array) -> Array:
     """G (n, 3, 3, 3), ∂H_i/∂x_j = Σ_k G_ijk J_k, 1/m, at points (n, 3) m; else as `round_tensor`.
 
     Its accuracy is worse by radius over distance from the surface.
@@ -63,9 +63,9 @@ def round_slope(body: Cylinder | Ring | Sphere, points: Array) -> Array:
     return np.asarray(np.einsum("ia,jb,kc,nabc->nijk", turn, turn, turn, slope, optimize=True))
 
 
-def mantles(body: Cylinder | Ring) -> list[tuple[float, float]]:
+def mantles(body: Cylinder) -> list[tuple[float, float]]:
     """Radii of the mantles, and the sign of what they carry."""
-    return [(body.radius, 1.0), (body.inner_radius, -1.0)] if isinstance(body, Ring) else [(body.radius, 1.0)]
+    return [(body.radius, 1.0), (body.inner_radius, -1.0)] if body.inner_radius else [(body.radius, 1.0)]
 
 
 def _sphere(radius: float, points: Array) -> tuple[Array, Array]:
@@ -180,19 +180,19 @@ MOST = 64  # segments of a mantle; at a quarter of its radius they still do to 1
 DIGITS = np.log(1e11)
 
 
-def resolved_distance(body: Cylinder | Ring) -> float:
+def resolved_distance(body: Cylinder) -> float:
     """Distance (m) from the surface from which on the segments' field is exact to 1e-10."""
     return float(max(radius * np.expm1(DIGITS / _count(body, radius)) for radius, _ in mantles(body)))
 
 
-def _count(body: Cylinder | Ring, radius: float) -> int:
+def _count(body: Cylinder, radius: float) -> int:
     """Number of segments of a mantle."""
     wanted = RESOLVED * body.volume ** (1 / 3)
     return min(int(np.ceil(DIGITS / np.log1p(wanted / radius))), MOST)
 
 
 def segments_field(
-    position: Sequence[Expression], body: Cylinder | Ring, polarization: Array
+    position: Sequence[Expression], body: Cylinder, polarization: Array
 ) -> tuple[list[Expression], list[list[Expression]]]:
     """B and its gradient in the body's own axes from `resolved_distance` on.
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from ...geometry.common import MU_0, Array, InputError
 from ...geometry.magnets import Magnet
-from ...geometry.shapes import Box, Cylinder, Ring, Sphere
+from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part, Solid
 from ..harmonics.expansion import turned_expressions, turned_field, uniform_moments
 from ..harmonics.expressions import CompiledField, FieldExpressions, Number
@@ -252,13 +252,13 @@ class UniformField:
         body, polarization = self.magnet.body, self.magnet.polarization
         if isinstance(body, Box):
             return cuboid_field(position, body.half_edges, polarization, number)
-        assert isinstance(body, Cylinder | Ring)
+        assert isinstance(body, Cylinder)
         return segments_field(position, body, polarization)
 
     @cached_property
     def _near(self) -> CompiledField:
         # to optimise the code of a round magnet's segments takes a second (cylinder) or three (ring)
-        return CompiledField(self.expressions, seldom=isinstance(self.magnet.body, Cylinder | Ring))
+        return CompiledField(self.expressions, seldom=isinstance(self.magnet.body, Cylinder))
 
     @cached_property
     def _far(self) -> CompiledField:

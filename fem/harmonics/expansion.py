@@ -10,7 +10,7 @@ import numpy as np
 from ...geometry.common import Array, frozen_array
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
-from ...geometry.shapes import Box, Cylinder, Ring, Sphere
+from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part as SolidPart, Solid
 from .expressions import UPPER, FieldExpressions, Number, harmonic_sums, whole_gradient
 from .interior import Ball, moment
@@ -43,8 +43,7 @@ def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
     if isinstance(body, Sphere):
         return round_rule(body, gauss(0.0, body.radius, nodes + 1), gauss(-1.0, 1.0, nodes + 1), degree + 1)
     # even powers of the distance from the axis are polynomials of its square
-    inner = body.inner_radius if isinstance(body, Ring) else 0.0
-    square, weights = gauss(inner**2, body.radius**2, nodes)
+    square, weights = gauss(body.inner_radius**2, body.radius**2, nodes)
     across = np.sqrt(square)
     half = body.height / 2
     return round_rule(body, (across, weights / (2 * across)), gauss(-half, half, nodes), degree + 1)
@@ -64,7 +63,7 @@ def box_rule(box: Box, rules: Sequence[tuple[Array, Array]]) -> tuple[Array, Arr
 
 
 def round_rule(
-    body: Cylinder | Ring | Sphere, radial: tuple[Array, Array], other: tuple[Array, Array], count: int
+    body: Cylinder | Sphere, radial: tuple[Array, Array], other: tuple[Array, Array], count: int
 ) -> tuple[Array, Array]:
     """Points (n, 3) m and weights (n,) m³ in a body of revolution.
 

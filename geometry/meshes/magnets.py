@@ -21,7 +21,7 @@ from ..common import Array, MeshError, frozen_array
 from ..files import LostError, call_apart
 from ..magnets import Magnet
 from ..overlap import overlapping_magnets
-from ..shapes import Box, Cylinder, Ring
+from ..shapes import Box, Cylinder
 from ..solids import Part, Solid, moved
 from .solids import LONGEST, SIMPLER, SMALLEST, SolidMesh, occ_solid, unmeshed
 
@@ -203,7 +203,7 @@ def _edge_directions(point: Array, bodies: Sequence[Solid], unit: float) -> list
             flush = np.abs(excess) < TINY * unit
             if excess.max() < TINY * unit and flush.sum() >= 2:
                 found += [body.rotation[:, axis] for axis in range(3) if np.delete(flush, axis).all()]
-        elif isinstance(body, Cylinder | Ring) and body.edge_distance((point * unit)[None])[0] < TINY * unit:
+        elif isinstance(body, Cylinder) and body.edge_distance((point * unit)[None])[0] < TINY * unit:
             across = np.array([-local[1], local[0], 0.0])
             found.append(np.asarray(body.rotation @ across / np.hypot(*local[:2])))
     return found

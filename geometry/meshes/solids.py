@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from ..common import Array, ComputationError, InputError, MeshError, frozen_array
 from ..files import CrashError, LostError, call_apart
-from ..shapes import Box, Ring, Sphere
+from ..shapes import Box, Sphere
 from ..solids import Part, Solid, moved
 
 MILLIMETRE = 1e-3
@@ -54,7 +54,7 @@ def occ_solid(body: Solid, center: Array, unit: float) -> Any:
         return occ.WorkPlane(axes).Rectangle(2 * half[0], 2 * half[1]).Face().Extrude(float(2 * half[2]))
     axes = occ.Axes(tuple(map(float, foot)), n=_vector(z), h=_vector(x))
     filled = occ.Cylinder(axes, body.radius / unit, body.height / unit)
-    if isinstance(body, Ring):
+    if body.inner_radius:
         return filled - occ.Cylinder(axes, body.inner_radius / unit, body.height / unit)
     return filled
 

@@ -42,7 +42,7 @@ class Floater:
     @property
     def shape(self) -> str:
         """ "sphere", "cuboid" or "cylinder"."""
-        return "cuboid" if isinstance(self.body, Box) else type(self.solid).__name__.lower()
+        return self.solid.kind
 
     @cached_property
     def solid(self) -> Box | Cylinder | Sphere:

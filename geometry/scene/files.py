@@ -16,7 +16,7 @@ import numpy as np
 from ..common import Array, InputError, shown
 from ..files import file_content, regular_file
 from ..magnets import Magnet
-from ..shapes import Box, Ring, Sphere, rotation_angles
+from ..shapes import Cylinder, rotation_angles
 from ..solids import Part, Solid
 from .contents import AbsoluteStart, Drag, OffsetStart, Scene
 from .making import Table, assemble, content_digest
@@ -67,9 +67,9 @@ def load_scene(path: str | Path) -> Scene:
     for keys, magnet in zip(scene_keys(scene)["rotor"].get("magnets", ()), scene.rotor, strict=False):
         body = magnet.body
         if keys.get("file") and not isinstance(body, Part):
-            kind = "cuboid" if isinstance(body, Box) else type(body).__name__.lower()
-            size = body.described_size.removeprefix(kind).strip()
-            logging.getLogger("spinlev").info(f"{Path(keys['file']).name} is a {kind}, {size}, and is computed as one")
+            size = body.described_size.removeprefix(body.kind).strip()
+            said = f"{Path(keys['file']).name} is a {body.kind}, {size}, and is computed as one"
+            logging.getLogger("spinlev").info(said)
     return scene
 
 
@@ -364,11 +364,12 @@ def shape_keys(body: Solid) -> dict[str, Any]:
     """The keys of a body's shape."""
     if isinstance(body, Part):
         return {"file": str(body.file)}
-    if isinstance(body, Box):
+    if body.kind == "cuboid":
         return {"size_mm": _all_rounded(1e3 * body.size)}
-    keys = {"shape": type(body).__name__.lower(), "diameter_mm": _rounded(2e3 * body.radius)}
-    keys |= {} if isinstance(body, Sphere) else {"height_mm": _rounded(1e3 * body.height)}
-    return keys | ({"inner_diameter_mm": _rounded(2e3 * body.inner_radius)} if isinstance(body, Ring) else {})
+    sizes = {"diameter_mm": body.size[0]}
+    sizes |= {} if body.kind == "sphere" else {"height_mm": body.size[2]}
+    sizes |= {"inner_diameter_mm": 2 * body.inner_radius} if isinstance(body, Cylinder) and body.inner_radius else {}
+    return {"shape": body.kind, **{key: _rounded(1e3 * size) for key, size in sizes.items()}}
 
 
 def pose_keys(body: Solid) -> dict[str, Any]:

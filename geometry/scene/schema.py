@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from ..magnets import Magnet
 from ..rotor import Conductor, Rotor, horizontal, tilt, vertical
-from ..shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
+from ..shapes import Box, Cylinder, Sphere, rotation_matrix
 from ..solids import Part, Solid, known_shape
 from .contents import AbsoluteStart, Drag, Floater, Lowering, MapReading, OffsetStart, Plate, Scene
 
@@ -79,10 +79,9 @@ def solid_of(table: Table) -> Solid:
     shape, radius = given.get("shape", "cuboid"), (given.get("diameter_mm") or 0.0) * MILLI / 2
     if shape == "sphere":
         return Sphere(radius, *pose)
-    if shape == "cylinder":
-        return Cylinder(radius, given["height_mm"] * MILLI, *pose)
-    if shape == "ring":
-        return Ring(radius, given["inner_diameter_mm"] * MILLI / 2, given["height_mm"] * MILLI, *pose)
+    if shape in ("cylinder", "ring"):
+        hole = (given.get("inner_diameter_mm") or 0.0) * MILLI / 2
+        return Cylinder(radius, given["height_mm"] * MILLI, *pose, inner_radius=hole)
     return Box(np.array([given["edge_mm"]] * 3 if shape == "cube" else given["size_mm"]) * MILLI, *pose)
 
 

@@ -23,7 +23,7 @@ from ...geometry.cutting import cells_of, cut_magnets
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.rotor import horizontal, tilt, vertical
-from ...geometry.shapes import Box, Cylinder, Ring, rotation_matrix
+from ...geometry.shapes import Box, Cylinder, ring, rotation_matrix
 from ..cli.console import progress
 from ..figures.style import PALETTE, legend_below, styled
 from ..result import Columns, columns, variable
@@ -185,7 +185,7 @@ def _magnet(
     return Magnet(box, np.array(polarization, float), PERMEABILITY, across)
 
 
-def _round(body: Cylinder | Ring, *polarization: float) -> tuple[Magnet, ...]:
+def _round(body: Cylinder, *polarization: float) -> tuple[Magnet, ...]:
     return (Magnet(body, np.array(polarization, float), PERMEABILITY),)
 
 
@@ -205,7 +205,7 @@ EIGHT = tuple(
 )
 OBLIQUE = (_magnet(CUBE, (1, 0, 0), angles=(15, 40, 70), across=1.15),)
 FLAT, LONG = (0.02, 0.02, 0.0005), (0.005, 0.005, 0.04)
-DISC, THIN_RING = Cylinder(10e-3, 1e-3), Ring(10e-3, 9e-3, 5e-3)
+DISC, THIN_RING = Cylinder(10e-3, 1e-3), ring(10e-3, 9e-3, 5e-3)
 CASES = {
     "contact distance": HardCase(_cube(PERMEABILITY), CONTACT, quick=True),
     "extensions of edges and faces": HardCase(_cube(PERMEABILITY), extensions=True),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ...geometry.shapes import Box, Ring, Sphere
+from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Part, Solid
 
 FINE = 161  # Points of a plane of the field along each of its edges
@@ -127,7 +127,7 @@ def triangles(body: Solid) -> Surface:
     if isinstance(body, Sphere):
         polar = np.linspace(np.pi, 0, SIDES // 2 + 1)
         return revolved(body.radius * np.column_stack([np.sin(polar), np.cos(polar)]), body.center)
-    half, inner = body.height / 2, body.inner_radius if isinstance(body, Ring) else 0.0
+    half, inner = body.height / 2, body.inner_radius
     profile = [(inner, -half), (body.radius, -half), (body.radius, half), (inner, half), (inner, -half)]
     return revolved(np.array(profile), body.center, body.rotation[:, 2])
 

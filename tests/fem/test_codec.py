@@ -12,7 +12,7 @@ from spinlev.fem.codec import CodecError, from_dataset, to_dataset
 from spinlev.fem.harmonics.expansion import MultipoleExpansion
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ def test_a_table_may_be_less_than_a_class(value, tmp_path):
 
 
 def test_shapes_of_all_kinds_survive(tmp_path):
-    bodies = Box((1, 2, 3), (0, 0, 1)), Cylinder(1.0, 2.0), Ring(2.0, 1.0, 3.0), Sphere(0.5, (1, 1, 1))
+    bodies = Box((1, 2, 3), (0, 0, 1)), Cylinder(1.0, 2.0), ring(2.0, 1.0, 3.0), Sphere(0.5, (1, 1, 1))
     magnets = tuple(Magnet(body, (0, 0, 1.3), 1.05, 1.1) for body in bodies)
     expansions = MultipoleExpansion(np.zeros(3), 0.01, np.eye(3) * (1 + 0.5j)), MultipoleExpansion(
         np.ones(3), 0.02, np.zeros((5, 5), complex))  # fmt: skip

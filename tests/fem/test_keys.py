@@ -22,14 +22,14 @@ from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.rotor import Conductor, horizontal
 from spinlev.geometry.scene.contents import Drag, Floater, Lowering, MapReading, Plate, Scene
-from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring
 from spinlev.geometry.step_file import read_part
 
 BOX = Box((0.01, 0.02, 0.03), (1e-3, 0, 0))
 MAGNET = Magnet(BOX, (0, 0, 1.3), 1.05, 1.2, 6e5, 1e6)
 SCENE = Scene(
     110.0, (MAGNET,), Floater(6e-3, 1.3, 1.05, 7500.0, 6e5, Cylinder(4e-3, 9e-3)), Drag(1e-6, 1e-10),
-    plate=Plate(BOX, 3e7, Lowering(1.0, 0.02, 0.05)), conductors=(Conductor(Ring(0.02, 0.01, 5e-3), 1e7),),
+    plate=Plate(BOX, 3e7, Lowering(1.0, 0.02, 0.05)), conductors=(Conductor(ring(0.02, 0.01, 5e-3), 1e7),),
     map_reading=MapReading("mm", "mT", "f=50"),
 )  # fmt: skip
 INPUTS = {

@@ -8,12 +8,12 @@ from article import BALL
 from spinlev.geometry.meshes.solids import occ_solid
 from spinlev.geometry.scene.files import load_scene, scene
 from spinlev.geometry.scene.making import magnets
-from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring, rotation_matrix
 from spinlev.geometry.solids import known_shape, moved
 from spinlev.geometry.step_file import read_part
 
 CENTER, TURN = np.array([1e-3, -2e-3, 3e-3]), rotation_matrix((25.0, -40.0, 10.0))
-BODIES = [Box((0.01, 0.012, 0.004)), Cylinder(5e-3, 8e-3), Cylinder(1e-2, 1e-3), Ring(5e-3, 2e-3, 8e-3), Sphere(9.5e-3)]
+BODIES = [Box((0.01, 0.012, 0.004)), Cylinder(5e-3, 8e-3), Cylinder(1e-2, 1e-3), ring(5e-3, 2e-3, 8e-3), Sphere(9.5e-3)]
 
 
 def written(solid, path):

@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 
 from spinlev.geometry.overlap import apart, body_overlap, deepest_overlap_in_a_turn, sphere_overlap
-from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring, rotation_matrix
 from spinlev.geometry.solids import moved
 
 angle = st.floats(-180, 180)
@@ -77,10 +77,10 @@ TURN = rotation_matrix((30.0, -20.0, 50.0))
             0.5,
         ),
         (Box((2.0, 2.0, 2.0)), Cylinder(1.0, 3.0, (0, 0, 2.5), rotation_matrix((0, 90.0, 0))), 0.5),
-        (Sphere(1.0), Ring(4.0, 2.0, 1.0), 1.0),  # in the hole
-        (Sphere(1.0, (0.5, 0, 0)), Ring(4.0, 2.0, 1.0), 0.5),
-        (Cylinder(1.0, 9.0, (0.25, 0, 3.0)), Ring(4.0, 2.0, 1.0), 0.75),  # a shaft
-        (Ring(2.0, 1.0, 1.0), Ring(2.0, 1.0, 1.0, (0, 0, 1.25)), 0.25),
+        (Sphere(1.0), ring(4.0, 2.0, 1.0), 1.0),  # in the hole
+        (Sphere(1.0, (0.5, 0, 0)), ring(4.0, 2.0, 1.0), 0.5),
+        (Cylinder(1.0, 9.0, (0.25, 0, 3.0)), ring(4.0, 2.0, 1.0), 0.75),  # a shaft
+        (ring(2.0, 1.0, 1.0), ring(2.0, 1.0, 1.0, (0, 0, 1.25)), 0.25),
     ],
 )
 def test_gaps_of_round_bodies_are_exact_in_any_pose(first, second, gap):

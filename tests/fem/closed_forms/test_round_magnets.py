@@ -9,7 +9,7 @@ from spinlev.fem.closed_forms.round import round_slope, round_tensor
 from spinlev.fem.closed_forms.uniform import remanent_field
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.shapes import Cylinder, Ring, Sphere, rotation_matrix
+from spinlev.geometry.shapes import Cylinder, Sphere, ring, rotation_matrix
 
 POLARIZATION = np.array([1.1, -0.4, 0.6])
 TURN = rotation_matrix((25.0, -40.0, 10.0))
@@ -17,9 +17,9 @@ BODIES = {
     "cylinder": Cylinder(5e-3, 10e-3),
     "tilted, displaced cylinder": Cylinder(5e-3, 10e-3, (2e-3, -1e-3, 3e-3), TURN),
     "disc of 20 : 1": Cylinder(10e-3, 1e-3),
-    "ring": Ring(10e-3, 6e-3, 5e-3),
-    "tilted, displaced ring": Ring(10e-3, 6e-3, 5e-3, (-3e-3, 1e-3, 2e-3), TURN),
-    "thin ring": Ring(10e-3, 9.5e-3, 2e-3),
+    "ring": ring(10e-3, 6e-3, 5e-3),
+    "tilted, displaced ring": ring(10e-3, 6e-3, 5e-3, (-3e-3, 1e-3, 2e-3), TURN),
+    "thin ring": ring(10e-3, 9.5e-3, 2e-3),
     "sphere": Sphere(9.5e-3, (1e-3, 2e-3, 0.0), TURN),
 }
 
@@ -34,7 +34,7 @@ def of_magpylib(magnet):
     pose["polarization"] = magnet.polarization
     if isinstance(body, Sphere):
         return magpylib.magnet.Sphere(diameter=2 * body.radius, **pose)
-    if isinstance(body, Ring):
+    if body.inner_radius:
         return magpylib.magnet.CylinderSegment(dimension=(body.inner_radius, body.radius, body.height, 0, 360), **pose)
     return magpylib.magnet.Cylinder(dimension=(2 * body.radius, body.height), **pose)
 

@@ -11,12 +11,12 @@ from spinlev.fem.maps_of_B.columns import UNITS, FieldMap, FieldMapError
 from spinlev.fem.maps_of_B.table import map_table, require_plausible
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.rotor import horizontal, vertical
-from spinlev.geometry.shapes import Box, Cylinder, Ring
+from spinlev.geometry.shapes import Box, Cylinder, ring
 
 ROTORS = {
     "displaced cube": horizontal(0.002, 0.01, 1.305, 1.05),
     "two cubes": vertical(0.012, 0.01, 1.305, 1.05),
-    "ring": (Magnet(Ring(0.009, 0.004, 0.005), np.array([0.8, 0.0, 0.5])),),
+    "ring": (Magnet(ring(0.009, 0.004, 0.005), np.array([0.8, 0.0, 0.5])),),
     "flat disc": (Magnet(Cylinder(0.01, 0.002), np.array([0.0, 0.0, 1.2]), 1.1),),
     "rod and plate": (
         Magnet(Cylinder(0.002, 0.02), np.array([1.2, 0.0, 0.0])),

@@ -11,10 +11,10 @@ from spinlev.fem.harmonics.interior import field_at_center, gradient_at_center
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import Wrench, rotor_ladder, two_body
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.shapes import Ring
+from spinlev.geometry.shapes import ring
 
 INNER, OUTER, HEIGHT = 4e-3, 10e-3, 6e-3
-RING = (Magnet(Ring(OUTER, INNER, HEIGHT), np.array([1.3, 0.0, 0.0]), 1.05),)
+RING = (Magnet(ring(OUTER, INNER, HEIGHT), np.array([1.3, 0.0, 0.0]), 1.05),)
 PLACES = np.array([[1e-3, -2e-3, -13e-3], [6e-3, 2e-3, -11.5e-3], [16e-3, 4e-3, -10e-3]])
 """3.8, 2.2 and 3.2 mm from contact; at 0.5 mm the mesh of both misses 0.3 % of the rigid force: as much as is added."""
 DIRECTIONS = np.array([[0.48, 0.36, 0.8], [1.0, 0.0, 0.0], [0.0, 0.6, -0.8]])

@@ -10,7 +10,7 @@ from spinlev.fem.rotor.near_field import complete, near_field
 from spinlev.fem.rotor.table import RangeError
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring, rotation_matrix
 
 POLARIZATION = np.array([1.2, 0.0, 0.5])
 TURN = rotation_matrix((25.0, -40.0, 10.0))
@@ -106,7 +106,7 @@ def test_the_gradient_is_that_of_the_field():
     [
         (Box((0.01,) * 3), (5e-3, 5e-3, 1e-3)),
         (Cylinder(5e-3, 8e-3), (3e-3, 4e-3, 4e-3)),
-        (Ring(5e-3, 3e-3, 8e-3), (0.0, -3e-3, -4e-3)),
+        (ring(5e-3, 3e-3, 8e-3), (0.0, -3e-3, -4e-3)),
     ],
 )
 def test_a_point_on_an_edge_is_refused(body, point):
@@ -182,7 +182,7 @@ def test_on_a_face_the_field_is_the_one_just_outside(permeability):
 
 ROUND = {
     "cylinder": (Cylinder(4.65e-3, 6.1e-3), (4.65e-3, 0.0, 6.1e-3, 1.27, 1.1), (0.2533e-3, 4.6573e-3, 3.0641e-3)),
-    "ring": (Ring(8.5e-3, 3.5e-3, 5.2e-3), (8.5e-3, 3.5e-3, 5.2e-3, 1.18, 1.05), (-1.3809e-3, -8.4073e-3, 2.5e-3)),
+    "ring": (ring(8.5e-3, 3.5e-3, 5.2e-3), (8.5e-3, 3.5e-3, 5.2e-3, 1.18, 1.05), (-1.3809e-3, -8.4073e-3, 2.5e-3)),
 }
 """Body; its numbers, whose field by surface charge is good to 3e-7 T; a place (m) where too little was stated."""
 

@@ -11,7 +11,7 @@ from spinlev.geometry.common import MU_0
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
 from spinlev.geometry.rotor import tilt
-from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring, rotation_matrix
 
 TURN = rotation_matrix((25.0, -40.0, 10.0))
 
@@ -72,7 +72,7 @@ def test_the_stated_error_of_a_tilted_cylinder_holds_against_a_finer_table():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "body", [Ring(10e-3, 6e-3, 5e-3, (1e-3, 0, 0), TURN), Ring(10e-3, 9.5e-3, 2e-3), Cylinder(10e-3, 1e-3)]
+    "body", [ring(10e-3, 6e-3, 5e-3, (1e-3, 0, 0), TURN), ring(10e-3, 9.5e-3, 2e-3), Cylinder(10e-3, 1e-3)]
 )
 def test_the_stated_error_of_rings_and_discs_holds(body):
     """Hard cases: many cells, thin walls, a disc of 20 : 1; another ladder of meshes, finer at the start.
@@ -91,7 +91,7 @@ def test_the_stated_error_of_rings_and_discs_holds(body):
 
 
 def test_a_table_of_round_magnets_is_read_as_it_was_written(tmp_path):
-    magnets = (Magnet(Ring(10e-3, 6e-3, 5e-3), (1, 0, 0)), Magnet(Sphere(5e-3, (0, 0, 10e-3)), (0, 0, 1)))
+    magnets = (Magnet(ring(10e-3, 6e-3, 5e-3), (1, 0, 0)), Magnet(Sphere(5e-3, (0, 0, 10e-3)), (0, 0, 1)))
     table = rotor_table((*magnets, Magnet(Cylinder(2e-3, 3e-3, (0, 0, 20e-3), TURN), (0, 1, 0))), "cuboid")
     ROTOR.save(table, tmp_path / "table.nc")
     again = ROTOR.load(tmp_path / "table.nc")
@@ -100,5 +100,5 @@ def test_a_table_of_round_magnets_is_read_as_it_was_written(tmp_path):
 
 
 def test_shapes_of_the_same_box_are_other_tables():
-    bodies = [Cylinder(5e-3, 10e-3), Sphere(5e-3), Ring(5e-3, 1e-3, 10e-3), Ring(5e-3, 2e-3, 10e-3), Box((0.01,) * 3)]
+    bodies = [Cylinder(5e-3, 10e-3), Sphere(5e-3), ring(5e-3, 1e-3, 10e-3), ring(5e-3, 2e-3, 10e-3), Box((0.01,) * 3)]
     assert len({ROTOR.key((Magnet(body, (1, 0, 0)),), "fem", 1e-6) for body in bodies}) == len(bodies)

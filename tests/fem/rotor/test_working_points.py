@@ -8,7 +8,7 @@ from spinlev.fem.rotor.near_field import near_field
 from spinlev.fem.rotor.working_point import EasyField, working_points
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.shapes import Box, Ring, Sphere, rotation_matrix
+from spinlev.geometry.shapes import Box, Sphere, ring, rotation_matrix
 
 J = 1.3
 CUBE = Box((0.01,) * 3)
@@ -87,8 +87,8 @@ def test_a_floater_and_a_touching_magnet_add_what_magpylib_adds():
 @pytest.mark.slow
 def test_a_thin_ring_across_its_axis_is_nearly_free_of_iron():
     """H = -J where a thin wall stands across the polarisation: all but the sides is lost at a knee of half of that."""
-    ring = Magnet(Ring(10e-3, 9.9e-3, 20e-3), (J, 0, 0), coercivity=knee_at(-0.5 * J))
-    (found,) = working_points(EasyField([ring]))
+    thin = Magnet(ring(10e-3, 9.9e-3, 20e-3), (J, 0, 0), coercivity=knee_at(-0.5 * J))
+    (found,) = working_points(EasyField([thin]))
     assert found.lowest == pytest.approx(-J, rel=0.02)
     # in the wall H is -J cos²φ along the axis: below -J/2 over half of the turn
     assert found.share_below == pytest.approx(0.5, abs=0.02)

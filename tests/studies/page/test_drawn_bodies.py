@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring
 from spinlev.studies.figures.view import arrow, near_plate, triangles
 
 RADIUS, HEIGHT, CENTER = 5e-3, 8e-3, (1e-3, 2e-3, -3e-3)
@@ -20,7 +20,7 @@ def volume(surface):
     [
         (Box((4e-3, 5e-3, 6e-3), CENTER), 1e-12),
         (Cylinder(RADIUS, HEIGHT, CENTER), 3e-3),  # a polygon of 48 sides has 0.3 % less than its circle
-        (Ring(RADIUS, RADIUS / 2, HEIGHT, CENTER), 3e-3),
+        (ring(RADIUS, RADIUS / 2, HEIGHT, CENTER), 3e-3),
         (Sphere(RADIUS, CENTER), 1e-2),
     ],
     ids=["box", "cylinder", "ring", "sphere"],
