@@ -1,5 +1,7 @@
 """Rotors from magpylib's magnets, and the field of a table as a source of magpylib."""
 
+from __future__ import annotations
+
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,11 +16,12 @@ from ..fem.cache import cache_folder
 from ..fem.files import write_whole
 from ..fem.rotor.table import RotorTable
 from ..geometry.common import MU_0, Array, InputError
-from ..geometry.meshes.solids import Body, Facets, Segment, lies_within, step_text
+from ..geometry.meshes.solids import faceted, joined, lies_within, segment, shifted, solid_of, step_text
 from ..geometry.scene.files import pose_keys, shape_keys
 from ..geometry.scene.making import magnets
 from ..geometry.shapes import Box, Cylinder, Sphere
-from ..geometry.solids import Part, Solid
+from ..geometry.solids import Part, Solid, known_shape
+from ..geometry.step_file import part_of
 
 KINDS = (
     magpylib.magnet.Cuboid,
@@ -54,8 +57,8 @@ def from_magpylib(
     Returns
     -------
     dict
-        The table `[rotor]` of a scene file, lengths in mm; the same field to 1e-12 where the permeability is 1, and
-        to 1e-6 that of a STEP file.
+        The table `[rotor]` of a scene file, lengths in mm; the same field to 1e-12 where the permeability is 1, to
+        1e-9 of what is joined or bored, and to 1e-6 that of a STEP file.
 
     Raises
     ------
@@ -74,30 +77,53 @@ def from_magpylib(
     if not sources:
         raise InputError("Input collection must hold at least one magnet; instead it is empty.")
     parts = Path(folder) if folder else cache_folder() / "parts"
-    tables = [
-        {
-            # Of what has no keys, and of a body with a cavity, there is a file.
-            **(_file(magnet, holes, parts) if holes or not isinstance(magnet.body, Solid) else shape_keys(magnet.body)),
-            **pose_keys(magnet.body),  # type: ignore[arg-type]  # which asks for no more than a body has
-            "polarization_T": (magnet.polarization + 0.0).tolist(),
-            "recoil_permeability": float(recoil_permeability),
-        }
-        for magnet, holes in _cavities(_joined([_magnet(source) for source in sources]))
-    ]
-    return dict(magnets(*tables))
+    found = _bored(_joined([_magnet(source) for source in sources]))
+    return dict(magnets(*(_table(magnet, float(recoil_permeability), parts) for magnet in found)))
 
 
 @dataclass(frozen=True)
 class _Magnet:
-    """A source: its body in the rotor's frame, and its polarisation (3,) T along the body's axes."""
+    """A source: its solid in mm and polarisation (3,) T along the body's axes; its body if a scene file has keys."""
 
-    body: Body
-    polarization: Array
     source: Any
+    solid: Any
+    center: Array
+    rotation: Array
+    polarization: Array
+    body: Solid | None = None
 
     @property
     def in_rotor(self) -> Array:
-        return self.body.rotation @ self.polarization
+        return self.rotation @ self.polarization
+
+    def seen_from(self, frame: _Magnet) -> Any:
+        """Its solid in the axes of another."""
+        back = frame.rotation.T
+        return shifted(self.solid, back @ (self.center - frame.center), back @ self.rotation)
+
+
+def _table(magnet: _Magnet, recoil_permeability: float, folder: Path) -> dict[str, Any]:
+    """Among `magnets` of a scene; of what has no keys the file is written if it is not there, named by its content."""
+    body, polarization = magnet.body, magnet.polarization
+    if body is None:
+        text = step_text(magnet.solid)
+        content = text.encode()
+        path = (folder / f"{hashlib.sha256(content).hexdigest()[:20]}.step").absolute()
+        part = part_of(text, path)
+        part = replace(part, center=magnet.center - magnet.rotation @ part.origin, rotation=magnet.rotation)
+        body = known_shape(part) or part
+        polarization = np.round(body.rotation.T @ magnet.in_rotor, 15)
+        try:
+            if body is part and (not path.exists() or path.read_bytes() != content):
+                write_whole(path, content)
+        except OSError as error:
+            raise InputError(f"Input folder must be one that files can be written to; instead: {error}.") from None
+    return {
+        **shape_keys(body),
+        **pose_keys(body),
+        "polarization_T": (polarization + 0.0).tolist(),
+        "recoil_permeability": recoil_permeability,
+    }
 
 
 def _sources(collection: Any) -> Iterator[Any]:
@@ -130,10 +156,14 @@ def _magnet(source: Any) -> _Magnet:
             "divide both by 1000."
         )
     pose = np.asarray(source.position, float), source.orientation.as_matrix()
-    return _Magnet(_body(source, np.asarray(size, float), pose), polarization, source)
+    body = _body(source, np.asarray(size, float), pose)
+    if isinstance(body, Solid):
+        return _Magnet(source, solid_of(body), *pose, polarization, body)
+    return _Magnet(source, body, *pose, polarization)
 
 
-def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Body:
+def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Any:
+    """The body of a source in its place, or the solid of one that a scene file has no keys for."""
     if isinstance(source, magpylib.magnet.Sphere):
         return Sphere(float(size) / 2, *pose)
     if isinstance(source, magpylib.magnet.Cuboid):
@@ -142,9 +172,10 @@ def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Body:
         return Cylinder(float(size[0]) / 2, float(size[1]), *pose)
     if isinstance(source, magpylib.magnet.CylinderSegment):
         inner, outer, height, start, end = map(float, size)
-        return _ring(Segment(inner, outer, height, start, end, *pose))
+        whole = abs(end - start - 360) < SAME_ANGLE
+        return Cylinder(outer, height, *pose, inner) if whole else segment(inner, outer, height, start, end)
     if isinstance(source, magpylib.magnet.Tetrahedron):
-        return Facets(size[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]], *pose)
+        return faceted(size[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]])
     for fault in ("open", "disconnected", "selfintersecting"):
         if getattr(source, f"status_{fault}"):
             raise InputError(f"Input mesh must be one closed surface; instead {source!r} is {fault}.")
@@ -153,109 +184,50 @@ def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Body:
             f"Input mesh must have at most {MOST_TRIANGLES} triangles; instead {source!r} has {len(source.mesh)}. "
             "Simplify it, as PyVista's decimate does."
         )
-    return Facets(np.asarray(source.mesh, float), *pose)
-
-
-def _ring(segment: Segment) -> Body:
-    """The segment, or where it goes all around the ring or cylinder that it is."""
-    pose = segment.center, segment.rotation
-    if abs(segment.end - segment.start - 360) > SAME_ANGLE:
-        return segment
-    return Cylinder(segment.radius, segment.height, *pose, inner_radius=segment.inner_radius)
-
-
-def _joined(found: Sequence[_Magnet]) -> list[_Magnet]:
-    """Magnets, of which segments that together go all around, with one polarisation, are one ring."""
-    left, joined = list(found), list[_Magnet]()
-    while left:
-        first = left.pop(0)
-        if isinstance(first.body, Segment):
-            others = [other for other in left if _same_ring(first, other)]
-            turns = sorted(_angles(first.body, one.body) for one in (first, *others))  # type: ignore[arg-type]
-            ends, begins = np.array([end for _, end in turns]), np.roll([start for start, _ in turns], -1)
-            gaps = (ends - begins + 180) % 360 - 180
-            whole = abs(sum(end - start for start, end in turns) - 360) < SAME_ANGLE
-            if others and whole and np.abs(gaps).max() < SAME_ANGLE:
-                first = replace(first, body=_ring(replace(first.body, start=0.0, end=360.0)))
-                left = [other for other in left if not any(other is one for one in others)]
-        joined.append(first)
-    return joined
-
-
-def _same_ring(one: _Magnet, other: _Magnet) -> bool:
-    a, b = one.body, other.body
-    if not (isinstance(a, Segment) and isinstance(b, Segment)):
-        return False
-    sizes, others = ((s.inner_radius, s.radius, s.height) for s in (a, b))
-    return (
-        bool(np.allclose(sizes, others, rtol=SAME, atol=0.0))
-        and float(np.linalg.norm(a.center - b.center)) < SAME * a.radius
-        and float(a.rotation[:, 2] @ b.rotation[:, 2]) > 1 - SAME
-        and _alike(one.in_rotor, other.in_rotor)
-    )
-
-
-def _angles(frame: Segment, segment: Segment) -> tuple[float, float]:
-    """Where a segment of the same axis begins and ends about that of a frame, degrees; it begins within a turn."""
-    turn = frame.rotation.T @ segment.rotation
-    start = segment.start + float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
-    start = round(start % 360, 9) % 360
-    return start, start + segment.end - segment.start
+    try:
+        return faceted(np.asarray(source.mesh, float))
+    except InputError as error:
+        raise InputError(f"{source!r}: {error}") from None
 
 
 def _alike(one: Array, other: Array) -> bool:
     return float(np.linalg.norm(one - other)) <= SAME * float(np.linalg.norm(one))
 
 
-def _cavities(found: Sequence[_Magnet]) -> list[tuple[_Magnet, list[Body]]]:
-    """Every magnet that is none with the cavities that opposite ones within it make.
+def _joined(found: Sequence[_Magnet]) -> list[_Magnet]:
+    """Magnets, of which segments about one axis that touch and have one polarisation are one."""
+    left, whole = list(found), list[_Magnet]()
+    while left:
+        first = left.pop(0)
+        others = [
+            other
+            for other in left
+            if all(isinstance(m.source, magpylib.magnet.CylinderSegment) and not m.body for m in (first, other))
+            and float(np.linalg.norm(first.center - other.center)) < SAME * float(first.source.dimension[1])
+            and float(first.rotation[:, 2] @ other.rotation[:, 2]) > 1 - SAME
+            and _alike(first.in_rotor, other.in_rotor)
+        ]
+        if others and (solid := joined([first.solid, *(other.seen_from(first) for other in others)])):
+            first = replace(first, solid=solid)
+            left = [other for other in left if not any(other is one for one in others)]
+        whole.append(first)
+    return whole
 
-    A cylinder in one of its height about the same axis makes it a ring, which has a closed form.
-    """
-    holes: dict[int, list[Body]] = {}
-    used: set[int] = set()
+
+def _bored(found: Sequence[_Magnet]) -> list[_Magnet]:
+    """Every magnet that is no cavity, without the cavities that opposite ones within it make."""
+    whole = list(found)
+    cavities = set[int]()
     for k, inner in enumerate(found):
         for j, outer in enumerate(found):
-            near = float(np.linalg.norm(inner.body.center - outer.body.center)) < outer.body.circumradius
+            ends = np.array([list(corner) for corner in outer.solid.bounding_box])
+            near = 1e3 * float(np.linalg.norm(inner.center - outer.center)) < float(np.linalg.norm(ends, axis=1).max())
             opposite = inner.in_rotor.any() and _alike(outer.in_rotor, -inner.in_rotor)
-            if j != k and j not in used and near and opposite and lies_within(inner.body, outer.body):
-                holes.setdefault(j, []).append(inner.body)
-                used.add(k)
+            if j != k and j not in cavities and near and opposite and lies_within(inner.seen_from(outer), outer.solid):
+                whole[j] = replace(whole[j], solid=whole[j].solid - inner.seen_from(outer), body=None)
+                cavities.add(k)
                 break
-    result = list[tuple[_Magnet, list[Body]]]()
-    for k, magnet in enumerate(found):
-        if k in used:
-            continue
-        bodies = holes.get(k, [])
-        ring = _bored(magnet.body, bodies[0]) if len(bodies) == 1 else None
-        result.append((replace(magnet, body=ring), []) if ring is not None else (magnet, bodies))
-    return result
-
-
-def _bored(outer: Body, inner: Body) -> Cylinder | None:
-    """The ring that a cylinder within another leaves, where both have the same axis and height."""
-    if not (isinstance(outer, Cylinder) and isinstance(inner, Cylinder)) or outer.inner_radius or inner.inner_radius:
-        return None
-    apart = float(np.linalg.norm(outer.center - inner.center))
-    along = abs(float(outer.rotation[:, 2] @ inner.rotation[:, 2]))
-    if apart > SAME * outer.radius or along < 1 - SAME or abs(outer.height - inner.height) > SAME * outer.height:
-        return None
-    return replace(outer, inner_radius=inner.radius)
-
-
-def _file(magnet: _Magnet, cavities: Sequence[Body], folder: Path) -> dict[str, Any]:
-    """The file of a magnet, written if it is not there; its name tells its content."""
-    try:
-        content = step_text(magnet.body, cavities).encode()
-    except InputError as error:
-        raise InputError(f"{magnet.source!r}: {error}") from None
-    path = (folder / f"{hashlib.sha256(content).hexdigest()[:20]}.step").absolute()
-    try:
-        if not path.exists() or path.read_bytes() != content:
-            write_whole(path, content)
-    except OSError as error:
-        raise InputError(f"Input folder must be one that files can be written to; instead: {error}.") from None
-    return {"file": str(path)}
+    return [magnet for k, magnet in enumerate(whole) if k not in cavities]
 
 
 def to_magpylib(table: RotorTable) -> Any:

@@ -7,7 +7,7 @@ import logging
 import re
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -175,88 +175,53 @@ def _vector(vector: Array) -> Any:
     return occ.gp_Vec(*map(float, vector))
 
 
-@dataclass(frozen=True)
-class Segment:
-    """A part of a ring, from an angle to another about the body's z axis."""
-
-    # inner_radius, radius, height: m; the first may be 0
-    inner_radius: float
-    radius: float
-    height: float
-    # start, end: degrees, at most 360 apart
-    start: float
-    end: float
-    # center, rotation: (3,) m and (3, 3), as of every body
-    center: Array = field(default_factory=lambda: np.zeros(3))
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-
-    @property
-    def circumradius(self) -> float:
-        """Radius of a sphere about the centre that holds it, m."""
-        return float(np.hypot(self.radius, self.height / 2))
+# Solids of OpenCASCADE in mm, about the origin along their own axes, for STEP files
 
 
-@dataclass(frozen=True)
-class Facets:
-    """A solid within triangles."""
-
-    triangles: Array  # (n, 3, 3) m, corners, in any order, along the body axes from the centre
-    # center, rotation: (3,) m and (3, 3), as of every body
-    center: Array = field(default_factory=lambda: np.zeros(3))
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-
-    @property
-    def circumradius(self) -> float:
-        """Radius of a sphere about the centre that holds it, m."""
-        return float(np.linalg.norm(self.triangles, axis=-1).max())
-
-
-Body = Solid | Segment | Facets
-
-
-def step_text(body: Body, cavities: Sequence[Body] = ()) -> str:
-    """A STEP file (mm) of a body without its cavities, its centre at the origin and its axes those of the file.
-
-    The text is the same for the same bodies. Raises InputError for facets that do not close, or cut each other.
-    """
-    shape = _shape(body)
-    for cavity in cavities:
-        shape = shape - _placed(cavity, body)
+def step_text(solid: Any) -> str:
+    """A STEP file (mm) of a solid; the text is the same for the same one."""
     with tempfile.NamedTemporaryFile(suffix=".step") as file:
-        shape.WriteStep(file.name)
+        solid.WriteStep(file.name)
         return OWN_WORDS.sub("''", Path(file.name).read_text(encoding="utf-8"))
 
 
-def lies_within(body: Body, other: Body) -> bool:
-    """Whether all of a body lies within another, and fills less than it."""
-    hole, whole = _placed(body, other), _shape(other)
-    if not float(hole.mass) < float(whole.mass) * (1 - WITHIN):
-        return False
-    left = float((whole - hole).mass)
-    return abs(left + float(hole.mass) - float(whole.mass)) < WITHIN * float(whole.mass)
-
-
-def _shape(body: Body) -> Any:
-    """The body as OpenCASCADE has it, mm, about the origin along its axes."""
-    if isinstance(body, Facets):
-        return _faceted(body.triangles / MILLIMETRE)
-    if isinstance(body, Segment):
-        inner, outer, height = (length / MILLIMETRE for length in (body.inner_radius, body.radius, body.height))
-        section = occ.WorkPlane(occ.Axes((inner, 0.0, -height / 2), n=occ.gp_Dir(0, -1, 0), h=occ.X))
-        axis = occ.Axis(occ.Pnt(0, 0, 0), occ.Z)
-        solid = section.Rectangle(outer - inner, height).Face().Revolve(axis, body.end - body.start)
-        return solid.Rotate(axis, body.start)
+def solid_of(body: Solid) -> Any:
+    """The solid of a body, wherever that is."""
     return occ_solid(moved(body, np.zeros(3), np.eye(3)), np.zeros(3), MILLIMETRE)
 
 
-def _placed(body: Body, frame: Body) -> Any:
-    """A body as OpenCASCADE has it, mm, in the axes of another."""
-    shape = _turned(_shape(body), frame.rotation.T @ body.rotation)
-    return shape.Move(_vector(frame.rotation.T @ (body.center - frame.center) / MILLIMETRE))
+def segment(inner_radius: float, radius: float, height: float, start: float, end: float) -> Any:
+    """Part of a ring from an angle to another about z, degrees; lengths in m."""
+    inner, outer, high = (length / MILLIMETRE for length in (inner_radius, radius, height))
+    section = occ.WorkPlane(occ.Axes((inner, 0.0, -high / 2), n=occ.gp_Dir(0, -1, 0), h=occ.X))
+    axis = occ.Axis(occ.Pnt(0, 0, 0), occ.Z)
+    return section.Rectangle(outer - inner, high).Face().Revolve(axis, end - start).Rotate(axis, start)
 
 
-def _faceted(triangles: Array) -> Any:
-    """The solid within triangles (n, 3, 3) mm; those of one plane are one face."""
+def shifted(solid: Any, shift: Array, rotation: Array) -> Any:
+    """A solid that is turned about the origin, then moved by (3,) m."""
+    return _turned(solid, rotation).Move(_vector(shift / MILLIMETRE))
+
+
+def lies_within(hole: Any, solid: Any) -> bool:
+    """Whether all of a solid lies within another, and fills less than it."""
+    whole, part = float(solid.mass), float(hole.mass)
+    return part < whole * (1 - WITHIN) and abs(float((solid - hole).mass) + part - whole) < WITHIN * whole
+
+
+def joined(solids: Sequence[Any]) -> Any | None:
+    """The one solid that solids make which touch, but do not overlap; None where they make none."""
+    whole = sum(solids[1:], solids[0]).UnifySameDomain()
+    alike = abs(float(whole.mass) - sum(float(solid.mass) for solid in solids)) < WITHIN * float(whole.mass)
+    return whole if alike and len(list(whole.solids)) == 1 else None
+
+
+def faceted(triangles: Array) -> Any:
+    """The solid within triangles (n, 3, 3) m in any order; those of one plane are one face.
+
+    Raises InputError where they do not close, or cut each other.
+    """
+    triangles = triangles / MILLIMETRE
     size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     _, numbers = np.unique(np.round(triangles.reshape(-1, 3) / (SAME * size)), axis=0, return_inverse=True)
     corners = numbers.reshape(-1, 3)
