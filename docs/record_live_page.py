@@ -16,7 +16,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 from devtools import Browser  # noqa: E402
 
 SIZE, WIDTH = (1400, 1150), 900
-FIND = "const model = name => Bokeh.documents[0].get_model_by_name(name);"
+AT = "const at = id => document.getElementById(id);"
 PACE = 0.25
 """Between pictures, s."""
 
@@ -33,7 +33,7 @@ def main() -> None:
         shots: list[Image.Image] = []
 
         def run(program: str) -> object:
-            return tab.run(f"(() => {{ {FIND} return {program}; }})()")
+            return tab.run(f"(() => {{ {AT} return {program}; }})()")
 
         def shoot(count: int = 1) -> None:
             for _ in range(count):
@@ -43,21 +43,17 @@ def main() -> None:
                     shots.append(picture.convert("RGB").resize((WIDTH, picture.height * WIDTH // picture.width)))
                 time.sleep(PACE)
 
-        tab.until("window.Bokeh && Bokeh.documents.length > 0 && Bokeh.documents[0].roots().length > 5")
-        tab.until(f"(() => {{ {FIND} return /Click to go/.test(model('map_says').text); }})()", 120)
+        tab.until("document.getElementById('map_says') !== null")
+        tab.until(f"(() => {{ {AT} return /Click to go/.test(at('map_says').textContent); }})()", 120)
         time.sleep(3)
         shoot(3)
         for frequency in (*range(132, 152, 4), *range(148, 128, -4)):
-            run(f"(model('frequency_hz').value = {frequency})")
+            run(f"(at('frequency_hz').value = {frequency}, at('frequency_hz').dispatchEvent(new Event('input')))")
             time.sleep(PACE)
             shoot()
         time.sleep(3)
         for press in ("play", "up", "aside"):
-            x, y = tab.run(
-                f"(() => {{ {FIND} const r = Bokeh.index.find_one(model('{press}')).el.getBoundingClientRect();"
-                " return [r.x + r.width / 2, r.y + r.height / 2]; })()"
-            )
-            tab.mouse((x, y))
+            run(f"at('{press}').click()")
             shoot(7)
         browser.close()
         server.terminate()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 import html
 import threading
-from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
-from ..geometry.common import ComputationError, SpinlevError
+from ..geometry.common import ComputationError
 from ..geometry.scene.contents import Scene
 from .cli.console import missing_extra
 from .scene_tables import SceneLike, given_scene
@@ -22,8 +20,10 @@ HEIGHT = 900  # of the page in a notebook, pixels
 class LivePage:
     """A page that is served in the background; in a notebook it shows itself."""
 
-    def __init__(self, pages: Pages, thread: threading.Thread, loop: asyncio.AbstractEventLoop) -> None:
-        self._pages, self._thread, self._loop = pages, thread, loop
+    def __init__(self, pages: Pages) -> None:
+        self._pages = pages
+        self._thread = threading.Thread(target=pages.run, name="spinlev explore", daemon=True)
+        self._thread.start()
 
     @property
     def address(self) -> str:
@@ -32,9 +32,8 @@ class LivePage:
 
     def stop(self) -> None:
         """Close the page and end its work."""
-        if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._loop.stop)
-            self._thread.join()
+        self._pages.stop()
+        self._thread.join()
 
     def __repr__(self) -> str:
         return f"LivePage at {self.address}"
@@ -71,23 +70,5 @@ def explore(scene: SceneLike, port: int = 0) -> LivePage:
         if needed := missing_extra(error):
             raise ComputationError(needed) from None
         raise
-    loaded = given_scene(scene)
     source = "scene" if isinstance(scene, Scene) else str(scene)
-    begun: Future[tuple[Pages, asyncio.AbstractEventLoop]] = Future()
-
-    def work() -> None:
-        loop = asyncio.new_event_loop()
-        asyncio.set_event_loop(loop)
-        try:
-            pages = serve(loaded, source, port=port, framed=True)
-        except SpinlevError as error:
-            begun.set_exception(error)
-        else:
-            begun.set_result((pages, loop))
-            pages.run()
-        loop.close()
-
-    thread = threading.Thread(target=work, name="spinlev explore", daemon=True)
-    thread.start()
-    pages, loop = begun.result()
-    return LivePage(pages, thread, loop)
+    return LivePage(serve(given_scene(scene), source, port=port, framed=True))

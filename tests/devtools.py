@@ -3,7 +3,6 @@
 import asyncio
 import base64
 import json
-import re
 import shutil
 import subprocess
 import time
@@ -147,95 +146,58 @@ class Tab:
 
 
 class LivePage:
-    """A page of `spinlev explore` without a browser: what it shows, by name and property, and what its reader does."""
+    """A page of `spinlev explore` without a browser: what it is told to show, and what its reader does."""
 
     def __init__(self, address: str, query: str = "") -> None:
         self.loop = asyncio.new_event_loop()
-        self.names: dict[str, str] = {}
-        self.shown: dict[str, dict[str, object]] = {}
-        self.number, self.whole = 0, False
+        self.shown: dict[str, object] = {}
         parts = urlsplit(address)
+        line = f"ws://{parts.netloc}/ws?{parts.query}{query and '&' + query}"
         try:
-            with urllib.request.urlopen(f"{address}{query and '&' + query}", timeout=60) as answer:
-                text = answer.read().decode()
-            token = re.search(r'"token":"([^"]*)"', text)[1]
-            line = httpclient.HTTPRequest(f"ws://{parts.netloc}/ws?{parts.query}", request_timeout=60)
-            self.line = self.loop.run_until_complete(self._joined(line, token))
-            self.loop.run_until_complete(asyncio.wait_for(self._hear(), 60))  # that it is ready
-            self.say("PULL-DOC-REQ", {})
-            self.until(lambda: self.whole)
+            self.line = self.loop.run_until_complete(self._joined(httpclient.HTTPRequest(line, request_timeout=60)))
         except BaseException:
             self.loop.close()
             raise
 
-    async def _joined(self, line, token):
-        return await websocket_connect(line, subprotocols=["bokeh", token], max_message_size=2**28)
+    async def _joined(self, line):
+        return await websocket_connect(line, max_message_size=2**28)
 
-    def say(self, kind: str, content: object) -> None:
-        """Send a message of Bokeh's protocol."""
-        self.number += 1
-        header = {"msgid": str(self.number), "msgtype": kind}
+    async def _heard(self):
+        return await self.line.read_message()
+
+    @property
+    def names(self) -> list[str]:
+        """Of the sliders."""
+        return [slider["name"] for slider in self.shown.get("controls", {}).get("sliders", [])]
+
+    @property
+    def said(self) -> str:
+        """The message to the reader, and the headline."""
+        return f"{self.shown.get('message') or ''} {self.shown.get('numbers', {}).get('headline', '')}".strip()
+
+    def say(self, *words: object) -> None:
+        """What the page's reader does, as page.js sends it."""
 
         async def sent():
-            for part in (header, {}, content):
-                await self.line.write_message(json.dumps(part))
+            await self.line.write_message(json.dumps(words))
 
         self.loop.run_until_complete(sent())
 
-    def set(self, name: str, value: object, attribute: str = "value") -> None:
-        """Move a slider, choose, or put a file in."""
-        event = {"kind": "ModelChanged", "model": {"id": self.names[name]}, "attr": attribute, "new": value}
-        self.say("PATCH-DOC", {"events": [event]})
-
-    def click(self, name: str) -> None:
-        """Press a button."""
-        values = {"type": "map", "entries": [["model", {"id": self.names[name]}]]}
-        event = {"type": "event", "name": "button_click", "values": values}
-        self.say("PATCH-DOC", {"events": [{"kind": "MessageSent", "msg_type": "bokeh_event", "msg_data": event}]})
-
-    def get(self, name: str, attribute: str = "text") -> object:
-        """A property as it is shown."""
-        return self.shown.get(self.names.get(name, ""), {}).get(attribute)
-
     def until(self, true, seconds: float = 120.0):
-        """Hear what the page says until something is true, and what that is."""
+        """Hear what the page is told until something is true, and what that is."""
         end = time.monotonic() + seconds
         while not (found := true()):
             try:
-                self.loop.run_until_complete(asyncio.wait_for(self._hear(), end - time.monotonic()))
+                text = self.loop.run_until_complete(asyncio.wait_for(self._heard(), end - time.monotonic()))
             except TimeoutError:
-                raise AssertionError(f"never true; message: {self.get('message')}, sign: {self.get('sign')}") from None
+                raise AssertionError(f"never true; {self.said}") from None
+            assert text is not None, f"the line was closed: {self.line.close_code} {self.line.close_reason}"
+            self.shown |= json.loads(text)
         return found
 
     def answered(self, seconds: float = 120.0) -> str:
         """What is said when an answer or a message is there."""
-        return str(self.until(lambda: self.get("message") or self.get("headline"), seconds))
-
-    async def _hear(self) -> None:
-        frames = [await self.line.read_message() for _ in range(3)]
-        assert None not in frames, f"the line was closed: {self.line.close_code} {self.line.close_reason}"
-        header, _, content = (json.loads(frame) for frame in frames)
-        for _ in range(2 * header.get("num_buffers", 0)):
-            await self.line.read_message()
-        self.whole |= header["msgtype"] == "PULL-DOC-REPLY"
-        self._note(content.get("doc", content))
-        for event in content.get("events", []):
-            if event["kind"] == "ModelChanged":
-                self.shown.setdefault(event["model"]["id"], {})[event["attr"]] = event["new"]
-
-    def _note(self, value: object) -> None:
-        """Names and properties of all models in what was said."""
-        if isinstance(value, list):
-            for part in value:
-                self._note(part)
-        elif isinstance(value, dict):
-            if value.get("type") == "object" and "id" in value:
-                known = value.get("attributes", {})
-                self.shown.setdefault(value["id"], {}).update(known)
-                if "name" in known:
-                    self.names[known["name"]] = value["id"]
-            for part in value.values():
-                self._note(part)
+        return str(self.until(lambda: self.said, seconds))
 
     def close(self) -> None:
         """Leave."""

@@ -1,47 +1,47 @@
 """The server of the pages: on this machine alone, unless one says otherwise, and for those with the token.
 
-Beside the pages only their own programs are served; whatever else is asked for is not there.
+A page is a file with its program, and a line (WebSocket) over which it is told what to show. Whatever else is asked for
+is not there.
 """
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import ipaddress
+import json
 import logging
-import re
 import secrets
 import socket
 import threading
 import time
-from collections.abc import Awaitable
 from contextlib import suppress
 from importlib.resources import files
 from typing import Any
 from urllib.parse import urlsplit
 from weakref import WeakSet
 
-from bokeh.application import Application
-from bokeh.application.handlers.function import FunctionHandler
-from bokeh.core.templates import get_env
-from bokeh.document import Document
-from bokeh.models import Div
-from bokeh.server.server import BaseServer
-from bokeh.server.tornado import BokehTornado
+import numpy as np
+from plotly.offline import get_plotlyjs
 from tornado.httpserver import HTTPServer
-from tornado.httputil import HTTPHeaders, HTTPServerRequest
-from tornado.ioloop import IOLoop
+from tornado.httputil import HTTPServerRequest
 from tornado.iostream import IOStream
-from tornado.web import OutputTransform, RequestHandler
+from tornado.web import Application, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from ...geometry.common import ComputationError, InputError
 from ...geometry.scene.contents import Scene
 from .page import Page
 from .state import PageState, first_state
-from .work import context
+from .worker import context
 
 LOOPBACK = "127.0.0.1"
 PAGES = ("/", "/ws")  # For which the token is asked
-BOKEH = re.compile(r"/static/js/bokeh(-[a-z]+)?(\.min)?\.js")  # Bokeh's own programs
+PROGRAMS = {"/": "text/html", "/page.js": "text/javascript", "/plotly.js": "text/javascript"}
+CONTENT = (
+    "default-src 'none'; script-src 'self' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
+    "connect-src 'self'; frame-ancestors "
+)  # What a page may load: Plotly makes programs and styles
 NOTEBOOKS = "'self' http://127.0.0.1:* http://localhost:* vscode-webview:"  # a source has no place for [::1]
 """Where a page may be in a frame: in notebooks on the reader's own machine."""
 REFUSALS = {
@@ -49,7 +49,7 @@ REFUSALS = {
     404: "There is no such page.",
     421: "This machine is not called so here: take the address that spinlev said.",
 }
-GONE = 3000  # Milliseconds after which a page that does not answer any more is taken to be closed
+GONE = 10  # Seconds after which a page that does not answer any more is taken to be closed
 MOST_PAGES, MOST_LINES = 8, 64  # Open at a time: pages, each with some processes; connections
 PATIENCE = 10.0  # Seconds that a connection may take for a request, and between two
 HEADER, BODY, MESSAGE = 48_000, 1000, 1_000_000
@@ -59,38 +59,57 @@ FULL = f"{MOST_PAGES} pages are open, and more are not served at a time. Close o
 
 
 class Pages:
-    """Where pages are served, until `stop`.
+    """Where pages are served, by `run`, until `stop`.
 
     Parameters
     ----------
     address : of the page, with its token
     local : whether no other machine can see them
     opened : the pages that are open
-    server : Bokeh's
     """
 
-    def __init__(self, address: str, local: bool, opened: set[Page], server: BaseServer) -> None:
-        self.address, self.local, self.opened, self._server = address, local, opened, server
-        self._faults = _OneLine()
+    def __init__(self, address: str, local: bool, gate: _Gate, listening: socket.socket) -> None:
+        self.address, self.local, self.opened = address, local, gate.opened
+        self._gate, self._listening, self._over = gate, listening, asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
 
     def run(self) -> None:
-        """Serve until someone stops the program."""
+        """Serve in this thread until `stop`, or until someone stops the program."""
+        faults = _OneLine()
         try:
             with suppress(KeyboardInterrupt):  # the way to stop it
-                self._server.io_loop.start()
+                asyncio.run(self._serve())
         finally:
-            self.stop()
+            faults.remove()
 
     def stop(self) -> None:
-        """End the server and all that was computed for its pages."""
-        for page in list(self.opened):
-            page.close()
-        self._server.stop()
-        self._faults.remove()
+        """End the server, from any thread, and all that is computed for its pages."""
+        if self._loop is None:
+            self._over.set()
+            self._listening.close()
+        else:
+            with suppress(RuntimeError):  # it has ended
+                self._loop.call_soon_threadsafe(self._over.set)
+
+    async def _serve(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        if self._over.is_set():
+            return
+        limits: dict[str, Any] = {"max_header_size": HEADER, "max_body_size": BODY}
+        limits |= {"idle_connection_timeout": PATIENCE, "body_timeout": PATIENCE}
+        http = _Lines(self._gate, **limits)
+        http.add_socket(self._listening)
+        try:
+            await self._over.wait()
+        finally:
+            http.stop()
+            for page in list(self.opened):
+                page.close()
+            await http.close_all_connections()
 
 
 def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int = 0, framed: bool = False) -> Pages:
-    """Begin to serve pages about a scene; the loop is the current one, and `run` starts it.
+    """Listen for browsers that ask for pages about a scene, which `run` serves.
 
     Parameters
     ----------
@@ -122,73 +141,36 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
     listening.setblocking(False)
     context()  # whose processes load the numeric libraries meanwhile
     token, (number, port) = secrets.token_urlsafe(24), listening.getsockname()[:2]
-    opened: set[Page] = set()
-    begin = first_state(scene, source)
-    gate = _Gate(FunctionHandler(lambda document: _open(document, opened, begin)), token, host, framed)
-    http = _Lines(
-        gate, max_header_size=HEADER, max_body_size=BODY, idle_connection_timeout=PATIENCE, body_timeout=PATIENCE
-    )
-    http.add_socket(listening)
-    server = BaseServer(IOLoop.current(), gate, http)
-    server.start()
     named = f"[{host}]" if ":" in host else host
     name = socket.getfqdn() if host in ("0.0.0.0", "::") else named
+    gate = _Gate(first_state(scene, source), token, host, NOTEBOOKS if framed else "'none'")
     local = ipaddress.ip_address(number).is_loopback
-    return Pages(f"http://{name}:{port}/?token={token}", local, opened, server)
+    return Pages(f"http://{name}:{port}/?token={token}", local, gate, listening)
 
 
-def _open(document: Document, opened: set[Page], state: PageState) -> None:
-    """A page for a browser that asks for one."""
-    document.title = "spinlev: explore"
-    if len(opened) >= MOST_PAGES:
-        document.add_root(Div(text=FULL))
-        return
-    session = document.session_context
-    arguments = session.request.arguments if session is not None and session.request is not None else {}
-    asked = {key: values[-1].decode(errors="replace") for key, values in arguments.items() if key != "token" and values}
-    document.template = get_env().from_string(program("page.html"))
-    document.template_variables["style"] = program("page.css")
-    page = Page(document, state, asked)
-    opened.add(page)
-
-    def closed(_: Any) -> None:
-        page.close()
-        opened.discard(page)
-
-    document.on_session_destroyed(closed)
-
-
-def program(name: str) -> str:
+def program(path: str) -> str:
     """The text of a program of the page, from the installed packages."""
-    if name == "plotly.js":
-        from plotly.offline import get_plotlyjs
-
+    if path == "/plotly.js":
         return str(get_plotlyjs())
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return files(__package__).joinpath("page.html" if path == "/" else path[1:]).read_text(encoding="utf-8")
 
 
-class _Gate(BokehTornado):  # type: ignore[misc]  # which has no types
-    """Bokeh's pages for those with the token, the programs for those who call this machine by its name, and no more."""
+class _Gate(Application):
+    """Pages for those with the token, the programs for those who call this machine by its name, and no more."""
 
-    def __init__(self, page: FunctionHandler, token: str, host: str, framed: bool) -> None:
+    def __init__(self, begin: PageState, token: str, host: str, ancestors: str) -> None:
         super().__init__(
-            {"/": Application(page)},
-            extra_patterns=[(r"/(plotly\.js|page\.js)", _Program)],
-            extra_websocket_origins=["*"],  # asked for here
-            secret_key=secrets.token_bytes(32),
-            sign_sessions=True,
-            include_headers=[],
-            include_cookies=[],
-            check_unused_sessions_milliseconds=1000,
-            unused_session_lifetime_milliseconds=GONE,
-            websocket_max_message_size_bytes=MESSAGE,
-            use_index=False,
+            [("/ws", _Line), ("/.*", _Program)], websocket_max_message_size=MESSAGE, websocket_ping_interval=GONE
         )
+        self.begin, self.ancestors = begin, ancestors
+        self.opened: set[Page] = set()
         self._token = token.encode()
         self._names = {name.lower() for name in ("localhost", host, socket.gethostname(), socket.getfqdn())}
         self.guests: WeakSet[Any] = WeakSet()
         """Streams of connections that were let in."""
-        self.add_transform(_Framed if framed else _Alone)
+
+    def log_request(self, handler: RequestHandler) -> None:
+        """Nothing: an address has the token."""
 
     def find_handler(self, request: HTTPServerRequest, **arguments: Any) -> Any:
         status = self._refusal(request)
@@ -208,16 +190,12 @@ class _Gate(BokehTornado):  # type: ignore[misc]  # which has no types
         # Another name may lead to this machine, so that its owner's pages can read ours (DNS rebinding).
         if name not in self._names and not _is_number(name):
             return 421
-        path = request.path
-        known = path in PAGES or path in ("/plotly.js", "/page.js") or BOKEH.fullmatch(path)
-        if not known or request.method not in ("GET", "HEAD"):
+        if request.path not in (*PAGES, *PROGRAMS) or request.method not in ("GET", "HEAD"):
             return 404
         given, origin = request.arguments.get("token", [b""]), request.headers.get("Origin")
         own = origin is None or origin.partition("://")[2].lower() == request.host.lower()
-        # Sessions are Bokeh's to name.
-        foreign = "Bokeh-Session-Id" in request.headers or any(key.startswith("bokeh-") for key in request.arguments)
-        invited = own and not foreign and len(given) == 1 and hmac.compare_digest(given[0], self._token)
-        return 0 if invited or path not in PAGES else 403
+        invited = own and len(given) == 1 and hmac.compare_digest(given[0], self._token)
+        return 0 if invited or request.path not in PAGES else 403
 
 
 def _is_number(name: str) -> bool:
@@ -227,42 +205,73 @@ def _is_number(name: str) -> bool:
         return False
 
 
-class _Alone(OutputTransform):
-    """Lets no other page show an answer in a frame, nor guess what it is."""
+class _Answer(RequestHandler):
+    application: _Gate
 
-    ancestors = "'none'"
-
-    def transform_first_chunk(
-        self, status_code: int, headers: HTTPHeaders, chunk: bytes, finishing: bool
-    ) -> tuple[int, HTTPHeaders, bytes]:
-        headers["Content-Security-Policy"] = f"frame-ancestors {self.ancestors}"
-        headers["X-Content-Type-Options"] = "nosniff"
-        headers["Referrer-Policy"] = "no-referrer"
-        if self.ancestors == "'none'":
-            headers["X-Frame-Options"] = "DENY"
-        return status_code, headers, chunk
+    def log_exception(self, *error: Any) -> None:
+        logging.getLogger("tornado.application").error("A page failed", exc_info=error)  # no address: it has the token
 
 
-class _Framed(_Alone):
-    ancestors = NOTEBOOKS
+class _Program(_Answer):
+    def set_default_headers(self) -> None:
+        ancestors = self.application.ancestors
+        self.set_header("Content-Security-Policy", CONTENT + ancestors)
+        self.set_header("X-Content-Type-Options", "nosniff")
+        self.set_header("Referrer-Policy", "no-referrer")
+        self.set_header("Cache-Control", "no-cache")  # asked for again, and not sent again
+        if ancestors == "'none'":
+            self.set_header("X-Frame-Options", "DENY")
+
+    def get(self) -> None:
+        self.set_header("Content-Type", f"{PROGRAMS[self.request.path]}; charset=utf-8")
+        self.finish(program(self.request.path))
+
+    head = get
 
 
-class _Refused(RequestHandler):
+class _Refused(_Program):
     def initialize(self, status: int) -> None:
         self.status = status
 
-    def prepare(self) -> Awaitable[None] | None:
+    def prepare(self) -> None:
         self.set_status(self.status)
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(REFUSALS[self.status])
-        return None
 
 
-class _Program(RequestHandler):
-    def get(self, name: str) -> None:
-        self.set_header("Content-Type", "text/javascript; charset=utf-8")
-        self.set_header("Cache-Control", "no-cache")  # asked for again, and not sent again
-        self.finish(program(name))
+class _Line(_Answer, WebSocketHandler):
+    """Between a page in a browser and what is computed for it."""
+
+    page: Page | None = None
+
+    def check_origin(self, origin: str) -> bool:
+        return True  # as the gate has found
+
+    def open(self, *_: str) -> None:
+        opened = self.application.opened
+        if len(opened) >= MOST_PAGES:
+            self._tell(message=FULL)
+            self.close()
+            return
+        given = self.request.arguments.items()
+        asked = {key: values[-1].decode(errors="replace") for key, values in given if key != "token" and values}
+        self.page = Page(self._tell, self.application.begin, asked)
+        opened.add(self.page)
+
+    def on_message(self, message: str | bytes) -> None:
+        if self.page is not None:
+            verb, *values = json.loads(message)
+            self.page.hears[verb](*values)
+
+    def on_close(self) -> None:
+        if self.page is not None:
+            self.page.close()
+            self.application.opened.discard(self.page)
+
+    def _tell(self, **what: Any) -> None:
+        with suppress(WebSocketClosedError):
+            sent = self.write_message(json.dumps(what, default=np.ndarray.tolist))
+            sent.add_done_callback(lambda done: done.cancelled() or done.exception())  # the page has gone
 
 
 class _Lines(HTTPServer):
@@ -288,7 +297,7 @@ class _OneLine(logging.Filter):
         super().__init__()
         self._thread, self._ends, self._said = threading.get_ident(), 0.0, 0
         names = ("asyncio", *logging.root.manager.loggerDict)
-        self._loggers = [logging.getLogger(n) for n in names if n.partition(".")[0] in ("asyncio", "bokeh", "tornado")]
+        self._loggers = [logging.getLogger(n) for n in names if n.partition(".")[0] in ("asyncio", "tornado")]
         for logger in self._loggers:
             logger.addFilter(self)
 

@@ -1,29 +1,17 @@
-"""What is computed for a page, each kind of work by a process of its own: it can be stopped, and ends with the page."""
+"""What is computed for a page, by processes of its own."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import resource
-import signal
 import tempfile
-import threading
-from collections.abc import Callable, Hashable
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
-from multiprocessing import forkserver, resource_tracker
-from multiprocessing.connection import Connection
-from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from tornado.ioloop import IOLoop
 
 from ...dynamics.continuation.map import equilibrium_map
 from ...dynamics.continuation.rotor_family import rotor_family
+from ...dynamics.equilibria.equilibrium import MODE_NAMES
 from ...dynamics.equilibria.search import survey
 from ...dynamics.flights.live import LiveFlight, Piece
 from ...geometry.common import Array, ComputationError, SpinlevError
@@ -34,17 +22,13 @@ from ..figures.pictures import drawn_field
 from ..figures.style import PAGE, PALETTE, figure_bytes, panels, styled
 from ..figures.view import field_lines
 from ..levitation import Levitation
-from ..processes import safe_path
 from ..result import Result, write_dataset
 from ..words import equilibria_rows, headline, left_out_words, worth_a_row
-from .state import MEASURES, PageState
+from .state import MEASURES, PageState, controls
 
 if TYPE_CHECKING:
-    from bokeh.document import Document
     from matplotlib.figure import Figure
 
-MEMORY = 4 * 2**30  # Bytes that a process may take
-PATIENCE = 10  # By how much a process is nicer than others that does not hurry
 SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)  # The box in which field lines are drawn, m
 ENDS = {
     "beyond": "left the region for which the plate's response was computed",
@@ -59,170 +43,13 @@ MODEL_WORDS = {
 }
 PLATE_WORDS = {"none": "without the plate's currents", "slab": "plate as an infinite slab"}
 PLATE_WORDS |= dict.fromkeys(("reduced", "fem"), "finite plate")
-MODE_COLUMNS = ("small motion", "frequency (Hz)", "growth (1/s)")
+MODE_COLUMNS = ("normal mode", "frequency (Hz)", "growth rate (s⁻¹)")
 FILES = {
     "toml": ("scene.toml", "text/plain"),
     "json": ("equilibria.json", "application/json"),
     "nc": ("equilibria.nc", "application/x-netcdf"),
     "png": ("explore.png", "image/png"),
 }  # What can be taken home: a file's name and its type
-
-
-@cache
-def context() -> ForkServerContext:
-    """Processes are copies of one that loads the numeric libraries from now on, and begin in hundredths of a second."""
-    found = multiprocessing.get_context("forkserver")
-    found.set_forkserver_preload([__name__])
-    with safe_path():
-        resource_tracker.ensure_running()
-        forkserver.ensure_running()
-    return found
-
-
-class Worker:
-    """A process that does one kind of work for a page, one thing after the other.
-
-    Parameters
-    ----------
-    document : of the page, in whose turn answers are received
-    words, seconds : what the work is, and after how long it is cut off; what takes longer is for the command line
-    failed : is told in a sentence why there is no answer
-    patience : by how much others go first
-    """
-
-    def __init__(
-        self, document: Document, words: str, seconds: float, failed: Callable[[str], None], patience: int = 0
-    ) -> None:
-        self.document, self.words, self.seconds, self.failed, self.patience = document, words, seconds, failed, patience
-        self.process: ForkServerProcess | None = None
-        self._waiting: dict[Hashable, tuple[Callable[[], tuple[Any, ...]], Callable[[Any], None]]] = {}
-        self._receive: Callable[[Any], None] | None = None
-        self._limit: Any = None
-
-    @property
-    def busy(self) -> bool:
-        """Whether an answer is still to come."""
-        return self._receive is not None
-
-    @property
-    def waits(self) -> bool:
-        """Whether a question still waits for its turn."""
-        return bool(self._waiting)
-
-    def ask(self, key: Hashable, call: Callable[[], tuple[Any, ...]], receive: Callable[[Any], None]) -> None:
-        """Compute something when its turn comes.
-
-        Parameters
-        ----------
-        key : an older question with this key that still waits is left out
-        call : gives the function and its arguments when the turn has come
-        receive : gets the answer
-        """
-        self._waiting.pop(key, None)
-        self._waiting[key] = call, receive
-        self._go_on()
-
-    def stop(self) -> None:
-        """End the process, whatever it is doing, and forget all questions."""
-        self._waiting.clear()
-        self._rest()
-        # First of all: a signal may come in between, and who stops everything then must not find half of it.
-        process, self.process = self.process, None
-        if process is not None:
-            self._loop.remove_handler(self._connection.fileno())
-            self._connection.close()
-            process.kill()
-            process.join()
-            process.close()
-
-    def _go_on(self) -> None:
-        if self.busy or not self._waiting:
-            return
-        if self.process is None:
-            self._begin()
-        call, self._receive = self._waiting.pop(next(iter(self._waiting)))
-        self._limit = self._loop.call_later(self.seconds, self._say, self.process, self._cut_off)
-        with suppress(BrokenPipeError, ConnectionResetError):  # it has ended, as `_listen` will find
-            self._connection.send(call())
-
-    def _begin(self) -> None:
-        self._loop = IOLoop.current()
-        self._connection, other = context().Pipe()
-        process = context().Process(target=_serve, args=(other, self.patience), daemon=True)
-        # A signal stops the main thread anywhere; a process that begins and is not told its task says so at length.
-        with ThreadPoolExecutor(1) as beside:
-            beside.submit(process.start).result()
-        other.close()
-        self.process = process
-        self._loop.add_handler(self._connection.fileno(), partial(self._listen, process), IOLoop.READ)
-
-    def _listen(self, process: ForkServerProcess, *_: object) -> None:
-        try:
-            answer, problem = self._connection.recv()
-        except (EOFError, ConnectionError):
-            self.stop()
-            why = "A computation was ended from outside; memory may be short."
-            self.document.add_next_tick_callback(lambda: self.failed(why))
-            return
-        self._say(process, lambda: self._answered(answer, problem))
-
-    def _say(self, process: ForkServerProcess | None, what: Callable[[], None]) -> None:
-        """In the document's turn, if the process is still the same."""
-        self.document.add_next_tick_callback(lambda: what() if self.process is process else None)
-
-    def _answered(self, answer: Any, problem: str) -> None:
-        receive = self._rest()
-        if problem:
-            self.failed(problem)
-        elif receive is not None:
-            receive(answer)
-        self._go_on()
-        if self.patience and not self.busy:  # gives its memory back; another one begins in hundredths of a second
-            self.stop()
-
-    def _rest(self) -> Callable[[Any], None] | None:
-        if self._limit is not None:
-            self._loop.remove_timeout(self._limit)
-        receive, self._receive, self._limit = self._receive, None, None
-        return receive
-
-    def _cut_off(self) -> None:
-        self.stop()
-        self.failed(f"{self.words} took longer than {self.seconds:g} s and was cut off.")
-
-
-def _serve(connection: Connection, patience: int) -> None:
-    os.nice(patience)
-    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    while True:
-        try:
-            function, *arguments = connection.recv()
-            answer, problem = None, ""
-            try:
-                answer = function(*arguments)
-            except SpinlevError as error:
-                problem = str(error)
-            except Exception as error:  # the last resort: the page says it
-                problem = f"The computation failed: {type(error).__name__}: {error}."
-            connection.send((answer, problem))
-        except (EOFError, BrokenPipeError, ConnectionResetError):  # the page has gone
-            return
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def build(state: PageState, method: str, arguments: tuple[Any, ...]) -> PageState:
-    """Another state, by a method of `PageState`."""
-    made: PageState = getattr(state, method)(*arguments)
-    made.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
-    return made
 
 
 @dataclass(frozen=True)
@@ -236,6 +63,16 @@ class Shown:
     places: list[tuple[list[float], list[float]]]  # position mm and direction of the moment at t = 0 of each
     left_out: list[str]  # which solutions are no equilibria, or not known to be, in sentences
     lines: list[Array] = field(default_factory=list)  # of the field, m, where they were asked for
+
+
+def become(state: PageState, method: str, arguments: tuple[Any, ...]) -> tuple[PageState, Shown | str]:
+    """Another state, by a method of `PageState`, and its preview, or why there is none."""
+    made: PageState = getattr(state, method)(*arguments)
+    made.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
+    try:
+        return made, preview(made)
+    except SpinlevError as error:
+        return made, str(error)
 
 
 def preview(state: PageState) -> Shown:
@@ -262,7 +99,11 @@ def _shown(levitation: Levitation) -> Shown:
     felt = levitation.plate.model if levitation.plate is not None else "none"
     plate = f", {PLATE_WORDS[felt]}" if levitation.scene.plate is not None else ""
     mutual = ", rotor and floater magnetise each other" if levitation.interaction_model == "mutual" else ""
-    modes = [(m.name, f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in useful[0].modes] if useful else []
+    modes = (
+        [(MODE_NAMES.get(m.name, m.name), f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in useful[0].modes]
+        if useful
+        else []
+    )
     return Shown(
         headline=headline(levitation, found, left_out),
         rows=equilibria_rows(levitation, found),
@@ -341,7 +182,7 @@ _flights: list[LiveFlight] = []  # The one of this process
 def begin_flight(state: PageState) -> Frame:
     """The first frame of a flight."""
     _flights[:] = [Levitation(state.scene, state.models, state.spin).live_flight()]
-    return _frame(_still())
+    return _frame()
 
 
 def fly(seconds: float) -> Frame:
@@ -349,7 +190,7 @@ def fly(seconds: float) -> Frame:
     try:
         return _frame(_flights[0].onward(seconds))
     except SpinlevError as error:
-        return replace(_frame(_still()), message=str(error), ended="stopped: the motion could not be computed")
+        return replace(_frame(), message=str(error), ended="stopped: the motion could not be computed")
 
 
 def wish(what: str, vector: list[float]) -> Frame:
@@ -357,20 +198,19 @@ def wish(what: str, vector: list[float]) -> Frame:
     try:
         getattr(_flights[0], what)(np.array(vector))
     except SpinlevError as error:
-        return replace(_frame(_still()), message=str(error))
-    return _frame(_still())
+        return replace(_frame(), message=str(error))
+    return _frame()
 
 
-def _still() -> Piece:
+def _frame(piece: Piece | None = None) -> Frame:
     flight = _flights[0]
-    lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
-    return Piece(np.array([flight.time]), lab, flight.scene.angular_velocity * flight.time, flight.ended_by)
-
-
-def _frame(piece: Piece) -> Frame:
-    flight = _flights[0]
+    if piece is None:  # nothing was flown
+        now = flight.now
+        lab = type(now)(*(vector[None] for vector in now.vectors))
+        angle = flight.scene.angular_velocity * flight.time
+        piece = Piece(np.array([flight.time]), lab, angle, flight.ended_by)
     places, moments = piece.lab.position, piece.lab.moment
-    now = piece.lab.to_rotor(flight.scene.angular_velocity * piece.time)
+    seen = piece.lab.to_rotor(flight.scene.angular_velocity * piece.time).position
     words = ENDS.get(piece.ended_by, "")
     return Frame(
         time=piece.time,
@@ -378,27 +218,14 @@ def _frame(piece: Piece) -> Frame:
         tilt=np.degrees(np.arctan2(np.hypot(moments[:, 0], moments[:, 1]), moments[:, 2])),
         position=(1e3 * places[-1]).tolist(),
         moment=moments[-1].tolist(),
-        seen=(1e3 * now.position[-1]).tolist(),
+        seen=(1e3 * seen[-1]).tolist(),
         angle=float(np.fmod(piece.angle, 2 * np.pi)),
         ended=f"After {flight.time:.3g} s {words}." if words else "",
     )
 
 
-@dataclass(frozen=True)
-class Screen:
-    """What is on a page's screen."""
-
-    shown: Shown | None
-    regions: Regions | None
-    axes: tuple[str, str]  # names of frequency and measure
-    point: tuple[float, float]  # what they are now
-    time: Array  # of the flight so far, s
-    height: Array  # mm
-    tilt: Array  # degrees
-
-
-def content(kind: str, state: PageState, screen: Screen | None = None) -> bytes:
-    """The content of a file of `FILES`, which the command line computes alike; `screen` for a picture of it.
+def content(kind: str, state: PageState, shown: Shown | None, regions: Regions | None, samples: Array) -> bytes:
+    """The content of a file of `FILES`, which the command line computes alike; a picture is of what the page shows.
 
     Raises
     ------
@@ -407,8 +234,7 @@ def content(kind: str, state: PageState, screen: Screen | None = None) -> bytes:
     if kind == "toml":
         return scene_text(state.scene).encode()
     if kind == "png":
-        assert screen is not None
-        return figure_bytes(screen_figure(screen, state), "png")
+        return figure_bytes(screen_figure(state, shown, regions, samples), "png")
     levitation = Levitation(state.scene, state.models, state.spin)
     result = Result(levitation, levitation.survey)
     if kind == "json":
@@ -422,31 +248,30 @@ def content(kind: str, state: PageState, screen: Screen | None = None) -> bytes:
 
 
 @styled
-def screen_figure(screen: Screen, state: PageState) -> Figure:
-    """Map, running plots and the headline."""
+def screen_figure(state: PageState, shown: Shown | None, regions: Regions | None, samples: Array) -> Figure:
+    """Map, numbers and trajectory, (3, n) time s, height mm and polar angle °."""
     from matplotlib.colors import ListedColormap
 
     figure, ((chart, height), (words, tilt)) = panels(2, 2, (PAGE, 4.6))
-    words.set_title("")
-    said, lines = "No equilibrium is known.", []
-    if (known := screen.shown) is not None:
-        said, lines = known.headline, [f"By: {known.sign}", f"spinlev equilibria scene.toml {state.command}"]
-        for table in (known.rows, known.modes):
+    if shown is not None:
+        figure.suptitle(shown.headline, fontsize=8, x=0.01, ha="left", wrap=True)
+        lines = [f"By: {shown.sign}", f"spinlev equilibria scene.toml {state.command}"]
+        for table in (shown.rows, shown.modes):
             widths = [max(map(len, column)) for column in zip(*table, strict=False)]
             lines += ["", *(" ".join(map(str.rjust, row[:4], widths)) for row in table)]
-    figure.suptitle(said, fontsize=8, x=0.01, ha="left", wrap=True)
-    words.text(0, 1, "\n".join(lines), va="top", fontsize=6, family="monospace")
+        words.text(0, 1, "\n".join(lines), va="top", fontsize=6, family="monospace")
+    words.set(title="")
     words.set_axis_off()
-    if (mapped := screen.regions) is None:
+    if regions is None:
         chart.set_axis_off()
     else:
+        frequency, measure = controls(state)[:2]
         look: dict[str, Any] = {"cmap": ListedColormap(["white", "#D8DEE9", PALETTE[5]]), "vmin": 0, "vmax": 2}
-        chart.pcolormesh(mapped.frequencies, mapped.measures, mapped.kind.T, rasterized=True, **look)
-        chart.plot(*screen.point, "o", color=PALETTE[1])
-        chart.set(xlabel=screen.axes[0], ylabel=screen.axes[1], title=f"(a) stable regions ({mapped.model})")
-    for axes, values, label in ((height, screen.height, "Height (mm)"), (tilt, screen.tilt, "Tilt of the moment (°)")):
-        axes.plot(screen.time, values)
+        chart.pcolormesh(regions.frequencies, regions.measures, regions.kind.T, rasterized=True, **look)
+        chart.plot(frequency.value, measure.value, "o", color=PALETTE[1])
+        title = f"(a) stable regions ({MODEL_WORDS[regions.model]})"
+        chart.set(xlabel=frequency.title, ylabel=measure.title, title=title)
+    for axes, values, label in ((height, samples[1], "Height (mm)"), (tilt, samples[2], "Polar angle (°)")):
+        axes.plot(samples[0], values)
         axes.set(xlabel="Time (s)", ylabel=label)
-        if not len(values):
-            axes.text(0.5, 0.5, "no flight yet", transform=axes.transAxes, ha="center", color="grey")
     return figure

@@ -9,14 +9,14 @@ import time
 
 import pytest
 
-from spinlev.studies.page.work import Worker
+from spinlev.studies.page.worker import Worker
 
 
-class Turns:
-    """A document whose turn it always is."""
-
-    def add_next_tick_callback(self, call):
-        call()
+async def begun(worker):
+    """The process of a worker, when it is there."""
+    while worker.process is None:
+        await asyncio.sleep(0.01)
+    return worker.process
 
 
 def said_by(ask, seconds=60.0):
@@ -24,7 +24,7 @@ def said_by(ask, seconds=60.0):
 
     async def listen():
         said = []
-        worker = Worker(Turns(), "The work", seconds, said.append)
+        worker = Worker("The work", seconds, said.append)
         ask(worker, said.append)
         while not said:
             await asyncio.sleep(0.01)
@@ -36,7 +36,7 @@ def said_by(ask, seconds=60.0):
 def test_questions_are_answered_in_turn_and_newer_ones_take_the_place_of_those_that_wait():
     async def listen():
         said = []
-        worker = Worker(Turns(), "The work", 60.0, said.append)
+        worker = Worker("The work", 60.0, said.append)
         for number in range(5):
             worker.ask("root", lambda number=number: (math.sqrt, number), said.append)
         worker.ask("other", lambda: (math.sqrt, 100), said.append)
@@ -59,8 +59,9 @@ def test_a_stop_that_is_interrupted_may_be_repeated():
     """As by SIGTERM while an idle process is ended: the server then ends all of them, this one too."""
 
     async def listen():
-        worker = Worker(Turns(), "The work", 60.0, print)
+        worker = Worker("The work", 60.0, print)
         worker.ask("", lambda: (math.sqrt, 4), print)
+        process = await begun(worker)
         close = worker._connection.close  # where the signal comes
 
         def struck():
@@ -68,7 +69,6 @@ def test_a_stop_that_is_interrupted_may_be_repeated():
             raise KeyboardInterrupt
 
         worker._connection.close = struck
-        process = worker.process
         with pytest.raises(KeyboardInterrupt):
             worker.stop()
         worker.stop()
@@ -82,7 +82,7 @@ def test_a_stop_that_is_interrupted_may_be_repeated():
 def test_idle_processes_of_work_that_is_not_in_a_hurry_end():
     async def listen():
         said = []
-        workers = [Worker(Turns(), "The work", 60.0, said.append, patience) for patience in (0, 10)]
+        workers = [Worker("The work", 60.0, said.append, patience) for patience in (0, 10)]
         for worker in workers:
             worker.ask("", lambda: (math.sqrt, 4), said.append)
         while len(said) < 2 or any(worker.busy for worker in workers):
@@ -109,9 +109,9 @@ def test_work_that_takes_too_long_is_cut_off():
 def test_a_process_at_work_ends_when_it_is_told():
     async def begin():
         heard = []
-        worker = Worker(Turns(), "The work", 60.0, heard.append)
+        worker = Worker("The work", 60.0, heard.append)
         worker.ask("", lambda: (time.sleep, 100), heard.append)
-        number = worker.process.pid
+        number = (await begun(worker)).pid
         worker.stop()
         return number, heard
 
@@ -122,11 +122,13 @@ def test_a_process_at_work_ends_when_it_is_told():
 
 BEGUN = """
 import asyncio, time
-from spinlev.studies.page.work import Worker
+from spinlev.studies.page.worker import Worker
 
 async def begin():
-    worker = Worker(None, "", 60.0, print)
+    worker = Worker("", 60.0, print)
     worker.ask("", lambda: (time.sleep, 100), print)
+    while worker.process is None:
+        await asyncio.sleep(0.01)
     print(worker.process.pid, flush=True)
     await asyncio.sleep(100)
 
@@ -147,7 +149,7 @@ def test_a_process_at_work_ends_with_a_program_that_is_killed():
 STRUCK = """
 import asyncio, os, signal, time
 from multiprocessing import forkserver
-from spinlev.studies.page.work import Worker
+from spinlev.studies.page.worker import Worker
 
 def stopped(*_):
     raise KeyboardInterrupt
@@ -159,7 +161,8 @@ def struck(descriptors, connect=forkserver.connect_to_new_process):
     return found
 
 async def begin():
-    Worker(None, "", 60.0, print).ask("", lambda: (time.sleep, 100), print)
+    Worker("", 60.0, print).ask("", lambda: (time.sleep, 100), print)
+    await asyncio.sleep(100)
 
 signal.signal(signal.SIGTERM, stopped)
 forkserver.connect_to_new_process = struck

@@ -15,7 +15,6 @@ from spinlev.studies.levitation import Levitation
 from spinlev.studies.page.state import first_state
 from spinlev.studies.page.work import (
     SIGHT,
-    Screen,
     begin_flight,
     complete,
     content,
@@ -29,6 +28,8 @@ from spinlev.studies.page.work import (
 from spinlev.studies.run import equilibria_job
 from spinlev.studies.words import left_out_words
 
+NOTHING = None, None, np.zeros((3, 0))
+"""On a page's screen."""
 STATE = replace(first_state(load_scene(OVER_PLATE)), plate_model="none")
 
 
@@ -127,12 +128,13 @@ def test_a_flight_that_cannot_begin_says_why():
 
 def test_files_to_take_home_are_those_of_the_command_line(tmp_path):
     values, _ = equilibria_job(STATE.scene, STATE.models, STATE.spin, tmp_path)
-    assert json.loads(content("json", STATE)) == json.loads((tmp_path / "equilibria.json").read_text())
-    (tmp_path / "result.nc").write_bytes(content("nc", STATE))
+    assert json.loads(content("json", STATE, *NOTHING)) == json.loads((tmp_path / "equilibria.json").read_text())
+    (tmp_path / "result.nc").write_bytes(content("nc", STATE, *NOTHING))
     with xr.open_dataset(tmp_path / "result.nc") as dataset:
         assert (1e3 * dataset.position[0]).values == pytest.approx(values["equilibria"][0]["position_mm"], rel=1e-12)
         assert dataset.attrs["model"] == "dipole"
     moved = STATE.changed("frequency_hz", 133.0)
-    assert parse_scene(content("toml", moved).decode()).frequency == 133.0
-    screen = Screen(None, None, ("Frequency (Hz)", "Tilt (°)"), (130.0, 10.0), *[np.zeros(0)] * 3)
-    assert content("png", STATE, screen).startswith(b"\x89PNG")
+    assert parse_scene(content("toml", moved, *NOTHING).decode()).frequency == 133.0
+    shown, found = preview(STATE), regions(STATE, ((100.0, 160.0), (6.0, 18.0)), "dipole", 5)
+    for screen in (NOTHING, (shown, found, np.ones((3, 5)))):
+        assert content("png", STATE, *screen).startswith(b"\x89PNG")
