@@ -127,9 +127,9 @@ def _arrow(
 
 def members() -> dict[str, set[str]]:
     """What each public member of `Levitation` asks of the others."""
-    trees = [ast.parse((ROOT / "studies" / f"{name}.py").read_text()) for name in ("scene_tables", "levitation")]
-    bodies = [n for tree in trees for n in tree.body if getattr(n, "name", "") in ("SceneTables", "Levitation")]
-    functions = {node.name: node for body in bodies for node in body.body if isinstance(node, ast.FunctionDef)}
+    tree = ast.parse((ROOT / "studies" / "levitation.py").read_text())
+    (body,) = (node for node in tree.body if getattr(node, "name", "") == "Levitation")
+    functions = {node.name: node for node in body.body if isinstance(node, ast.FunctionDef)}
     uses = {
         name: {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "self"}
         for name, node in functions.items()

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .common import millimetres
+from .common import Array, millimetres
 from .magnets import Magnet
 from .overlap import TOUCHING, body_overlap
 from .shapes import Box, rotation_matrix
@@ -15,57 +16,29 @@ X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 Rotor = tuple[Magnet, ...]
 
 
-def _solid(body: float | Solid) -> Solid:
-    """The cube of an edge about the origin, or the body that stands for it."""
-    return Box(np.full(3, body)) if isinstance(body, int | float) else body
-
-
-def horizontal(
-    displacement: float,
-    body: float | Solid,
-    remanence: float,
-    recoil_permeability: float,
-    transverse_permeability: float | None = None,
-) -> Rotor:
+def horizontal(displacement: float, body: float | Solid, *material: float | None) -> Rotor:
     """One cube magnetised along +x, `displacement` off the axis along +x; its edge, or a body in its place.
 
-    Its material has a `remanence` (T), a `recoil_permeability` and across the easy axis a `transverse_permeability`.
+    Of its `material` the remanence (T), the recoil permeability and, if it is another, that across the easy axis.
     """
-    body = moved(_solid(body), displacement * X)
-    return (Magnet(body, remanence * X, recoil_permeability, transverse_permeability),)
+    return (_magnet(body, X, material, center=displacement * X),)
 
 
-def vertical(
-    displacement: float,
-    body: float | Solid,
-    remanence: float,
-    recoil_permeability: float,
-    transverse_permeability: float | None = None,
-) -> Rotor:
-    """A cube at the origin magnetised along +x and one `displacement` above it along +z; their edge, or a body.
-
-    Their material has a `remanence` (T), a `recoil_permeability` and across the easy axis a `transverse_permeability`.
-    """
-    material = (recoil_permeability, transverse_permeability)
-    return (
-        Magnet(moved(_solid(body), 0 * X), remanence * X, *material),
-        Magnet(moved(_solid(body), displacement * Z), remanence * Z, *material),
-    )
+def vertical(displacement: float, body: float | Solid, *material: float | None) -> Rotor:
+    """A cube at the origin magnetised along +x and one `displacement` above it along +z; `material` as `horizontal`."""
+    return _magnet(body, X, material), _magnet(body, Z, material, center=displacement * Z)
 
 
-def tilt(
-    angle: float,
-    body: float | Solid,
-    remanence: float,
-    recoil_permeability: float,
-    transverse_permeability: float | None = None,
-) -> Rotor:
-    """One cube at the origin, body and magnetisation turned to (cos angle, 0, sin angle); its edge, or a body.
+def tilt(angle: float, body: float | Solid, *material: float | None) -> Rotor:
+    """One cube at the origin, body and magnetisation turned to (cos angle, 0, sin angle); as `horizontal`."""
+    return (_magnet(body, X, material, rotation=rotation_matrix((0.0, -np.degrees(angle), 0.0))),)
 
-    Its material has a `remanence` (T), a `recoil_permeability` and across the easy axis a `transverse_permeability`.
-    """
-    turned = moved(_solid(body), 0 * X, rotation_matrix((0.0, -np.degrees(angle), 0.0)))
-    return (Magnet(turned, remanence * X, recoil_permeability, transverse_permeability),)
+
+def _magnet(
+    body: float | Solid, easy: Array, material: Sequence[Any], center: Array = 0 * X, rotation: Array | None = None
+) -> Magnet:
+    cube = Box(np.full(3, body)) if isinstance(body, int | float) else body
+    return Magnet(moved(cube, center, rotation), material[0] * easy, *material[1:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from .cli.options import Models
 from .figures.pictures import plate_currents
 from .figures.style import NAMES, PAGE, panels, save_figures, styled
 from .levitation import Levitation
+from .plan import sources
 from .result import write_dataset
-from .scene_tables import sources
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

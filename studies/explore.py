@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..geometry.common import ComputationError
 from ..geometry.scene.contents import Scene
 from .cli.console import missing_extra
-from .scene_tables import SceneLike, given_scene
+from .plan import SceneLike, given_scene
 
 if TYPE_CHECKING:
     from .page.server import Pages

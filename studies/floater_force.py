@@ -14,8 +14,8 @@ from ..geometry.solids import moved
 from .cli.console import heard, note
 from .cli.options import FieldModel, Models
 from .levitation import Levitation
+from .plan import SceneLike
 from .result import AXIS, variable
-from .scene_tables import SceneLike
 
 COARSE = 12  # degree of the rule whose difference from the full one is the error of the sums
 

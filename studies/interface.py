@@ -35,10 +35,10 @@ from .cli.options import (
 )
 from .demagnetising import working_point_dataset
 from .levitation import Levitation
+from .plan import SceneLike, given_scene
 from .processes import mapped
 from .question import Question
 from .result import AXIS, Result, found_dataset, state_columns, variable
-from .scene_tables import SceneLike, given_scene
 from .starts import drawn_starts, given_starts
 from .study import Point, Study
 from .sweep import forget, swept

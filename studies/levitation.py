@@ -1,38 +1,55 @@
-"""Equilibria and trajectory of one scene, and the table of its plate's currents, which follows the floater."""
+"""Field, effects, equilibria and trajectory of one scene, and its plate's currents, which follow the floater."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, cast
 
 import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
-from ..dynamics.equilibria.search import free_of_bodies, with_plate
-from ..dynamics.flights.flight import Checkpoint, initial_state, simulate, starting_point
+from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
+from ..dynamics.flights.flight import Checkpoint, initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
+from ..dynamics.motion.effect import Interaction, interaction_of
+from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, mutual_choice, with_effects
+from ..dynamics.motion.equations import FORCE_ALONE
 from ..dynamics.motion.events import plate_depth
 from ..dynamics.motion.plate import PlateMemory
+from ..dynamics.motion.rates import Rates
+from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
+from ..fem.mutual.making import cached_mutual_table, mutual_key
+from ..fem.mutual.table import MutualTable
 from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
+from ..fem.rotor.choice import cached_rotor_table, resolve_model, rotor_table
 from ..fem.rotor.models import AccuracyError
-from ..fem.rotor.table import RotorTable
-from ..geometry.common import Array, SpinlevError, Watch
+from ..fem.rotor.table import FieldTable, RotorTable
+from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
+from ..geometry.common import Array, SpinlevError, Watch, unwatched
 from ..geometry.scene.contents import AbsoluteStart, Plate, Scene
-from .cli.console import detail, note, progress
-from .cli.options import Models, positive
+from .cli.console import detail, note, progress, stages
+from .cli.options import FieldModel, Models, finite, positive
 from .plan import (
     RotorField,
+    SceneLike,
+    SharedTables,
     check_room,
+    check_way,
+    equations_key,
     far_plan,
+    field_key,
+    given_scene,
     looser,
+    map_of,
+    nearest_faces,
     plate_plan,
+    sources,
 )
-from .scene_tables import SceneLike, SceneTables, SharedTables, sources
 
 AHEAD = 1.0  # of a trajectory, s, that is looked at beforehand
 PLACES = 50  # on a trajectory, at which the error by a slab's missing edges is looked at
@@ -68,7 +85,7 @@ def plate_memory(
     return PlateMemory(asked.plate, made, share, model, edges)
 
 
-class Levitation(SceneTables):
+class Levitation:
     """Equilibria, stability and trajectory of one scene by the models that are asked for.
 
     Every member is computed when it is first used and then kept: the rotor's `table`, the `survey` of all equilibria,
@@ -87,7 +104,11 @@ class Levitation(SceneTables):
     """
 
     def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
-        super().__init__(scene, models, spin)
+        self.scene = given_scene(scene)
+        self.models = models.checked()
+        self.spin = finite("spin", spin)
+        self.searched = True  # whether the equilibria were searched for; else they were carried here from scenes nearby
+        self._tables = SharedTables()
         # The plate's currents for all of a flight's way, where it left the range of `plate`.
         self.wider: PlateMemory | None = None
         self.no_wider = ""  # why they could not be known, if so
@@ -132,6 +153,137 @@ class Levitation(SceneTables):
         """Names of the models, for a result."""
         plate = self.plate.model if self.plate else "none"
         return {"model": self.table.model, "plate_model": plate, "interaction": self.interaction_model}
+
+    # The rotor's field and what else acts
+
+    @cached_property
+    def table(self) -> RotorField:
+        """The rotor's field by the model that was asked for; `auto` chooses and says why."""
+        return self.field(self.models.model)
+
+    def field(self, model: str) -> RotorField:
+        """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on.
+
+        Raises
+        ------
+        InputError : the map cannot be used
+        """
+        scene, rtol, nearest = self.scene, self.models.rtol, nearest_faces(self.scene.floater)
+        if model == "map":
+            return self._tables.once(field_key(scene, model, rtol), lambda: map_of(scene))
+        chosen = partial(resolve_model, scene.rotor, model, rtol, nearest)
+        name, reason = self._tables.once(f"model {field_key(scene, model, rtol)}", chosen)
+        if model == "auto":
+            detail(f"Field model: {name} ({reason})")
+        key = field_key(scene, name, rtol)
+        if name == "fem":
+            make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest)
+            return self._tables.table(key, name, "Rotor's field by finite elements", make)
+        return self._tables.once(key, lambda: rotor_table(scene.rotor, name, rtol, nearest))
+
+    @cached_property
+    def answers(self) -> tuple[MutualTable | None, str]:
+        """Mutual magnetisation of rotor and floater, or None; and why."""
+        scene = self.scene
+        known, why = mutual_choice(scene, self.table, self.models.interaction, self.models.rtol)
+        if not known:
+            return None, why
+        key, make = (
+            mutual_key(scene.rotor, scene.floater),
+            partial(cached_mutual_table, scene.rotor, scene.floater, note),
+        )
+        return self._tables.table(key, "mutual", "Mutual magnetisation of rotor and floater", make), why
+
+    def _has_metal(self) -> bool:
+        """Whether metal turns with the rotor, once it and the floater are found fit for a table of losses."""
+        scene, pieces = self.scene, pieces_of(self.scene.rotor, self.scene.conductors)
+        if pieces:
+            scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
+            check_metal(pieces, scene.frequency, scene.floater.radius)
+        return bool(pieces)
+
+    @cached_property
+    def losses(self) -> RotorLosses | None:
+        """The losses in the rotor's metal, or None where none has a conductivity.
+
+        Raises
+        ------
+        InputError : the rotor turns too fast for its metal, or the floater is no sphere
+        """
+        if not self._has_metal():
+            return None
+        make = partial(cached_rotor_losses, self.scene, note)
+        return self._tables.table(losses_key(self.scene), "rotor losses", "Eddy currents in the rotor", make)
+
+    @cached_property
+    def interaction(self) -> Interaction:
+        """The rotor's field with what else acts on the floater.
+
+        Raises
+        ------
+        InputError : mutual magnetisation is asked for where it cannot be known, or the floater is a cuboid
+        """
+        self.scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
+        self._has_metal()  # refused before the field's table is made, which takes minutes
+        return self._with_effects(self.table)
+
+    def _with_effects(self, table: RotorField) -> Interaction:
+        answers, effects = self.answers[0], interaction_of(table)
+        if answers is not None:
+            effects = effects.joined(Mutual(answers, self.scene.floater.moment))
+        if self.losses is not None:
+            effects = effects.joined(RotorCurrents(self.losses))
+        return with_effects(self.scene, effects)
+
+    @cached_property
+    def equations_key(self) -> str:
+        """All that decides tables and equations; scenes where it is the same differ in parameters of the motion."""
+        return equations_key(self.scene, self.models)
+
+    @property
+    def rates(self) -> Rates:
+        """The equations of motion in the rotor's field, compiled."""
+        return self._tables.once(f"rates {self.equations_key}", lambda: Rates(self.interaction))
+
+    # Equilibria
+
+    @cached_property
+    def without_plate(self) -> Survey:
+        """All equilibria as if there were no plate.
+
+        Raises
+        ------
+        EquilibriumError : the rotor is at rest
+        InputError : a conductor is in the floater's way, or the rotor turns too fast for its metal
+        """
+        interaction = self.interaction
+        note("Equilibria ...")
+        with stages("Equilibria") as watch:
+            watch("compiling the equations of motion", 0.0)
+            found = self._searched(interaction, self.equations_key, watch, self.rates)
+        place = most_like_levitation(found.equilibria)
+        if place is not None:
+            check_way(self.scene, place.position)
+        return found
+
+    def survey_in(self, model: str) -> Survey:
+        """All equilibria in the rotor's field alone by a model: without plate and without all that it brings about."""
+        models = replace(self.models, model=cast(FieldModel, model), interaction="rigid")
+        key = equations_key(self.scene, models)
+        return self._searched(self.field(model), f"alone {key}", unwatched)
+
+    def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
+        """All equilibria in a table, from the cache if they were searched for before."""
+
+        def remembered(search: Callable[[], FixedPoints]) -> FixedPoints:
+            if self.scene.field_map:  # no number in a key stands for how a map is fitted
+                return search()
+            found, known = cached_points(self.scene, equations, self.spin, search, note)
+            if known:
+                detail("  from the cache.")
+            return found
+
+        return survey(self.scene, table, self.spin, rates=rates, remembered=remembered, watch=watch)
 
     @cached_property
     def survey(self) -> Survey:

@@ -1,4 +1,4 @@
-"""Which models a scene's motion is computed by, each with its reason, and what decides the tables that it needs.
+"""Which models a scene's motion is computed by, each with its reason, and the tables that scenes share.
 
 The rotor's field is the cheapest that meets the tolerance (`resolve_model`); rotor and floater magnetise each other
 where that matters at this tolerance (`mutual_choice`); the plate is an obstacle, an infinite slab or the network of the
@@ -7,24 +7,30 @@ far off, for all of its way.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..dynamics.motion.plate import PlateMemory
-from ..fem.maps_of_B.table import GriddedTable
+from ..fem.maps_of_B.table import GriddedTable, map_table
 from ..fem.mutual.making import mutual_key
 from ..fem.plate.choice import resolve_plate_model
 from ..fem.plate.table import Region
 from ..fem.rotor.table import ROTOR, RotorTable
 from ..fem.rotor_metal import losses_key, pieces_of
-from ..geometry.common import Array, InputError, millimetre_size
+from ..geometry.common import Array, InputError, Watch, millimetre_size, shown
 from ..geometry.overlap import TOUCHING, sphere_overlap
 from ..geometry.scene.contents import Floater, Scene
-from ..geometry.scene.files import map_digest
-from .cli.console import detail, note
+from ..geometry.scene.files import check_files, load_scene, map_digest
+from .cli.console import detail, note, stages
 from .cli.options import Models
 
+Made = TypeVar("Made")
+SceneLike = Scene | str | Path  # a scene, or the path of its file
 RotorField = RotorTable | GriddedTable  # a rotor's table: computed, or from a map
 # Radii for which tables are made: that of the article's floater, m, and so many times the one before.
 ARTICLE_RADIUS, STEP = 6.35e-3, 2 ** (1 / 8)
@@ -35,6 +41,58 @@ PLATE_WORDS = {
     "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
     "reduced": "finite, {size}",
 }
+
+
+class SharedTables:
+    """Tables and equations for any number of scenes to share; a scene finds those that were made for what it needs."""
+
+    def __init__(self) -> None:
+        self.from_cache: list[str] = []  # names of the tables that were found in the user's cache
+        self._known: dict[str, Any] = {}
+
+    def once(self, key: str, make: Callable[[], Made]) -> Made:
+        """The thing of this key, made now unless it was made for another scene."""
+        if key not in self._known:
+            self._known[key] = make()
+        made: Made = self._known[key]
+        return made
+
+    def table(self, key: str, name: str, title: str, make: Callable[[Watch], tuple[Made, bool]]) -> Made:
+        """A table under its `key`, reported by `title`; `make` says whether it was cached, as which `name` is noted."""
+
+        def told() -> Made:
+            note(f"{title} ...")
+            begun = perf_counter()
+            with stages(title) as watch:
+                made, found = make(watch)
+            note("  from the cache." if found else f"  done in {perf_counter() - begun:.1f} s.")
+            if found and name not in self.from_cache:
+                self.from_cache.append(name)
+            return made
+
+        return self.once(key, told)
+
+
+def given_scene(scene: SceneLike) -> Scene:
+    """A scene as it is, or from the path of its file. Raises SceneError, and InputError for anything else."""
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, str | Path):
+        return load_scene(scene)
+    raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {shown(scene)}.")
+
+
+def sources(table: RotorField) -> RotorTable:
+    """The closed forms and expansions that make a table's field."""
+    return table.expansions if isinstance(table, GriddedTable) else table
+
+
+def map_of(scene: Scene) -> GriddedTable:
+    """The table of a scene's map of the field. Raises SceneError where it was replaced since the scene was read."""
+    note("Rotor's field from its map ...")
+    table = map_table(scene.field_map, scene.rotor, scene.map_reading)
+    check_files(scene)  # the map may have been replaced since the scene was read
+    return table
 
 
 @dataclass(frozen=True, eq=False)

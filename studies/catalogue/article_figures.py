@@ -16,8 +16,8 @@ from ...dynamics.flights.flight import simulate
 from ...geometry.common import Array
 from ..figures.style import DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
 from ..levitation import Levitation
+from ..plan import sources
 from ..result import Columns, variable
-from ..scene_tables import sources
 from ..study import Point, Study, case_with, cases_with, recorded
 from .article import (
     CONFIGURATIONS,

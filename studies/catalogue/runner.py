@@ -33,10 +33,10 @@ from ..figures.run import (
 from ..figures.style import save_figures
 from ..figures.view import SEEN, Currents, current_places, near_plate
 from ..levitation import Levitation
+from ..plan import sources
 from ..question import Question
 from ..result import write_dataset
 from ..run import Job
-from ..scene_tables import sources
 from ..study import Point, Study
 from ..sweep import forget, swept
 from .entries import CATALOGUE

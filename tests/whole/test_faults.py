@@ -263,9 +263,9 @@ def test_a_full_disk_behind_standard_output(spinlev, capsys):
 PHASES = {
     "table": ("spinlev.fem.rotor.choice.rotor_table", FIELD),
     "table, when it is written": ("spinlev.fem.cache.write_whole", FIELD),
-    "equilibria": ("spinlev.studies.scene_tables.survey", WRITERS["equilibria.json"]),
+    "equilibria": ("spinlev.studies.levitation.survey", WRITERS["equilibria.json"]),
     "files": ("spinlev.studies.run.write_whole", WRITERS["equilibria.json"]),
-    "sweep": ("spinlev.studies.scene_tables.rotor_table", SWEEP),
+    "sweep": ("spinlev.studies.levitation.rotor_table", SWEEP),
     "sweep, when a point is kept": ("spinlev.studies.sweep.write_whole", SWEEP),
     "sweep, when all are joined": ("spinlev.studies.catalogue.runner.write_dataset", SWEEP),
     "figures": ("spinlev.studies.catalogue.runner.save_figures", SWEEP),
