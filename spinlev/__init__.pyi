@@ -17,6 +17,7 @@ from .studies.cli.options import Models as Models
 from .studies.explore import explore as explore
 from .studies.floater_force import floater_force as floater_force
 from .studies.interface import (
+    compare as compare,
     draw as draw,
     ensemble as ensemble,
     equilibria as equilibria,

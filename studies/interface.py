@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
+import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -33,6 +34,7 @@ from .cli.options import (
     finite,
     positive,
 )
+from .compare import compared, compared_dataset
 from .demagnetising import working_point_dataset
 from .levitation import Levitation
 from .plan import SceneLike, given_scene
@@ -77,6 +79,55 @@ def equilibria(
     levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
     found = Result(levitation, levitation.survey).dataset()
     return found.assign_attrs(study="equilibria", scene=scene_text(levitation.scene))
+
+
+@documented
+def compare(
+    scene: SceneLike,
+    frequencies: Sequence[float] | None = None,
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    rtol: float = Models.rtol,
+    plate_rtol: float = Models.plate_rtol,
+    progress: bool = False,
+) -> xr.Dataset:
+    """Every field model's answers about one scene, under the same conditions: may the point dipole be used for it?
+
+    Parameters
+    ----------
+    scene
+    frequencies : sequence of float, optional
+        (n,) of the rotor, Hz, for the branches; left out: about the stable ones.
+    plate_model, spin, rtol, plate_rtol, progress
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `model` (dipole; dipole of the true moment; cuboid with μr = 1; finite elements; with mutual magnetisation)
+        and, for the branch on which the floater levitates, over `frequency` (Hz): distance (m), polar angle (°), growth
+        rate (1/s), range of stable frequencies (Hz). NaN where a model has no such equilibrium.
+
+    Raises
+    ------
+    EquilibriumError
+        The rotor is at rest.
+    InputError
+        A frequency, a model, a tolerance or a file that cannot be used.
+
+    Examples
+    --------
+    >>> import spinlev as sl
+    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
+    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+    >>> found = sl.compare(sl.scene(frequency_hz=130.0, rotor=cube, floater=ball), [120.0, 130.0])
+    >>> (1e3 * found.distance.sel(model=["dipole", "cuboid"])).round(2).values.tolist()
+    [18.84, 19.11]
+    """
+    grid = None if frequencies is None else np.array(checked_values({"frequencies": frequencies})["frequencies"])
+    if grid is not None and grid.min() <= 0:
+        raise InputError(f"Input frequencies must be positive; instead received {grid.min():g}.")
+    asked = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
+    return compared_dataset(compared(given_scene(scene), asked, spin), grid)
 
 
 @documented

@@ -338,6 +338,14 @@ class Levitation:
                 return far
         return self._plate_memory(place, plan.model, plan.rtol, plan.edges, plan.region)
 
+    def use_plate_of(self, other: Levitation) -> None:
+        """Take the model and the region of another's plate, so that both have one network of its currents."""
+        known, rtol = other.plate, self.models.plate_rtol
+        if known is not None:
+            region = known.table.region
+            known = self._plate_memory(np.zeros(3), known.model, rtol, known.neglected, region)
+        self.plate = known
+
     def _plate_memory(self, place: Array, model: str, rtol: float, edges: float, region: Region | None) -> PlateMemory:
         assert self.scene.plate is not None
         table = sources(self.table)

@@ -17,7 +17,7 @@ from ...fem.rotor.choice import rotor_table
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
-from ..equilibria.equilibrium import FOLD, Equilibrium, EquilibriumError
+from ..equilibria.equilibrium import FOLD, MARGINAL, Equilibrium, EquilibriumError
 from ..equilibria.path import Steps
 from ..equilibria.search import find_equilibria
 from ..motion.effects import with_effects
@@ -36,8 +36,6 @@ REACH = (8e-3, 0.15)  # Distances on the axis between which the attraction is lo
 LOWEST, HIGHEST = 25.0, 400.0  # Frequencies between which is looked for ranges of stability, Hz
 # Ends of a range beside those that `follow_branch` marks: the floater touches the rotor; nobody looked beyond.
 CONTACT, BORDER = "contact", "border"
-# Growth that counts as stable, 1/s: more than what the error of finite elements makes of undamped motion.
-TOLERATED = 0.02
 # Along a branch, and along one that is known from one that is near.
 STEPS, LONG_STEPS = Steps(longest=0.1, turn=0.15), Steps(longest=0.4, turn=0.3)
 WIDEST = 2.0  # Ratio of frequencies, up and down, within which one that works is looked for
@@ -71,9 +69,9 @@ class Branch:
         return found
 
 
-def by_frequency(scene: Scene, rates: Rates) -> Family:
-    """A scene's equilibria against the frequency of the rotor."""
-    return Family(rates, frequencies(scene), UNIT)
+def by_frequency(scene: Scene, rates: Rates, spin: float = 0.0) -> Family:
+    """A scene's equilibria with a body spin against the frequency of the rotor."""
+    return Family(rates, frequencies(scene, spin), UNIT)
 
 
 def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: float) -> Branch:
@@ -174,15 +172,34 @@ def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[Sta
     bare = replace(scene, plate=None)
     near = levitating_branch(bare, table, rates, HIGHEST).near
     start = near[len(near) // 2]
-    return _stable_ranges(bare, rates, start.state, start.parameter)
+    return stable_ranges(branch_through(bare, rates, start.state, start.parameter))
 
 
-def _stable_ranges(scene: Scene, rates: Rates, start: Array, frequency: float) -> list[StableRange]:
-    """Intervals of stability through an equilibrium, both ways to the first fold, contact with the rotor or border."""
-    walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates), start, frequency)
-    below, above = walk(LOWEST), walk(HIGHEST)
+def branch_through(scene: Scene, rates: Rates, start: Array, frequency: float, spin: float = 0.0) -> list[BranchPoint]:
+    """The branch through an equilibrium, both ways to the first fold, contact with the rotor or border.
+
+    Parameters
+    ----------
+    scene : gravity along the axis
+    rates : its equations of motion
+    start : scaled state (12,) of the equilibrium
+    frequency : where it is, Hz
+    spin : body spin
+
+    Raises
+    ------
+    EquilibriumError : there is no equilibrium near `start`
+    """
+    walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates, spin), start, frequency)
+    below = walk(LOWEST if frequency > LOWEST else frequency / WIDEST)
+    above = walk(HIGHEST if frequency < HIGHEST else frequency * WIDEST)
+    return [*below[:0:-1], *above]
+
+
+def stable_ranges(points: Sequence[BranchPoint]) -> list[StableRange]:
+    """Intervals of stability on a branch, its `points` in order and marked."""
     runs: list[list[BranchPoint]] = [[]]
-    for point in [*below[:0:-1], *above]:
+    for point in points:
         runs[-1].append(point)
         if point.kind:
             runs.append([point])
@@ -200,7 +217,7 @@ def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> 
     On the branch through the equilibrium of `scene` and `rates` near `start` (12,) there. Raises EquilibriumError where
     there is none.
     """
-    found = _stable_ranges(scene, rates, start, frequency)
+    found = stable_ranges(branch_through(scene, rates, start, frequency))
     if not found:
         raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
     return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter))
@@ -212,13 +229,13 @@ def at_frequency(
     near: BranchPoint,
     frequency: float,
     steps: Steps = STEPS,
-    tolerated: float = TOLERATED,
+    tolerated: float = MARGINAL,
 ) -> BranchPoint:
     """The equilibrium of a `scene` with its `rates` at a `frequency` (Hz) on the branch through another, `near` it.
 
     `steps` and `tolerated` are as for `follow_branch`. Raises EquilibriumError where the branch does not reach it.
     """
-    family = by_frequency(scene, rates)
+    family = by_frequency(scene, rates, near.spin)
     if frequency == near.parameter:
         return family.point(near.state[:3], near.state[6:9], frequency)
     last = follow_branch(family, near.state, near.parameter, frequency, steps, tolerated=tolerated)[-1]
@@ -244,14 +261,14 @@ def is_over(scene: Scene, point: BranchPoint) -> bool:
 
 def levitates(point: BranchPoint) -> bool:
     """Whether no mode grows faster than what is tolerated."""
-    return point.growth_per_s <= max(TOLERATED, point.doubt_per_s)
+    return point.growth_per_s <= max(MARGINAL, point.doubt_per_s)
 
 
 def _side(
     scene: Scene, family: Family, start: Array, frequency: float, end: float, steps: Steps = STEPS
 ) -> list[BranchPoint]:
     """The branch from `frequency` towards `end`, to its first fold, contact or the border, which is marked."""
-    points = follow_branch(family, start, frequency, end, steps, partial(is_over, scene), TOLERATED)
+    points = follow_branch(family, start, frequency, end, steps, partial(is_over, scene), MARGINAL)
     for k, point in enumerate(points):
         if point.kind == FOLD:
             return points[: k + 1]
@@ -259,7 +276,7 @@ def _side(
             before = points[k - 1]
 
             def there(f: float, before: BranchPoint = before) -> BranchPoint:
-                return follow_branch(family, before.state, before.parameter, f, STEPS, tolerated=TOLERATED)[-1]
+                return follow_branch(family, before.state, before.parameter, f, STEPS, tolerated=MARGINAL)[-1]
 
             ends = before.parameter + 1e-9 * (point.parameter - before.parameter), point.parameter
             touching = scipy.optimize.brentq(lambda f: rotor_gap(scene, there(f).position), *ends, xtol=1e-6)

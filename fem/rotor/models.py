@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...geometry.common import Array, InputError, Watch, even_directions, unwatched
+from ...geometry.common import MU_0, Array, InputError, Watch, even_directions, unwatched
 from ...geometry.cutting import CONVERGENCE, cells_of, cut_magnets
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings
@@ -328,6 +328,20 @@ def extrapolated_tail(expansions: Sequence[MultipoleExpansion], ratio: float = C
         last[:-2] = 0.0
         found.append(MultipoleExpansion(expansion.center, expansion.radius, last / (faster - 1)))
     return found
+
+
+def of_true_moment(rotor: Rotor, table: RotorTable) -> Rotor:
+    """The `rotor`'s magnets with μr = 1, polarised so that each has the dipole moment that it has in a `table`."""
+    parts = [(magnet.body.center, magnet.moment) for magnet in table.uniform]
+    parts += [(expansion.center, expansion.moment) for expansion in table.expansions]
+    centers = np.array([center for center, _ in parts])
+    owners = np.argmin([magnet.body.distance(centers) for magnet in rotor], axis=0)
+    found = []
+    for k, magnet in enumerate(rotor):
+        moment = sum((m for (_, m), owner in zip(parts, owners, strict=True) if owner == k), np.zeros(3))
+        along = MU_0 / magnet.body.volume * magnet.body.rotation.T @ moment
+        found.append(replace(magnet, polarization=along, recoil_permeability=1.0, transverse_permeability=None))
+    return tuple(found)
 
 
 # Share of the tolerance that what is left out may always have, even if the table itself does not meet it

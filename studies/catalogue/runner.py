@@ -19,6 +19,7 @@ from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import check_files, parse_scene
 from ..cli.console import note, progress
 from ..cli.options import Models, Workers, combinations
+from ..compare import compare_figure
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
 from ..figures.run import (
@@ -43,6 +44,7 @@ from .entries import CATALOGUE
 
 QUESTION = "question"  # What the result of one's own question is called
 DRAWN = {
+    "branch_distance": ("compare", compare_figure),
     "axis_field": ("field", field_figure),
     "curve_force": ("force", force_figure),
     "position_rotor_frame": ("trajectory", trajectory_figure),

@@ -17,9 +17,11 @@ from .options import (
     FieldModel,
     Models,
     Output,
+    PlateModel,
     Quantity,
     Workers,
     default_scene,
+    frequency_grid,
     map_extent,
     new_scene,
     parse_vary,
@@ -162,6 +164,45 @@ def equilibria(
     from ..run import equilibria_job
 
     return Answer(*equilibria_job(loaded, asked.checked(), spin, output.folder), output.json)
+
+
+def compare(
+    scene: Path,
+    *,
+    frequency_hz: str | None = None,
+    plate_model: PlateModel = "auto",
+    rtol: float = Models.rtol,
+    plate_rtol: float = Models.plate_rtol,
+    spin: float = 0.0,
+    output: Output = Output(),
+) -> Answer:
+    """May the point dipole be used? Every field model's answers about one scene, under the same conditions.
+
+    Dipole, dipole of the true moment, cuboid (μr = 1), finite elements, and those with mutual magnetisation: a table,
+    a figure over the frequency, compare.nc and compare.json.
+
+    Parameters
+    ----------
+    scene
+        Scene file.
+    frequency_hz
+        Frequencies of the figure, FIRST:LAST:STEP or VALUE,VALUE,... in Hz; left out: about the stable ones.
+    plate_model
+        none, slab, fem or reduced, or auto, of all field models alike.
+    rtol
+        Relative accuracy asked of the field wherever the floater can be.
+    plate_rtol
+        Relative accuracy asked of the plate's reaction.
+    spin
+        Body spin S = Ω·m̂/ω of the floater about its own moment.
+    """
+    _check_spin(spin)
+    frequencies = None if frequency_hz is None else frequency_grid(frequency_hz)
+    asked = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
+    loaded = _loaded(scene)
+    from ..compare import compare_job
+
+    return Answer(*compare_job(loaded, asked, spin, frequencies, output.folder), output.json)
 
 
 def simulate(

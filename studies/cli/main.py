@@ -32,7 +32,8 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 for command in (
-    *(commands.run, commands.field, commands.plate, commands.equilibria, commands.simulate, commands.study),
+    *(commands.run, commands.field, commands.plate, commands.equilibria, commands.compare, commands.simulate),
+    commands.study,
     *(commands.figure, commands.show, commands.report, commands.cite, commands.new, commands.export, commands.explore),
 ):
     app.command(command)

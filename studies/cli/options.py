@@ -364,13 +364,32 @@ def combinations(values: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     return [dict(zip(values, chosen, strict=True)) for chosen in product(*values.values())]
 
 
+def frequency_grid(text: str) -> Array:
+    """(n,) Hz, rising, from FIRST:LAST:STEP or VALUE,VALUE,... Raises InputError unless all are positive."""
+    numbers = sorted(set(_numbers(text) or ()))
+    if not numbers or numbers[0] <= 0:
+        raise InputError(
+            "Input --frequency-hz must be FIRST:LAST:STEP or VALUE,VALUE,... of positive numbers, such as 100:180:5; "
+            f"instead received {shown(text)}."
+        )
+    return np.array(numbers)
+
+
 def _values(text: str, values: str) -> list[float]:
+    numbers = _numbers(values)
+    if numbers is None:
+        raise _wrong(text)
+    return numbers
+
+
+def _numbers(values: str) -> list[float] | None:
+    """Numbers of FIRST:LAST:STEP or VALUE,VALUE,...; None where it is neither."""
     separator = ":" if ":" in values else ","
     numbers = _floats(values, separator)
     if numbers and separator == ",":
         return numbers
     if len(numbers) != 3 or numbers[2] == 0 or (numbers[1] - numbers[0]) / numbers[2] < 0:
-        raise _wrong(text)
+        return None
     first, last, step = numbers
     count = int(min((last - first) / step + 1e-6, MOST_VALUES)) + 1
     # Rounded to 12 digits: 0.1, 0.2, 0.3 and not 0.30000000000000004.

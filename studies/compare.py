@@ -1,0 +1,300 @@
+"""One scene by every model of the rotor's field, under the same conditions: may the point dipole be used for it?"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ..dynamics.continuation.branch import BranchPoint
+from ..dynamics.continuation.frequencies import at_frequency, branch_through, levitates, stable_ranges
+from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError
+from ..dynamics.flights.flight import most_like_levitation
+from ..dynamics.motion.state import Scales
+from ..fem.files import write_whole
+from ..fem.rotor.models import of_true_moment
+from ..geometry.common import Array, InputError
+from ..geometry.scene.contents import Scene
+from ..geometry.scene.files import scene_text
+from .cli.console import note, to_json
+from .cli.options import FieldModel, Models
+from .figures.style import PAGE, PALETTE, legend_below, panels, save_figures, styled
+from .levitation import Levitation
+from .result import variable, write_dataset
+from .run import Job
+from .scene_tables import sources
+from .words import bracketed, worth_a_row
+
+TRUE_MOMENT, MUTUAL = "dipole, true moment", "{} + mutual"
+BESIDE = 0.1  # of the frequency: how far beyond the ranges of stability the branches are drawn
+GRID = 41  # frequencies at which they are, where none are asked for
+END = ("low", "high")
+COLUMNS = (
+    "model", "distance (mm)", "polar angle (°)", "growth rate (s⁻¹)", "modes (Hz)", "stable from, to (Hz)", ""
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """One model's answers."""
+
+    name: str
+    levitation: Levitation
+    found: Equilibrium | None  # on the branch on which the floater levitates by the best model
+    branch: tuple[BranchPoint, ...] = ()  # through it by frequency, without the plate
+    stable: tuple[float, float] | None = None  # the range of stable frequencies there, Hz
+
+    def row(self) -> dict[str, Any]:
+        """For JSON."""
+        row: dict[str, Any] = {"name": self.name, "stable_range_hz": self.stable}
+        if (e := self.found) is None:
+            return row | dict.fromkeys(
+                ("distance_mm", "polar_angle_deg", "growth_per_s", "stability", "frequencies_hz")
+            )
+        return row | {
+            "distance_mm": -1e3 * float(e.position[2]),
+            "distance_error_mm": 1e3 * e.position_error,
+            "polar_angle_deg": e.polar_angle_deg,
+            "growth_per_s": e.growth_per_s,
+            "efolding_s": e.efolding_s,
+            "stability": e.stability,
+            "frequencies_hz": e.frequencies_hz,
+        }
+
+
+def compared(scene: Scene, asked: Models, spin: float = 0.0) -> list[Compared]:
+    """A `scene` by dipole, dipole of the true moment, closed form, finite elements, and with mutual magnetisation.
+
+    The plate's model and the tolerances are those `asked` for; a scene with a field map has that in the place of the
+    finite elements. What mutual magnetisation cannot be computed for is left out with a message.
+
+    Raises
+    ------
+    EquilibriumError : the rotor is at rest
+    """
+    best: FieldModel = "map" if scene.field_map else "fem"
+    alone = replace(asked, model=best, interaction="rigid")
+    finest = Levitation(scene, alone, spin)
+    rough = replace(alone, model="dipole")
+    made = [
+        ("dipole", finest.elsewhere(rough)),
+        (TRUE_MOMENT, finest.elsewhere(rough, rotor=of_true_moment(scene.rotor, sources(finest.table)))),
+        ("cuboid", finest.elsewhere(replace(alone, model="cuboid"))),
+        (best, finest),
+    ]
+    both = finest.elsewhere(replace(alone, interaction="mutual"))
+    try:
+        assert both.interaction
+        made.append((MUTUAL.format(best), both))
+    except InputError as error:
+        note(f"Left out: mutual magnetisation. {error}")
+    found = list[Compared]()
+    for name, levitation in reversed(made):  # the best first: the others' equilibria are those nearest to its own
+        note(f"Model: {name}")
+        if found:
+            levitation.use_plate_of(found[0].levitation)
+        chosen = _nearest(worth_a_row(levitation.equilibria), found[0].found if found else None)
+        found.append(_with_branch(Compared(name, levitation, chosen)))
+    return found[::-1]
+
+
+def _nearest(equilibria: Sequence[Equilibrium], to: Equilibrium | None) -> Equilibrium | None:
+    """The one nearest to another, or, where there is no other, where the floater levitates; None without any."""
+    if to is None:
+        return most_like_levitation(equilibria)
+    return min(equilibria, key=lambda e: float(np.linalg.norm(e.position - to.position)), default=None)
+
+
+def _with_branch(one: Compared) -> Compared:
+    """The same with the branch of its equilibrium, where gravity is along the axis, so that there is one."""
+    scene = replace(one.levitation.scene, plate=None)
+    here = _nearest(one.levitation.without_plate.equilibria, one.found)
+    if here is None or scene.gravity[:2].any():
+        return one
+    start = Scales.of(scene).pack(here.state)
+    try:
+        points = branch_through(scene, one.levitation.rates, start, scene.frequency, one.levitation.spin)
+    except EquilibriumError as error:
+        note(f"The range of stable frequencies is not known: {error}")
+        return one
+    ranges = [(run.low.parameter, run.high.parameter) for run in stable_ranges(points)]
+    apart = [max(low - scene.frequency, scene.frequency - high) for low, high in ranges]
+    return replace(one, branch=tuple(points), stable=ranges[int(np.argmin(apart))] if ranges else None)
+
+
+def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None) -> xr.Dataset:
+    """All of it over `model`, and the branches over `frequency`.
+
+    Parameters
+    ----------
+    rows : of `compared`
+    frequencies : (n,) Hz of the branches; None: about the ranges of stability
+    """
+    scene = rows[0].levitation.scene
+    if frequencies is None:
+        ends = [f for row in rows for f in row.stable or ()] or [scene.frequency * (1 - BESIDE)]
+        low, high = min(*ends, scene.frequency), max(*ends, scene.frequency)
+        frequencies = np.linspace(low * (1 - BESIDE), high * (1 + BESIDE), GRID)
+    points = [[_on_branch(row, float(f)) for f in frequencies] for row in rows]
+
+    distances = [[-p.position[2] if p else math.nan for p in row] for row in points]
+    growths = [[p.growth_per_s if p else math.nan for p in row] for row in points]
+
+    found = [row.found for row in rows]
+    modes = max((len(e.frequencies_hz) for e in found if e), default=0)
+    spectrum = np.full((len(rows), modes), math.nan)
+    for k, e in enumerate(found):
+        if e:
+            spectrum[k, : len(e.frequencies_hz)] = e.frequencies_hz
+
+    def each(value: str) -> Array:
+        return np.array([getattr(e, value) if e else math.nan for e in found], float)
+
+    distance = [-e.position[2] if e else math.nan for e in found]
+    over = ("model", "frequency")
+    plate = next((row.levitation.plate for row in rows if row.levitation.plate), None)
+    return xr.Dataset(
+        {
+            "distance": variable(("model",), distance, "m", "levitation distance"),
+            "distance_error": variable(("model",), each("position_error"), "m", "its error, as the model states it"),
+            "polar_angle": variable(("model",), each("polar_angle_deg"), "deg", "polar angle of the moment"),
+            "growth": variable(("model",), each("growth_per_s"), "1/s", "growth rate of the least stable mode"),
+            "stability": (("model",), [e.stability if e else "" for e in found]),
+            "mode_frequency": variable(("model", "mode"), spectrum, "Hz", "frequencies of the modes, rotor's frame"),
+            "stable_range": variable(
+                ("model", "end"), [row.stable or (math.nan,) * 2 for row in rows], "Hz",
+                "ends of the range of stable frequencies, without the plate",
+            ),
+            "branch_distance": variable(over, distances, "m", "levitation distance, without the plate"),
+            "branch_growth": variable(over, growths, "1/s", "growth rate, without the plate"),
+            "branch_stable": (over, [[bool(p and levitates(p)) for p in row] for row in points]),
+        },
+        {
+            "model": [row.name for row in rows],
+            "end": list(END),
+            "frequency": variable(("frequency",), frequencies, "Hz", "rotor frequency"),
+        },
+        {
+            "study": "compare",
+            "frequency_hz": scene.frequency,
+            "plate_model": plate.model if plate else "none",
+            "scene": scene_text(scene),
+        },
+    )  # fmt: skip
+
+
+def _on_branch(row: Compared, frequency: float) -> BranchPoint | None:
+    """The equilibrium on a row's branch at a frequency, Hz; None beyond its ends."""
+    ordinary = [point for point in row.branch if not point.kind]
+    ends = [point.parameter for point in row.branch]
+    if not ordinary or not min(ends) <= frequency <= max(ends):
+        return None
+    near = min(ordinary, key=lambda point: abs(point.parameter - frequency))
+    levitation = row.levitation
+    try:
+        return at_frequency(replace(levitation.scene, plate=None), levitation.rates, near, frequency)
+    except EquilibriumError:  # between the last ordinary point and a fold
+        return None
+
+
+def compare_words(rows: Sequence[Compared]) -> list[str]:
+    """The answer in a sentence or two, the table, and its conditions."""
+    best, dipole = rows[-1], rows[0]
+    scene = best.levitation.scene
+    said = [f"At {scene.frequency:g} Hz the floater has no equilibrium by {best.name}."]
+    if best.found is not None and dipole.found is not None:
+        apart = 1e3 * float(best.found.position[2] - dipole.found.position[2])
+        share = abs(apart) / (1e3 * best.found.distance)
+        error = 1e3 * best.found.position_error
+        more = "more" if apart > 0 else "less"
+        said = [
+            f"Levitation distance by the point dipole: {bracketed(abs(apart), error, 2)} mm {more} "
+            f"({share:.1%}) than by {best.name}; {_verdict(dipole, best)}."
+        ]
+    elif best.found is not None:
+        said = [f"The point dipole has no equilibrium at {scene.frequency:g} Hz; {best.name} has one."]
+    table = [COLUMNS, *(_cells(row) for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = [
+        "  ".join([cells[0].ljust(widths[0]), *map(str.rjust, cells[1:-1], widths[1:-1]), cells[-1]]).rstrip()
+        for cells in table
+    ]
+    plate = best.levitation.plate
+    conditions = "without a plate" if scene.plate is None else "without eddy currents in the plate"
+    if plate is not None:
+        conditions = f"with eddy currents in the plate ({plate.model})"
+    ranges = f"Stable: growth rate below {MARGINAL:g} s⁻¹ (e-folding time above 250 s)"
+    return [*said, *lines, f"Equilibria: {conditions}. {ranges}; ranges are those without eddy currents in the plate."]
+
+
+def _verdict(dipole: Compared, best: Compared) -> str:
+    assert dipole.found is not None
+    assert best.found is not None
+    one, other = dipole.found.stability, best.found.stability
+    return f"both are {one}" if one == other else f"the dipole is {one}, {best.name} {other}"
+
+
+def _cells(row: Compared) -> tuple[str, ...]:
+    if (e := row.found) is None:
+        return (row.name, "", "", "", "", "", "no equilibrium")
+    last = e.position_error if row.name not in ("dipole", TRUE_MOMENT, "cuboid") else 0.0  # theirs is what is compared
+    ranged = "" if row.stable is None else f"{row.stable[0]:.1f}, {row.stable[1]:.1f}"
+    return (
+        row.name,
+        bracketed(-1e3 * e.position[2], 1e3 * last) if last else f"{-1e3 * e.position[2]:.2f}",
+        f"{e.polar_angle_deg:.2f}",
+        f"{e.growth_per_s:.2g}",
+        " ".join(f"{f:.3g}" for f in e.frequencies_hz),
+        ranged,
+        e.stability,
+    )
+
+
+@styled
+def compare_figure(result: xr.Dataset) -> Figure:
+    """Levitation distance of every model by frequency, and how far each is from the best."""
+    figure, ((left, right),) = panels(1, 2, (PAGE, 2.9))
+    best = result.isel(model=-1)
+    for k, color in zip(range(result.sizes["model"]), PALETTE, strict=False):
+        one = result.isel(model=k)
+        for panel, share in ((left, 0.0), (right, 1.0)):
+            curve = 1e3 * (one["branch_distance"] - share * best["branch_distance"])
+            panel.plot(curve["frequency"], curve, ":", color=color)
+            panel.plot(curve["frequency"], curve.where(one["branch_stable"]), color=color, label=one["model"].item())
+            scene = 1e3 * (one["distance"] - share * best["distance"])
+            panel.plot(result.attrs["frequency_hz"], scene, "o", color=color, ms=3)
+    left.plot([], [], "k:", label="unstable")
+    plate = result.attrs["plate_model"] != "none"
+    left.plot([], [], "ko", ms=3, label="the scene, with its plate" if plate else "the scene")
+    for panel in (left, right):
+        panel.set_xlabel("rotor frequency (Hz)")
+    left.set_ylabel("levitation distance (mm)")
+    right.set_ylabel(f"difference from {best['model'].item()} (mm)")
+    legend_below(figure, left, columns=4)
+    return figure
+
+
+def compare_job(scene: Scene, asked: Models, spin: float, frequencies: Array | None, out: Path) -> Job:
+    """Every model's answers about a `scene`; writes compare.nc, compare.json and the figure to `out`."""
+    rows = compared(scene, asked, spin)
+    result = compared_dataset(rows, frequencies)
+    values = {
+        "models": [row.row() for row in rows],
+        "frequency_hz": scene.frequency,
+        "plate_model": result.attrs["plate_model"],
+        "error_estimate": float(rows[-1].found.position_error / rows[-1].found.distance) if rows[-1].found else None,
+        "model": rows[-1].name,
+        "tables_from_cache": rows[-1].levitation.from_cache,
+    }
+    if frequencies is not None:
+        branches = 1e3 * result["branch_distance"].values
+        values["frequencies_hz"] = frequencies
+        values["distances_mm"] = {row.name: branches[k] for k, row in enumerate(rows)}
+    write_dataset(result, out / "compare.nc", scene)
+    write_whole(out / "compare.json", f"{to_json(values)}\n".encode())
+    save_figures({"compare": compare_figure(result)}, out)
+    return values, [*compare_words(rows), f"Figure and numbers in {out}/compare.png, .pdf, .nc and .json"]
