@@ -285,18 +285,25 @@ def in_ball(solution: RotorSolution, points: Array) -> NDArray[np.bool_]:
     return np.asarray(np.linalg.norm(_in_mesh(solution, points), axis=1) < WITHIN * solution.mesh.ball_radius)
 
 
-def potential_slopes(solution: RotorSolution, points: Array) -> tuple[Array, Array]:
+def potential_slopes(solution: RotorSolution, points: Array, beside: Array) -> tuple[Array, Array]:
     """∇ψ (n, 3) T and its slope ∂_i ∂_j ψ (n, 3, 3) T/m at points (n, 3) m in the ball, rotor's frame.
 
-    On a face it is that of the side on which the mesh has the point.  ∇ψ converges as h^p, its slope one order slower.
+    ∇ψ converges as h^p, its slope one order slower. Next to a face, nearer than some 1e-4 of an element, the mesh may
+    find a point on the wrong side: where the material is not that of the place `beside` (n, 3) m, which lies farther
+    from the face on the same side, ∇ψ is continued from there by its slope.
     """
     mesh, planes, axes = solution.mesh, solution.symmetry.planes, solution.symmetry.axes
-    places = _in_mesh(solution, points)
+    places, others = _in_mesh(solution, points), _in_mesh(solution, beside)
     flips = np.ones_like(places)
     for plane in solution.mesh.planes:
         flips[:, plane] = np.where(places[:, plane] < 0, -1.0, 1.0)
     assert set(solution.mesh.planes) <= set(planes)
     # the mesh has one side of the planes: points are mirrored there, and each parity gets its signs back
+    near = np.flatnonzero((places != others).any(axis=1))
+    if len(near):
+        sides = [_materials(mesh, flips[near] * there[near]) for there in (places, others)]
+        near = near[sides[0] != sides[1]]
+        places[near] = others[near]
     found = mesh.mesh(*(flips * places).T)
     first, second = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
     for part in solution.parts:
@@ -307,7 +314,15 @@ def potential_slopes(solution: RotorSolution, points: Array) -> tuple[Array, Arr
         hesse = np.asarray(part.potential.Operator("hesse")(found)).reshape(-1, 3, 3)
         second += sign[:, None, None] * hesse
     first, second = first * flips, second * flips[:, :, None] * flips[:, None, :] / mesh.unit
-    return first @ axes.T, np.asarray(axes @ second @ axes.T)
+    first, second = first @ axes.T, np.asarray(axes @ second @ axes.T)
+    first[near] += np.einsum("nij,nj->ni", second[near], points[near] - beside[near])
+    return first, second
+
+
+def _materials(mesh: MagnetMesh, places: Array) -> NDArray[np.str_]:
+    """Names of the materials (n,) of the elements in which the mesh finds places (n, 3) in its coordinates."""
+    numbers = mesh.mesh(*places.T)["nr"]
+    return np.array([mesh.mesh[ng.ElementId(ng.VOL, int(number))].mat for number in numbers])
 
 
 def _in_mesh(solution: RotorSolution, points: Array) -> Array:

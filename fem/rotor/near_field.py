@@ -11,7 +11,7 @@ from ...geometry.common import Array, InputError
 from ...geometry.cutting import CONVERGENCE
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings
-from ...geometry.solids import Part
+from ...geometry.solids import Part, Solid
 from ..closed_forms.moments import carrier
 from ..closed_forms.uniform import UniformField
 from ..elements.ladder import RotorSolution, in_ball, potential_slopes, refinement_of, solve_rotor, strongest
@@ -25,6 +25,9 @@ MOST_LAYERS = 5
 SLOWEST = 0.3  # least ratio of two steps that is believed
 # Share of the root mean square of the last step that is added to it, whose zeros are not those of the error
 SPREAD = 2.0
+# Distance from a face, in edges of a cube of the magnet's volume, from which on the mesh finds the side of a place: at
+# order 6 it took one that was 0.34 µm inside a cube of 10 mm, 3.4e-5, for one outside; 1 µm inside it did not
+BESIDE_FACE = 5e-4
 OUTSIDE = 1e-5  # relative accuracy of what lies outside the ball of the elements
 
 
@@ -89,11 +92,12 @@ class NearElements:
     def _climbed(self, points: Array, allowed: float, highest: int) -> tuple[Array, Array, Array, Array, int]:
         """∇ψ, its slope, the estimated errors of both, and the order."""
         error, steep = np.full(len(points), np.inf), np.full(len(points), np.inf)
-        first, second = potential_slopes(self._solution(LOWEST), points)
+        beside = self._off_faces(points)
+        first, second = potential_slopes(self._solution(LOWEST), points, beside)
         step, step_of_slope = np.zeros(len(points)), np.zeros(len(points))
         for order in range(LOWEST + 1, highest + 1):
             before = first, second
-            first, second = potential_slopes(self._solution(order), points)
+            first, second = potential_slopes(self._solution(order), points, beside)
             # a step that is small by chance does not tell the error: the one before it has a say
             step = np.maximum(np.linalg.norm(first - before[0], axis=1), SLOWEST * step)
             step_of_slope = np.maximum(np.linalg.norm(second - before[1], axis=(1, 2)), SLOWEST * step_of_slope)
@@ -101,6 +105,19 @@ class NearElements:
             if error.max() <= allowed:
                 return first, second, error, steep, order
         return first, second, error, steep, highest
+
+    def _off_faces(self, points: Array) -> Array:
+        """Points (n, 3) m, those next to a magnet's face moved away from it on their side."""
+        moved = points.copy()
+        for magnet in self.magnets:
+            apart = BESIDE_FACE * magnet.body.volume ** (1 / 3)
+            depth = magnet.body.distance(points)
+            near = np.abs(depth) < apart
+            way = np.where(depth[near] < 0, -apart, apart) - depth[near]
+            moved[near] += way[:, None] * _normals(magnet.body, points[near])
+        astray = owners(self.magnets, moved) != owners(self.magnets, points)  # across a gap narrower than that
+        moved[astray] = points[astray]
+        return moved
 
 
 HIGHEST = 8  # order of the elements
@@ -155,9 +172,7 @@ def near_field(
     for magnet in magnets:  # H jumps at a face: points on it are moved out
         on = np.abs(magnet.body.distance(given)) < OFF_FACE
         if on.any():
-            steps = ON_EDGE / 2 * np.eye(3)
-            rise = [magnet.body.distance(given[on] + s) - magnet.body.distance(given[on] - s) for s in steps]
-            places[on] += OFF_FACE * np.transpose(rise) / ON_EDGE
+            places[on] += OFF_FACE * _normals(magnet.body, given[on])
     solved = elements or NearElements(magnets)
     rows = [UniformField(one).rows(np.ascontiguousarray(places.T)) for one in solved.carriers if one.polarization.any()]
     closed = sum(rows, np.zeros((12, len(places))))
@@ -173,6 +188,12 @@ def near_field(
         for doubt in (error, steep):
             doubt[mine] *= max(magnet.recoil_permeability, magnet.transverse_permeability or 1.0)
     return NearField(flux, field, gradient, error, steep, owner, order)
+
+
+def _normals(body: Solid, points: Array) -> Array:
+    """Gradients (n, 3) of the distance from a body's surface at points (n, 3) m."""
+    steps = ON_EDGE / 2 * np.eye(3)
+    return np.transpose([body.distance(points + s) - body.distance(points - s) for s in steps]) / ON_EDGE
 
 
 def owners(magnets: Sequence[Magnet], points: Array) -> NDArray[np.intp]:
