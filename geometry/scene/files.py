@@ -7,7 +7,7 @@ import logging
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +18,19 @@ from ..files import file_content, regular_file
 from ..magnets import Magnet
 from ..shapes import Cylinder, rotation_angles
 from ..solids import Part, Solid
-from .contents import AbsoluteStart, Drag, OffsetStart, Scene
-from .making import Table, assemble, content_digest
+from . import schema
+from .contents import Drag, OffsetStart, Scene
+from .making import assemble, content_digest
 from .messages import SceneError
-from .schema import SceneTable
 
 SAME = 1e-12  # Entry of a vector, in its largest, below which it is round-off
 MOST = 5_000_000  # Bytes of a scene file; one with a thousand magnets has 200 000
 MOST_OF_MAP = 1_000_000_000  # Bytes of a map of the field
 # A dotted key of so many parts: reading it takes time and memory that grow with their square.
 LONGEST_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*\.[ \t]*){20}""")
+# The unit at a key's end, and its size where it is not that of the objects of a scene.
+UNIT = re.compile(r"_(mm_s|mm|kA_m|hz|s|T|S_m|kg_m3|N_s_m|N_m_s)$")
+IN_SI = {"_mm_s": 1e-3, "_mm": 1e-3, "_kA_m": 1e3, "_hz": 2 * np.pi}
 DECIMAL_COMMA = re.compile(r"(?m)^[^#\n\[]*=\s*[-+]?\d+,\s*\d")
 DEEPEST = 10  # Tables and lists in each other; a scene has five
 LARGEST = 2**1000  # Integers below it are floats
@@ -174,12 +177,12 @@ def _replace(raw: Any, key: str, value: float, source: str) -> None:
 def scene(
     *,
     frequency_hz: float,
-    rotor: Table,
-    floater: Table,
-    plate: Table | None = None,
+    rotor: Mapping[str, Any],
+    floater: Mapping[str, Any],
+    plate: Mapping[str, Any] | None = None,
     gravity_m_s2: Sequence[float] = (0.0, 0.0, -9.81),
-    drag: Table | None = None,
-    start: Table | None = None,
+    drag: Mapping[str, Any] | None = None,
+    start: Mapping[str, Any] | None = None,
 ) -> Scene:
     """A scene from the tables of a scene file; the object itself is in SI units.
 
@@ -262,7 +265,7 @@ def scene_keys(scene: Scene) -> dict[str, Any]:
 
 def canonical_keys(scene: Scene) -> dict[str, Any]:
     """All keys that a scene file can have, with defaults, numbers as floats, and None for what is left out."""
-    return SceneTable.model_validate(scene_keys(scene)).model_dump()
+    return schema.SceneTable.model_validate(scene_keys(scene)).model_dump()
 
 
 def scene_digest(scene: Scene) -> str:
@@ -293,71 +296,56 @@ def _as_written(scene: Scene, name: str) -> bool:
     return all(now is then or (not isinstance(now, np.ndarray) and now == then) for now, then in pairs)
 
 
+def _said(table: type[schema.Table], thing: Any) -> dict[str, Any]:
+    """What a table's keys are of an object whose attributes have their names without units; those that it has."""
+    keys: dict[str, Any] = {}
+    for key in table.model_fields:
+        unit = UNIT.search(key)
+        name, size = key.removesuffix(unit[0] if unit else "").removeprefix("map_"), IN_SI.get(unit[0] if unit else "")
+        value = getattr(thing, name, None)
+        if isinstance(value, np.ndarray):
+            keys[key] = _all_rounded(value / size) if size else value.tolist()
+        elif isinstance(value, float | int | str):
+            keys[key] = _rounded(float(value) / size) if size else value
+    return keys
+
+
 def _rotor(scene: Scene) -> dict[str, Any]:
-    keys: dict[str, Any] = {"magnets": [magnet_keys(magnet) for magnet in scene.rotor]}
+    keys: dict[str, Any] = {"magnets": [_magnet(magnet) for magnet in scene.rotor]}
     keys |= {"field_map": str(scene.field_map)} if scene.field_map else {}
-    keys |= _given({f"map_{name}": value for name, value in asdict(scene.map_reading).items()})
     conductors = [
-        {"shape": "cuboid", **shape_keys(c.body), **pose_keys(c.body), "conductivity_S_m": c.conductivity}
+        {"shape": "cuboid", **shape_keys(c.body), **pose_keys(c.body), **_said(schema.ConductorTable, c)}
         for c in scene.conductors
     ]
-    return keys | ({"conductors": conductors} if conductors else {})
+    return keys | _said(schema.AnyRotor, scene.map_reading) | ({"conductors": conductors} if conductors else {})
 
 
-def magnet_keys(magnet: Magnet) -> dict[str, Any]:
-    """The table of a magnet, among `rotor.magnets`."""
-    along, across = magnet.recoil_permeability, magnet.transverse_permeability
-    return {
-        **shape_keys(magnet.body),
-        **pose_keys(magnet.body),
-        "polarization_T": magnet.polarization.tolist(),
-        "recoil_permeability": along if magnet.isotropic else [along, across],
-        **_given({"conductivity_S_m": magnet.conductivity}),
-        **_given({"coercivity_kA_m": magnet.coercivity and _rounded(magnet.coercivity / 1e3)}),
-    }
+def _magnet(magnet: Magnet) -> dict[str, Any]:
+    keys = {**shape_keys(magnet.body), **pose_keys(magnet.body), **_said(schema.MagnetTable, magnet)}
+    both = [magnet.recoil_permeability, magnet.transverse_permeability]
+    return keys if magnet.isotropic else keys | {"recoil_permeability": both}
 
 
 def _floater(scene: Scene) -> dict[str, Any]:
-    floater = scene.floater
-    return {
-        "shape": floater.shape,
-        **shape_keys(floater.solid),
-        "remanence_T": floater.remanence,
-        "recoil_permeability": floater.recoil_permeability,
-        "density_kg_m3": floater.density,
-        **_given({"conductivity_S_m": floater.conductivity}),
-    }
+    return _said(schema.FloaterTable, scene.floater) | shape_keys(scene.floater.solid)
 
 
 def _plate(scene: Scene) -> dict[str, Any] | None:
-    if scene.plate is None:
+    if (plate := scene.plate) is None:
         return None
-    box, down = scene.plate.box, scene.plate.lowering
-    keys = {**shape_keys(box), **pose_keys(box), "conductivity_S_m": scene.plate.conductivity}
-    if down:
-        speed, distance = _rounded(1e3 * down.speed), _rounded(1e3 * down.distance)
-        keys["lowering"] = {"start_s": down.start, "speed_mm_s": speed, "distance_mm": distance}
-    return keys
+    down = {"lowering": _said(schema.LoweringTable, plate.lowering)} if plate.lowering else {}
+    return {**shape_keys(plate.box), **pose_keys(plate.box), **_said(schema.PlateTable, plate), **down}
 
 
 def _drag(scene: Scene) -> dict[str, Any] | None:
     if scene.drag == (stokes := Drag.of(scene.floater)):
         return None
-    numbers = {"linear_N_s_m": scene.drag.linear, "angular_N_m_s": scene.drag.angular}
-    return {"model": "air"} if scene.drag == replace(stokes, air=True) else numbers
+    return {"model": "air"} if scene.drag == replace(stokes, air=True) else _said(schema.DragTable, scene.drag)
 
 
 def _start(scene: Scene) -> dict[str, Any] | None:
-    start = scene.start
-    if not isinstance(start, AbsoluteStart):
-        offset = _all_rounded(1e3 * start.offset)
-        return None if offset == [0.0, 0.0, 0.1] else {"offset_mm": offset}
-    return {
-        "position_mm": _all_rounded(1e3 * start.position),
-        "velocity_mm_s": _all_rounded(1e3 * start.velocity),
-        "moment": start.moment.tolist(),
-        "spin_hz": _all_rounded(start.spin / (2 * np.pi)),
-    }
+    keys = _said(schema.StartTable, scene.start)
+    return None if keys == {"offset_mm": [0.0, 0.0, 0.1]} else keys
 
 
 def shape_keys(body: Solid) -> dict[str, Any]:
@@ -378,10 +366,6 @@ def pose_keys(body: Solid) -> dict[str, Any]:
     return {"center_mm": _all_rounded(1e3 * center), "rotation_deg": _all_rounded(rotation_angles(body.rotation))}
 
 
-def _given(keys: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in keys.items() if value is not None}
-
-
 def _rounded(value: float) -> float:
     """A number without the round-off of its way through SI units."""
     return float(f"{float(value):.14g}") + 0.0
@@ -397,7 +381,10 @@ FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
     "frequency_hz": (("frequency",), lambda scene: float(scene.frequency)),
     "gravity_m_s2": (("gravity",), lambda scene: scene.gravity.tolist()),
     "rotor": (("rotor", "conductors", "field_map", "map_reading"), _rotor),
-    "floater": (("floater",), _floater),
+    "floater": (
+        ("floater",),
+        lambda scene: _said(schema.FloaterTable, scene.floater) | shape_keys(scene.floater.solid),
+    ),
     "plate": (("plate",), _plate),
     "drag": (("drag", "floater"), _drag),
     "start": (("start",), _start),
