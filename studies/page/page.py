@@ -218,8 +218,7 @@ class Page:
         self.tell(equilibria=[[position[0], position[2]] for position, _ in places])
         if places:
             position, moment = places[0]
-            tilt = np.degrees(np.arctan2(np.hypot(moment[0], moment[1]), moment[2]))
-            self._sample(np.array([[0.0], [position[2]], [tilt]]), fresh=True)
+            self._sample(np.array([[0.0], [position[2]], [work.polar_angle(np.array(moment))]]), fresh=True)
             self.tell(pose={"position": position, "moment": moment, "seen": position, "angle": 0.0, "flying": False})
 
     def _take_off(self) -> None:
@@ -243,17 +242,16 @@ class Page:
         def wished(frame: Frame) -> None:
             self._flown(frame)
             if what == "put":
-                self.tell(playing=not frame.message)
+                self.tell(playing=not frame["message"])
 
         self.flyer.ask(object(), lambda: call, wished)
 
     def _flown(self, frame: Frame, piece: bool = False) -> None:
-        self._sample(np.array([frame.time, frame.height, frame.tilt]))
-        seen = {key: getattr(frame, key) for key in ("position", "moment", "seen", "angle")}
-        self.ended = bool(frame.ended)
+        self._sample(frame["samples"])
+        self.ended = bool(frame["ended"])
         self.tell(
-            says=frame.message or frame.ended or f"t = {frame.time[-1]:.4g} s",
-            pose={**seen, "flying": True, "piece": piece, "ended": self.ended},
+            says=frame["message"] or frame["ended"] or f"t = {frame['samples'][0, -1]:.4g} s",
+            pose={**frame["pose"], "flying": True, "piece": piece, "ended": self.ended},
         )
 
     def _lost(self, message: str) -> None:

@@ -183,12 +183,12 @@ class _Gate(Application):
 
     def _refusal(self, request: HTTPServerRequest) -> int:
         """The status with which a request is sent away; 0 for one that is answered."""
+        # Another name may lead to this machine, so that its owner's pages can read ours (DNS rebinding).
         try:
             name = urlsplit(f"//{request.host}").hostname or ""
+            if name not in self._names:
+                ipaddress.ip_address(name)
         except ValueError:
-            return 421
-        # Another name may lead to this machine, so that its owner's pages can read ours (DNS rebinding).
-        if name not in self._names and not _is_number(name):
             return 421
         if request.path not in (*PAGES, *PROGRAMS) or request.method not in ("GET", "HEAD"):
             return 404
@@ -196,13 +196,6 @@ class _Gate(Application):
         own = origin is None or origin.partition("://")[2].lower() == request.host.lower()
         invited = own and len(given) == 1 and hmac.compare_digest(given[0], self._token)
         return 0 if invited or request.path not in PAGES else 403
-
-
-def _is_number(name: str) -> bool:
-    try:
-        return bool(ipaddress.ip_address(name))
-    except ValueError:
-        return False
 
 
 class _Answer(RequestHandler):

@@ -79,10 +79,8 @@ class PageState:
     def with_query(self, asked: Mapping[str, str]) -> PageState:
         """The state of an address: of a whole scene, or one that changes what it names; its rotor or plate is whole.
 
-        Raises
-        ------
-        SceneError : the scene of the address cannot be, or names a file that the first scene does not
-        InputError : a model that does not exist, a spin that is no number, or more than an address may hold
+        Raises SceneError: the scene cannot be, or names a file that the first scene does not; InputError: a model that
+        does not exist, a spin that is no number, or more than an address may hold.
         """
         if sum(len(key) + len(value) for key, value in asked.items()) > LONGEST:
             raise InputError(f"Input address must have at most {LONGEST} characters of a scene; instead it is longer.")
@@ -106,13 +104,7 @@ class PageState:
         return replace(self, scene=scene, **{**chosen, "spin": spin})
 
     def opened(self, content: bytes, name: str) -> PageState:
-        """The state in which a page shows a scene file of its reader's.
-
-        Raises
-        ------
-        SceneError : the scene cannot be, or names a file that the first scene does not
-        InputError : no text, or more than a page takes
-        """
+        """The state in which a page shows a scene file of its reader's. Raises as `with_query`."""
         if len(content) > LARGEST:
             raise InputError(f"Input scene must have at most {LARGEST} bytes in a page; instead it has {len(content)}.")
         try:
@@ -157,7 +149,7 @@ def _put(keys: Any, path: list[str], text: str) -> None:
 
 @dataclass(frozen=True)
 class Control:
-    """A number that a slider moves, as Bokeh's sliders take it; `name` is its key in the scene file, or `spin`."""
+    """A number that a slider moves; `name` is its key in the scene file, or `spin`."""
 
     name: str
     title: str
@@ -169,21 +161,22 @@ class Control:
 
 def controls(state: PageState) -> list[Control]:
     """The sliders of a state, from the most to the least used: of what its scene has."""
+    scene, rotor, floater = state.scene, state.keys["rotor"], state.keys["floater"]
     rows: list[tuple[str, str, float, float, float, float]]
-    rows = [("frequency_hz", "Frequency (Hz)", state.scene.frequency, 20.0, 300.0, 0.5)]
-    rotor, floater = state.keys["rotor"], state.keys["floater"]
+    rows = [("frequency_hz", "Frequency (Hz)", scene.frequency, 20.0, 300.0, 0.5)]
     if (kind := rotor.get("configuration")) in MEASURES:
         key, title, low, high = MEASURES[kind]
-        low = max(low, 1e3 * float(state.scene.rotor[0].body.size[2])) if kind == "vertical" else low  # they touch
+        low = max(low, 1e3 * float(scene.rotor[0].body.size[2])) if kind == "vertical" else low  # they touch
         rows.append((f"rotor.{key}", title, rotor[key], low, high, 0.05))
         rows += [(f"rotor.{k}", f"Rotor's {of}", rotor[k], 3.0, 20.0, 0.05) for k, of in SIZES.items() if k in rotor]
-    sizes = {key: (f"Floater's {of}", floater[key]) for key, of in SIZES.items() if key in floater}
+    rows += [
+        (f"floater.{k}", f"Floater's {of}", floater[k], 3.0, 30.0, 0.05) for k, of in SIZES.items() if k in floater
+    ]
     for k, size in enumerate(floater.get("size_mm", ())):
-        sizes[f"size_mm.{k}"] = f"Floater's edge along its {'xyz'[k]} (mm)", size
-    rows += [(f"floater.{key}", title, size, 3.0, 30.0, 0.05) for key, (title, size) in sizes.items()]
+        rows.append((f"floater.size_mm.{k}", f"Floater's edge along its {'xyz'[k]} (mm)", size, 3.0, 30.0, 0.05))
     rows.append(("spin", "Body spin S", state.spin, -2.0, 2.0, 0.01))
-    if state.scene.plate is not None:
-        box = state.scene.plate.box
+    if scene.plate is not None:
+        box = scene.plate.box
         axis = int(np.abs(box.rotation[:, int(np.argmin(box.size))]).argmax())  # along which it is thin
         place = state.keys["plate"]["center_mm"][axis]
         near, far = sorted((0.4 * place, 2.5 * place)) if place else (-PLATE_REACH, PLATE_REACH)
@@ -191,6 +184,6 @@ def controls(state: PageState) -> list[Control]:
         rows.append((f"plate.center_mm.{axis}", title, place, near, far, 0.25))
     found = []
     for key, title, value, low, high, step in rows:  # each range has room for its value
-        ends = np.floor(min(low, value) / step) * step, np.ceil(max(high, value) / step) * step
-        found.append(Control(key, title, float(value), round(float(ends[0]), 6), round(float(ends[1]), 6), step))
+        start, end = np.floor(min(low, value) / step) * step, np.ceil(max(high, value) / step) * step
+        found.append(Control(key, title, float(value), round(float(start), 6), round(float(end), 6), step))
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -161,21 +161,10 @@ def regions(
     return Regions(model, frequencies, measures, np.asarray((every > 0).astype(np.uint8) + (stable > 0)))
 
 
-@dataclass(frozen=True)
-class Frame:
-    """A moment of a flight and what was simulated since the last."""
-
-    time: Array  # (n,) s
-    height: Array  # (n,) mm
-    tilt: Array  # (n,) degrees from +z
-    position: list[float]  # (3,) now, mm, along the laboratory's axes
-    moment: list[float]  # (3,) now, its direction
-    seen: list[float]  # (3,) mm, the same position along the rotor's axes
-    angle: float  # of the rotor, rad
-    ended: str = ""  # how the flight has ended, in words; empty while it lasts
-    message: str = ""  # what was wrong with a wish
-
-
+Frame: TypeAlias = "dict[str, Any]"
+"""A moment of a flight: `samples` (3, n) since the last, time s, height mm and polar angle °; the floater's `pose`, its
+position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's `angle`,
+rad; how the flight has `ended`, in words; a `message` of what was wrong with a wish."""
 _flights: list[LiveFlight] = []  # The one of this process
 
 
@@ -190,7 +179,7 @@ def fly(seconds: float) -> Frame:
     try:
         return _frame(_flights[0].onward(seconds))
     except SpinlevError as error:
-        return replace(_frame(), message=str(error), ended="stopped: the motion could not be computed")
+        return {**_frame(), "message": str(error), "ended": "stopped: the motion could not be computed"}
 
 
 def wish(what: str, vector: list[float]) -> Frame:
@@ -198,30 +187,35 @@ def wish(what: str, vector: list[float]) -> Frame:
     try:
         getattr(_flights[0], what)(np.array(vector))
     except SpinlevError as error:
-        return replace(_frame(), message=str(error))
+        return {**_frame(), "message": str(error)}
     return _frame()
 
 
 def _frame(piece: Piece | None = None) -> Frame:
     flight = _flights[0]
     if piece is None:  # nothing was flown
-        now = flight.now
-        lab = type(now)(*(vector[None] for vector in now.vectors))
-        angle = flight.scene.angular_velocity * flight.time
-        piece = Piece(np.array([flight.time]), lab, angle, flight.ended_by)
+        lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
+        turned = flight.scene.angular_velocity * flight.time
+        piece = Piece(np.array([flight.time]), lab, turned, flight.ended_by)
     places, moments = piece.lab.position, piece.lab.moment
     seen = piece.lab.to_rotor(flight.scene.angular_velocity * piece.time).position
     words = ENDS.get(piece.ended_by, "")
-    return Frame(
-        time=piece.time,
-        height=1e3 * places[:, 2],
-        tilt=np.degrees(np.arctan2(np.hypot(moments[:, 0], moments[:, 1]), moments[:, 2])),
-        position=(1e3 * places[-1]).tolist(),
-        moment=moments[-1].tolist(),
-        seen=(1e3 * seen[-1]).tolist(),
-        angle=float(np.fmod(piece.angle, 2 * np.pi)),
-        ended=f"After {flight.time:.3g} s {words}." if words else "",
-    )
+    return {
+        "samples": np.stack([piece.time, 1e3 * places[:, 2], polar_angle(moments)]),
+        "pose": {
+            "position": 1e3 * places[-1],
+            "moment": moments[-1],
+            "seen": 1e3 * seen[-1],
+            "angle": float(np.fmod(piece.angle, 2 * np.pi)),
+        },
+        "ended": f"After {flight.time:.3g} s {words}." if words else "",
+        "message": "",
+    }
+
+
+def polar_angle(moments: Array) -> Array:
+    """Of moments (..., 3) from +z, degrees."""
+    return np.asarray(np.degrees(np.arctan2(np.hypot(moments[..., 0], moments[..., 1]), moments[..., 2])))
 
 
 def content(kind: str, state: PageState, shown: Shown | None, regions: Regions | None, samples: Array) -> bytes:

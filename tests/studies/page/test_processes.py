@@ -39,6 +39,7 @@ def test_questions_are_answered_in_turn_and_newer_ones_take_the_place_of_those_t
         worker = Worker("The work", 60.0, said.append)
         for number in range(5):
             worker.ask("root", lambda number=number: (math.sqrt, number), said.append)
+            await asyncio.sleep(0)  # the first begins, the others wait
         worker.ask("other", lambda: (math.sqrt, 100), said.append)
         while worker.busy:
             await asyncio.sleep(0.01)

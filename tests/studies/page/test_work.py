@@ -109,16 +109,16 @@ def test_what_has_no_map():
 
 def test_a_flight_does_what_it_is_told():
     start = begin_flight(STATE)
-    assert start.time.tolist() == [0.0]
-    assert wish("push", [0.0, 0.0, 0.01]).position == start.position
-    assert "free of the magnets" in wish("put", [0.0, 0.0, 0.0]).message
-    assert 0 < fly(1e-4).time[-1] < 1e-3
+    assert start["samples"][0].tolist() == [0.0]
+    assert np.array_equal(wish("push", [0.0, 0.0, 0.01])["pose"]["position"], start["pose"]["position"])
+    assert "free of the magnets" in wish("put", [0.0, 0.0, 0.0])["message"]
+    assert 0 < fly(1e-4)["samples"][0, -1] < 1e-3
     wish("put", [0.0, 0.0, -0.09])
     frame = start
-    while not frame.ended:
+    while not frame["ended"]:
         frame = fly(0.1)
-    assert frame.ended.endswith("touched the rotor or the plate.") or "lost" in frame.ended
-    assert frame.height[-1] < -60.0
+    assert frame["ended"].endswith("touched the rotor or the plate.") or "lost" in frame["ended"]
+    assert frame["samples"][1, -1] < -60.0
 
 
 def test_a_flight_that_cannot_begin_says_why():
