@@ -24,9 +24,9 @@ from .cli.console import note, to_json
 from .cli.options import FieldModel, Models
 from .figures.style import PAGE, PALETTE, legend_below, panels, save_figures, styled
 from .levitation import Levitation
+from .plan import sources
 from .result import variable, write_dataset
 from .run import Job
-from .scene_tables import sources
 from .words import bracketed, worth_a_row
 
 TRUE_MOMENT, MUTUAL = "dipole, true moment", "{} + mutual"
