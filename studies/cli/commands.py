@@ -15,10 +15,14 @@ from .console import note
 from .options import (
     Answer,
     FieldModel,
+    Flag,
     Models,
     Output,
+    Place,
     PlateModel,
     Quantity,
+    SceneFile,
+    Spin,
     Workers,
     default_scene,
     frequency_grid,
@@ -80,14 +84,14 @@ def run(
 
 
 def field(
-    scene: Path,
+    scene: SceneFile,
     *,
     points: Path | None = None,
     plane: Plane | None = None,
     extent_mm: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     offset_mm: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0,
     steps: int = 121,
-    working_point: Annotated[bool, Parameter(negative="")] = False,
+    working_point: Flag = False,
     model: FieldModel = "auto",
     rtol: float = 3e-6,
     output: Output = Output(),
@@ -99,8 +103,6 @@ def field(
 
     Parameters
     ----------
-    scene
-        Scene file.
     points
         CSV file with the columns x_mm, y_mm, z_mm.
     plane
@@ -143,22 +145,8 @@ def field(
     return Answer(*field_job(loaded, places, asked, output.folder), output.json)
 
 
-def equilibria(
-    scene: Path,
-    *,
-    asked: Models = Models(),
-    spin: float = 0.0,
-    output: Output = Output(),
-) -> Answer:
-    """All equilibria of the floater, frequency-locked to the rotor, with their modes and stability.
-
-    Parameters
-    ----------
-    scene
-        Scene file.
-    spin
-        Body spin S = Ω·m̂/ω of the floater about its own moment.
-    """
+def equilibria(scene: SceneFile, *, asked: Models = Models(), spin: Spin = 0.0, output: Output = Output()) -> Answer:
+    """All equilibria of the floater, frequency-locked to the rotor, with their modes and stability."""
     _check_spin(spin)
     loaded = _loaded(scene)
     from ..run import equilibria_job
@@ -167,13 +155,13 @@ def equilibria(
 
 
 def compare(
-    scene: Path,
+    scene: SceneFile,
     *,
     frequency_hz: str | None = None,
     plate_model: PlateModel = "auto",
     rtol: float = Models.rtol,
     plate_rtol: float = Models.plate_rtol,
-    spin: float = 0.0,
+    spin: Spin = 0.0,
     output: Output = Output(),
 ) -> Answer:
     """May the point dipole be used? Every field model's answers about one scene, under the same conditions.
@@ -183,8 +171,6 @@ def compare(
 
     Parameters
     ----------
-    scene
-        Scene file.
     frequency_hz
         Frequencies of the figure, FIRST:LAST:STEP or VALUE,VALUE,... in Hz; left out: about the stable ones.
     plate_model
@@ -193,8 +179,6 @@ def compare(
         Relative accuracy asked of the field wherever the floater can be.
     plate_rtol
         Relative accuracy asked of the plate's reaction.
-    spin
-        Body spin S = Ω·m̂/ω of the floater about its own moment.
     """
     _check_spin(spin)
     frequencies = None if frequency_hz is None else frequency_grid(frequency_hz)
@@ -206,19 +190,12 @@ def compare(
 
 
 def simulate(
-    scene: Path,
-    *,
-    duration_s: float,
-    asked: Models = Models(),
-    resume: Annotated[bool, Parameter(negative="")] = False,
-    output: Output = Output(),
+    scene: SceneFile, *, duration_s: float, asked: Models = Models(), resume: Flag = False, output: Output = Output()
 ) -> Answer:
     """Trajectory of the floater and how it ended; writes trajectory.nc and its figure.
 
     Parameters
     ----------
-    scene
-        Scene file.
     duration_s
         Simulated time, s.
     resume
@@ -234,9 +211,9 @@ def simulate(
 
 
 def plate(
-    scene: Path,
+    scene: SceneFile,
     *,
-    at: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    at: Place,
     frequency_hz: float,
     model: ReactionModel = "auto",
     rtol: float = 1e-3,
@@ -270,12 +247,12 @@ def plate(
 def study(
     name: str | None = None,
     *,
-    list: Annotated[bool, Parameter(negative="")] = False,
-    quick: Annotated[bool, Parameter(negative="")] = False,
+    list: Flag = False,
+    quick: Flag = False,
     vary: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     ask: Quantity = "equilibria",
-    at: Annotated[str, Parameter(allow_leading_hyphen=True)] = "0,0,-20",
-    spin: float = 0.0,
+    at: Place = "0,0,-20",
+    spin: Spin = 0.0,
     duration_s: float = 3.0,
     asked: Models = Models(),
     engine: Workers = Workers(),
@@ -300,8 +277,6 @@ def study(
         What is computed with --vary.
     at
         Place X,Y,Z of the field asked for, mm, rotor's frame.
-    spin
-        Body spin S = Ω·m̂/ω of the equilibria asked for.
     duration_s
         Duration of the trajectories asked for, s.
     """
@@ -343,7 +318,7 @@ def figure(result: Path, *, output: Output = Output()) -> Answer:
     return Answer({"figures": files}, [f"Figure in {file}" for file in files], output.json)
 
 
-def show(result: Path, *, html: Annotated[bool, Parameter(negative="")] = False, output: Output = Output()) -> Answer:
+def show(result: Path, *, html: Flag = False, output: Output = Output()) -> Answer:
     """Three-dimensional pictures of a trajectory, beside its file: scene and currents in the plate, animation, page.
 
     Parameters
@@ -401,13 +376,11 @@ def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
     return Answer({"file": str(path)}, [f"Written: {path}. Next: spinlev run {path}"], output.json)
 
 
-def export(scene: Path, file: Path, *, asked: Models = Models(), output: Output = Output()) -> Answer:
+def export(scene: SceneFile, file: Path, *, asked: Models = Models(), output: Output = Output()) -> Answer:
     """B, H and M inside and around the bodies, and J in the plate, for ParaView.
 
     Parameters
     ----------
-    scene
-        Scene file.
     file
         File to write, OUT.vtu.
     """
@@ -428,7 +401,7 @@ def explore(
     *,
     host: str = "127.0.0.1",
     port: int = 0,
-    no_browser: Annotated[bool, Parameter(negative="")] = False,
+    no_browser: Flag = False,
     output: Output = Output(),
 ) -> Answer:
     """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, live motion.

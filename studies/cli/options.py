@@ -125,6 +125,10 @@ def _number(path: Path, line: int, row: list[str], column: int) -> float:
     return value
 
 
+Flag = Annotated[bool, Parameter(negative="")]
+Place = Annotated[str, Parameter(allow_leading_hyphen=True)]
+SceneFile = Annotated[Path, Parameter(help="Scene file.")]
+Spin = Annotated[float, Parameter(help="Body spin S = Ω·m̂/ω of the floater about its own moment.")]
 FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
 InteractionModel = Literal["rigid", "mutual", "auto"]
 Quantity = Literal["equilibria", "flight", "field"]
@@ -206,9 +210,9 @@ class Output:
         Report why each model was chosen, its number of unknowns, and how well energy is conserved.
     """
 
-    json: Annotated[bool, Parameter(negative="")] = False
+    json: Flag = False
     out: Path | None = None
-    verbose: Annotated[bool, Parameter(negative="")] = False
+    verbose: Flag = False
 
     @property
     def folder(self) -> Path:
@@ -296,7 +300,7 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
         for name in kwargs.keys() - known:
             close = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(signature.parameters)}"
-            raise TypeError(f"{function.__name__}: unknown argument `{name}` ({hint})")
+            raise TypeError(f"Input {name} must be an argument of {function.__name__}; instead it is none ({hint}).")
         with heard(bool(signature.bind(*args, **kwargs).arguments.get("progress"))):
             return function(*args, **kwargs)
 
