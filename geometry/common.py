@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
+import inspect
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import wraps
 from html import escape
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,6 +60,32 @@ class MeshError(ComputationError):
     """No mesh of the bodies, or one whose elements do not match each other."""
 
 
+def no_argument(function: str, name: str, allowed: Iterable[str]) -> str:
+    """Message for a `name` that is no argument of a `function`, with the one of the `allowed` that was probably meant."""
+    names = list(allowed)
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(names)}"
+    return f"Input {name} must be an argument of {function}; instead it is none ({hint})."
+
+
+def spelled(function: Callable[P, T]) -> Callable[P, T]:
+    """A function that says of a slip in the name of an argument which one was probably meant."""
+    signature = inspect.signature(function)
+
+    @wraps(function)
+    def called(*args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            signature.bind(*args, **kwargs)
+        except TypeError:
+            for name in kwargs.keys() - signature.parameters.keys():
+                missing = [known for known in signature.parameters if known not in kwargs]
+                raise TypeError(no_argument(function.__name__, name, missing)) from None
+            raise
+        return function(*args, **kwargs)
+
+    return called
+
+
 def shown(value: object, most: int = 80) -> str:
     """A value that was received, for a message: as Python writes it, on one line, no longer than `most`."""
     try:
@@ -101,6 +130,8 @@ def html_table(title: str, rows: Mapping[str, str]) -> str:
 
 Watch = Callable[[str, float], None]  # Takes the name of a stage and the share of it that is done
 Item = TypeVar("Item")
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 def unwatched(stage: str, share: float) -> None:

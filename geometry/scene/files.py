@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common import Array, InputError, shown
+from ..common import Array, InputError, shown, spelled
 from ..files import file_content, regular_file
 from ..magnets import Magnet
 from ..shapes import Cylinder, rotation_angles
@@ -21,7 +21,7 @@ from ..solids import Part, Solid
 from . import schema
 from .contents import Drag, OffsetStart, Scene
 from .making import assemble, content_digest
-from .messages import SceneError
+from .messages import SceneError, unusual
 
 SAME = 1e-12  # Entry of a vector, in its largest, below which it is round-off
 MOST = 5_000_000  # Bytes of a scene file; one with a thousand magnets has 200 000
@@ -67,6 +67,7 @@ def load_scene(path: str | Path) -> Scene:
         raise
     except InputError as error:
         raise SceneError(source, [str(error)]) from None
+    _warned(scene)
     for keys, magnet in zip(scene_keys(scene)["rotor"].get("magnets", ()), scene.rotor, strict=False):
         body = magnet.body
         if keys.get("file") and not isinstance(body, Part):
@@ -174,6 +175,7 @@ def _replace(raw: Any, key: str, value: float, source: str) -> None:
         ) from None
 
 
+@spelled
 def scene(
     *,
     frequency_hz: float,
@@ -222,7 +224,13 @@ def scene(
     """
     keys = {"frequency_hz": frequency_hz, "gravity_m_s2": gravity_m_s2, "rotor": rotor, "floater": floater}
     keys |= {name: table for name, table in (("plate", plate), ("drag", drag), ("start", start)) if table is not None}
-    return assemble(_plain(keys), "scene")
+    return _warned(assemble(_plain(keys), "scene"))
+
+
+def _warned(scene: Scene) -> Scene:
+    if said := unusual(scene):
+        logging.getLogger("spinlev").warning(said)
+    return scene
 
 
 def _plain(value: Any, depth: int = 0) -> Any:

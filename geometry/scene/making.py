@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..common import InputError, shown
+from ..common import InputError, shown, spelled
 from ..files import regular_file
 from ..step_file import read_part
 from .contents import Scene
@@ -117,6 +117,7 @@ def _cube(remanence_T: float, edge_mm: float | None) -> Table:
     return {"remanence_T": remanence_T} | ({} if edge_mm is None else {"edge_mm": edge_mm})
 
 
+@spelled
 def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """One cube magnetised along +x and displaced along it from the axis.
 
@@ -137,6 +138,7 @@ def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | N
     return {"configuration": "horizontal", "displacement_mm": displacement_mm, **_cube(remanence_T, edge_mm), **more}
 
 
+@spelled
 def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """A cube magnetised along +x and one above it along +z.
 
@@ -155,6 +157,7 @@ def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | Non
     return {"configuration": "vertical", "displacement_mm": displacement_mm, **_cube(remanence_T, edge_mm), **more}
 
 
+@spelled
 def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """One cube, turned with its magnetisation about y.
 
@@ -197,6 +200,7 @@ def magnets(*bodies: Table, **more: Any) -> Table:
     return {"magnets": list(bodies), **more}
 
 
+@spelled
 def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **more: Any) -> Table:
     """The floating sphere.
 
@@ -215,6 +219,7 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
     return {"diameter_mm": diameter_mm, "remanence_T": remanence_T, "density_kg_m3": density_kg_m3, **more}
 
 
+@spelled
 def plate(*, size_mm: Sequence[float], center_mm: Sequence[float], conductivity_S_m: float, **more: Any) -> Table:
     """A conducting plate.
 

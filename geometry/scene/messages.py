@@ -15,6 +15,8 @@ from .schema import TABLES, ExplicitRotor
 
 LONGEST = 60  # Characters of a key in a message
 LONGEST_SOURCE = 300  # Characters of a file's name in a message
+# Beyond these a scene is unusual: remanence, T, and sizes of magnets and floater, m
+STRONGEST, SIZES = 2.0, (1e-4, 1.0)
 MOST = 20  # Faults of a scene that are told; the rest are counted
 # The kinds of error of pydantic.
 RULES = {
@@ -100,6 +102,20 @@ def _allowed(place: Sequence[Any]) -> list[str]:
 def _close(place: Sequence[Any]) -> list[str]:
     """The key that an unknown one was likely meant for, if there is one."""
     return difflib.get_close_matches(str(place[-1])[:LONGEST], _allowed(place), n=1)
+
+
+def unusual(scene: Scene) -> str:
+    """A sentence about polarisations, sizes and distances that no magnet of a laboratory has; empty if all are usual.
+
+    Mistaken units are most often the cause: all keys name theirs.
+    """
+    strongest = max([scene.floater.remanence, *(float(np.linalg.norm(one.polarization)) for one in scene.rotor)])
+    sizes = [2 * scene.floater.radius, *(edge for one in scene.rotor for edge in one.box.size)]
+    farthest = max(float(np.linalg.norm(one.body.center)) for one in scene.rotor)
+    said = [f"a remanence of {strongest:.4g} T (NdFeB has up to 1.5 T)"] if strongest > STRONGEST else []
+    said += [f"a size of {1e3 * size:.4g} mm" for size in (min(sizes), max(sizes)) if not SIZES[0] < size < SIZES[1]]
+    said += [f"a magnet {farthest:.4g} m from the rotor's origin"] if farthest > SIZES[1] else []
+    return f"Unusual: {', '.join(dict.fromkeys(said))}. Is that meant? Every key names its unit." if said else ""
 
 
 def overlap_faults(scene: Scene) -> list[str]:

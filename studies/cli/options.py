@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import inspect
 import io
 import math
@@ -20,7 +19,7 @@ from typing import Annotated, Any, Literal, ParamSpec, Self, TypedDict, TypeVar,
 import numpy as np
 from cyclopts import Parameter
 
-from ...geometry.common import Array, InputError, shown
+from ...geometry.common import Array, InputError, no_argument, shown
 from ...geometry.files import file_content
 from .console import heard
 
@@ -298,9 +297,7 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
     @wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> T:
         for name in kwargs.keys() - known:
-            close = difflib.get_close_matches(name, known, n=1)
-            hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(signature.parameters)}"
-            raise TypeError(f"Input {name} must be an argument of {function.__name__}; instead it is none ({hint}).")
+            raise TypeError(no_argument(function.__name__, name, known))
         with heard(bool(signature.bind(*args, **kwargs).arguments.get("progress"))):
             return function(*args, **kwargs)
 
