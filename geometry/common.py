@@ -61,7 +61,7 @@ class MeshError(ComputationError):
 
 
 def no_argument(function: str, name: str, allowed: Iterable[str]) -> str:
-    """Message for a `name` that is no argument of a `function`, with the one of the `allowed` that was probably meant."""
+    """Message for a `name` that is no argument of a `function`, with the one of the `allowed` that it may stand for."""
     names = list(allowed)
     close = difflib.get_close_matches(name, names, n=1)
     hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(names)}"

@@ -21,6 +21,7 @@ from .studies.interface import (
     draw as draw,
     ensemble as ensemble,
     equilibria as equilibria,
+    field_map as field_map,
     plate_table as plate_table,
     rotor_table as rotor_table,
     run_study as run_study,

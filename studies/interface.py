@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import xarray as xr
@@ -28,6 +28,7 @@ from .cli.options import (
     PlateModel,
     Quantity,
     Workers,
+    check_steps,
     checked_values,
     combinations,
     documented,
@@ -36,6 +37,7 @@ from .cli.options import (
 )
 from .compare import compared, compared_dataset
 from .demagnetising import working_point_dataset
+from .exchange import PLANES, field_map as plane_map
 from .levitation import Levitation
 from .plan import SceneLike, given_scene
 from .processes import mapped
@@ -224,6 +226,52 @@ def rotor_table(
     """
     table = Levitation(scene, Models(model, rtol=rtol)).table
     return complete(table, max(rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
+
+
+@documented
+def field_map(
+    scene: SceneLike,
+    plane: Literal["xy", "xz", "yz"] = "xz",
+    extent: Sequence[float] | None = None,
+    offset: float = 0.0,
+    steps: int = 121,
+    progress: bool = False,
+) -> xr.Dataset:
+    """B, H and M on a plane through or beside the rotor, by dipole, closed form and finite elements.
+
+    Parameters
+    ----------
+    scene
+    plane : {"xz", "xy", "yz"}
+        Across and up, in the rotor's frame at t = 0.
+    extent : sequence of 4 floats, optional
+        Left, right, lower and upper end, m; left out: twice the rotor's size.
+    offset : float
+        Third coordinate, m.
+    steps : int
+        Points along the longer side, 5 to 1001.
+    progress
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `model`, the two coordinates of the plane (m) and `component`: `B` (T), `H`, `M` (A/m), the relative
+        `difference` from the finite elements, their stated `error` (T), and the number of the `magnet` at a place.
+
+    Raises
+    ------
+    InputError
+        A plane, an extent, a number of steps or a file that cannot be used.
+    """
+    if plane not in PLANES:
+        raise InputError(f"Input plane must be one of {', '.join(PLANES)}; instead received {plane}.")
+    check_steps("steps", steps)
+    ends = None if extent is None else np.array([finite("extent", end) for end in extent])
+    if ends is not None and not (len(ends) == 4 and ends[0] < ends[1] and ends[2] < ends[3]):
+        said = "left, right, lower and upper end in rising order, m"
+        raise InputError(f"Input extent must be {said}; instead received {extent}.")
+    found = plane_map(given_scene(scene), plane, ends, finite("offset", offset), steps)
+    return found.rename(u=plane[0], v=plane[1])
 
 
 @documented

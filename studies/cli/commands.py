@@ -24,6 +24,7 @@ from .options import (
     SceneFile,
     Spin,
     Workers,
+    check_steps,
     default_scene,
     frequency_grid,
     map_extent,
@@ -132,8 +133,7 @@ def field(
         return Answer(*working_point_job(Levitation(_loaded(scene), asked), output.folder), output.json)
     if plane is not None:
         extent = None if extent_mm is None else map_extent(extent_mm)
-        if not 5 <= steps <= 1001:
-            raise InputError(f"Input --steps must be between 5 and 1001; instead received {steps}.")
+        check_steps("--steps", steps)
         from ..exchange import field_map_job
 
         made = field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)

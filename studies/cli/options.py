@@ -60,6 +60,12 @@ def map_extent(text: str) -> Array:
     return np.array(numbers) * 1e-3
 
 
+def check_steps(name: str, steps: int) -> None:
+    """Raise InputError where a map cannot have so many points along its longer side."""
+    if not is_number(steps) or steps != int(steps) or not 5 <= steps <= 1001:
+        raise InputError(f"Input {name} must be between 5 and 1001; instead received {shown(steps)}.")
+
+
 def is_number(value: Any) -> bool:
     """Whether it is a finite number that a float holds."""
     if not isinstance(value, Real) or isinstance(value, bool):

@@ -262,3 +262,18 @@ def test_shared_arguments_are_written_out_and_a_slip_gets_a_hint():
         assert ("\nplate_rtol : float\n" in str(function.__doc__)) == ("plate_model" in names)
     with pytest.raises(TypeError, match="did you mean `plate_model`"):
         sl.equilibria(HORIZONTAL, plate_modl="none")
+    with pytest.raises(TypeError, match="did you mean `diameter_mm`"):
+        sl.sphere(diameter=12.7, remanence_T=1.3, density_kg_m3=7500.0)
+    with pytest.raises(TypeError, match="missing a required"):
+        sl.sphere(remanence_T=1.3, density_kg_m3=7500.0)
+
+
+def test_magnitudes_that_no_magnet_has_are_told(caplog):
+    cube, ball = {"angle_deg": 10.0, "edge_mm": 10.0}, sl.sphere(diameter_mm=9.0, remanence_T=1.3, density_kg_m3=7e3)
+    sl.scene(frequency_hz=130.0, rotor=sl.tilt(**cube, remanence_T=1.3), floater=ball)
+    assert not caplog.text
+    sl.scene(frequency_hz=130.0, rotor=sl.tilt(**cube, remanence_T=13.0), floater=ball)
+    assert "Unusual: a remanence of 13 T (NdFeB has up to 1.5 T). Is that meant?" in caplog.text
+    far = {"size_mm": [0.012, 10, 10], "center_mm": [0, 0, 2e4], "polarization_T": [1.3, 0, 0]}
+    sl.scene(frequency_hz=130.0, rotor=sl.magnets(far), floater=ball)
+    assert "a size of 0.012 mm, a magnet 20 m from the rotor's origin" in caplog.text

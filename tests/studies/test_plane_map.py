@@ -35,6 +35,34 @@ def test_a_map_of_a_sphere_has_its_exact_field_inside_and_outside():
     assert outside == pytest.approx(0.05 / 3, rel=1e-6)
 
 
+def test_python_has_the_map_over_the_coordinates_of_its_plane():
+    found = sl.field_map(scene_of(SPHERE), "yz", (-8e-3, 8e-3, -9e-3, -6e-3), 1e-3, 9)
+    assert found["B"].dims == ("model", "z", "y", "component")
+    assert {name: found[name].attrs["units"] for name in ("y", "z", "B", "H", "error")} == {
+        "y": "m", "z": "m", "B": "T", "H": "A/m", "error": "T"
+    }  # fmt: skip
+    table = sl.rotor_table(scene_of(SPHERE), "fem")
+    alone = table.evaluate([[1e-3, float(found["y"][2]), float(found["z"][0])]])[0][0]
+    assert found["B"].sel(model="fem")[0, 2].values == pytest.approx(alone, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"plane": "xq"}, "plane must be one of xy, xz, yz"),
+        ({"extent": (1.0, -1.0, 0.0, 1.0)}, "extent must be left, right, lower and upper end"),
+        ({"extent": (0.0, 1.0)}, "extent must be left"),
+        ({"extent": (0.0, float("nan"), 0.0, 1.0)}, "extent must be a finite number"),
+        ({"steps": 3}, "steps must be between 5 and 1001"),
+        ({"steps": 7.5}, "steps must be between 5 and 1001"),
+        ({"offset": "a"}, "offset must be a finite number"),
+    ],
+)
+def test_python_refuses_what_no_map_can_be_of(wrong, said):
+    with pytest.raises(InputError, match=said):
+        sl.field_map(scene_of(SPHERE), **wrong)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("map")
