@@ -11,8 +11,8 @@ from ..geometry.overlap import body_overlap
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from ..geometry.solids import moved
-from .cli.console import heard, note
-from .cli.options import FieldModel, Models
+from .cli.console import note
+from .cli.options import FieldModel, Models, documented
 from .levitation import Levitation
 from .plan import SceneLike
 from .result import AXIS, variable
@@ -20,6 +20,7 @@ from .result import AXIS, variable
 COARSE = 12  # degree of the rule whose difference from the full one is the error of the sums
 
 
+@documented
 def floater_force(
     scene: SceneLike,
     position: ArrayLike,
@@ -36,20 +37,13 @@ def floater_force(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        The scene, or the path of its file.
+    scene, model, rtol, progress
     position : array_like
         (n, 3) or (3,) of the floater's centre, m, rotor's frame.
     moment : array_like
         (n, 3) or (3,) directions of its moment, the body's z.
     body_x : array_like, optional
         (n, 3) or (3,) directions near which the body's x lies; left out, near the rotor's x. It matters to a cuboid.
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
-        Model of the rotor's field.
-    rtol : float
-        Relative accuracy asked of that field.
-    progress : bool
-        Whether messages go to standard error.
 
     Returns
     -------
@@ -73,18 +67,17 @@ def floater_force(
     >>> print(f"{found.force.values[0, 2]:.3f} N")
     1.466 N
     """
-    with heard(progress):
-        levitation = Levitation(scene, Models(model, rtol=rtol))
-        floater, table = levitation.scene.floater, levitation.table
-        places, pointing = np.broadcast_arrays(_vectors("position", position), _directions("moment", moment))
-        axes = np.array([floater.axes(m) for m in pointing])
-        if body_x is not None:
-            axes = _turned(axes, np.broadcast_to(_directions("body_x", body_x), places.shape))
-        _check_free(levitation.scene, places, axes)
-        fine, coarse = floater_sources(floater, note), floater_sources(floater, note, COARSE)
-        force, torque = _acting(fine, table, places, axes)
-        rough = _acting(coarse, table, places, axes)
-        unsure = fine.unsure(table, places, axes)
+    levitation = Levitation(scene, Models(model, rtol=rtol))
+    floater, table = levitation.scene.floater, levitation.table
+    places, pointing = np.broadcast_arrays(_vectors("position", position), _directions("moment", moment))
+    axes = np.array([floater.axes(m) for m in pointing])
+    if body_x is not None:
+        axes = _turned(axes, np.broadcast_to(_directions("body_x", body_x), places.shape))
+    _check_free(levitation.scene, places, axes)
+    fine, coarse = floater_sources(floater, note), floater_sources(floater, note, COARSE)
+    force, torque = _acting(fine, table, places, axes)
+    rough = _acting(coarse, table, places, axes)
+    unsure = fine.unsure(table, places, axes)
     errors = [
         doubt + np.linalg.norm(one - other, axis=1)
         for doubt, one, other in zip(unsure, (force, torque), rough, strict=True)

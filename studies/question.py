@@ -21,7 +21,7 @@ from ..fem.rotor.table import canonical
 from ..geometry.common import Array, InputError, SpinlevError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text, startless_text
-from .cli.options import Models, Quantity, positive
+from .cli.options import NAMES, Models, Quantity, positive
 from .levitation import Levitation
 from .plan import equations_key, nearest_faces
 from .result import AXIS, found_dataset, variable
@@ -98,7 +98,7 @@ def _fly_together(levitations: Sequence[Levitation], duration: float) -> None:
                     one.adopt_flight(duration, flight)
 
 
-CHOICES = ("model", "plate_model", "interaction", "spin")  # what can be varied beside the keys of the scene file
+CHOICES = (*NAMES, "spin")  # what can be varied beside the keys of the scene file
 ROTOR = ("rotor", "model", "interaction", "floater")  # how keys begin whose values need a table of their own
 # How many points are answered together at most, and lost together if the program is killed among them.
 LARGEST: Mapping[Quantity, int] = {"equilibria": 60, "flight": 32, "field": 60}

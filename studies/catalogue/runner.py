@@ -18,7 +18,7 @@ from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import check_files, parse_scene
 from ..cli.console import note, progress
-from ..cli.options import Models, Workers, combinations
+from ..cli.options import NAMES, Models, Workers, combinations
 from ..compare import compare_figure
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
@@ -106,7 +106,7 @@ def question_job(question: Question, values: dict[str, list[Any]], engine: Worke
 def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> Study:
     """One's own question over a grid as a study. Raises InputError where the first point or a model cannot be."""
     points = combinations(values)
-    for key in ("plate_model", "interaction", "model"):
+    for key in NAMES:
         for value in values.get(key, ()):
             question.levitation({**points[0], key: value})
     question.levitation(points[0])

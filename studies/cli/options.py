@@ -138,6 +138,10 @@ FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
 InteractionModel = Literal["rigid", "mutual", "auto"]
 Quantity = Literal["equilibria", "flight", "field"]
 PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
+# Options whose values are names.
+NAMES = {
+    "model": get_args(FieldModel), "plate_model": get_args(PlateModel), "interaction": get_args(InteractionModel),
+}  # fmt: skip
 
 
 def default_scene() -> Path:
@@ -184,19 +188,17 @@ class Models:
         ------
         InputError : a model that does not exist, or a tolerance out of range
         """
-        choices = {"model": FieldModel, "plate_model": PlateModel, "interaction": InteractionModel}
-        for name, kind in choices.items():
-            value, known = getattr(self, name), get_args(kind)
+        for name, known in NAMES.items():
+            value = getattr(self, name)
             if not isinstance(value, str) or value not in known:
                 raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {shown(value)}.")
-        if not is_number(self.rtol) or not 1e-13 <= self.rtol < 1:
-            raise InputError(
-                f"Input --rtol must be at least 1e-13 and less than 1; instead received {shown(self.rtol)}."
-            )
-        if not is_number(self.plate_rtol) or not 1e-5 <= self.plate_rtol <= 0.1:
-            raise InputError(
-                f"Input --plate-rtol must be at least 1e-5 and at most 0.1; instead received {shown(self.plate_rtol)}."
-            )
+        for name, fine, rule in (
+            ("rtol", lambda value: 1e-13 <= value < 1, "at least 1e-13 and less than 1"),
+            ("plate_rtol", lambda value: 1e-5 <= value <= 0.1, "at least 1e-5 and at most 0.1"),
+        ):
+            if not is_number(value := getattr(self, name)) or not fine(value):
+                option = f"--{name.replace('_', '-')}"
+                raise InputError(f"Input {option} must be {rule}; instead received {shown(value)}.")
         return self
 
 
@@ -316,7 +318,6 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
 
 
 MOST_VALUES = 100_000  # points of a sweep, at most
-NAMED = ("model", "plate_model", "interaction")  # keys whose values are names
 
 
 def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
@@ -333,12 +334,12 @@ def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
             raise _wrong(text)
         if key in found:
             raise InputError(f"Input --vary must give each key once; instead received {shown(key)} twice.")
-        found[key] = [part.strip() for part in values.split(",")] if key in NAMED else _values(text, values)
+        found[key] = [part.strip() for part in values.split(",")] if key in NAMES else _values(text, values)
     return checked_values(found, "--vary")
 
 
 def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") -> dict[str, list[Any]]:
-    """Values by key as lists of floats and, for `NAMED` keys, of texts; `name` is what messages call them.
+    """Values by key as lists of floats and, for those of `NAMES`, of texts; `name` is what messages call them.
 
     Raises
     ------
@@ -353,13 +354,13 @@ def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") ->
         listed = (
             list(given) if isinstance(given, Iterable) and not isinstance(given, str | bytes | Mapping) else [given]
         )
-        fine = all(isinstance(v, str) if key in NAMED else is_number(v) for v in listed)
+        fine = all(isinstance(v, str) if key in NAMES else is_number(v) for v in listed)
         if not listed or not fine:
-            what = "names" if key in NAMED else "finite numbers"
+            what = "names" if key in NAMES else "finite numbers"
             raise InputError(f"Input {key} must be varied over {what}; instead received {shown(given)}.")
         if len(set(listed)) < len(listed):
             raise InputError(f"Input {name} must give {key} each value once; instead received {shown(given)}.")
-        found[key] = listed if key in NAMED else [float(value) for value in listed]
+        found[key] = listed if key in NAMES else [float(value) for value in listed]
     points = math.prod(len(each) for each in found.values())
     if points > MOST_VALUES:
         raise InputError(f"Input {name} must make at most {MOST_VALUES} points; instead received {points}.")
