@@ -239,7 +239,7 @@ def plate(
     positive("--rtol", rtol)
     place = three_numbers("--at", at)
     loaded = _loaded(scene)
-    from ..reaction import plate_job
+    from ..run import plate_job
 
     return Answer(*plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.folder), output.json)
 

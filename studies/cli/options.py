@@ -192,11 +192,11 @@ class Models:
             value = getattr(self, name)
             if not isinstance(value, str) or value not in known:
                 raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {shown(value)}.")
-        for name, fine, rule in (
-            ("rtol", lambda value: 1e-13 <= value < 1, "at least 1e-13 and less than 1"),
-            ("plate_rtol", lambda value: 1e-5 <= value <= 0.1, "at least 1e-5 and at most 0.1"),
+        for name, least, most, rule in (
+            ("rtol", 1e-13, math.nextafter(1, 0), "at least 1e-13 and less than 1"),
+            ("plate_rtol", 1e-5, 0.1, "at least 1e-5 and at most 0.1"),
         ):
-            if not is_number(value := getattr(self, name)) or not fine(value):
+            if not is_number(value := getattr(self, name)) or not least <= value <= most:
                 option = f"--{name.replace('_', '-')}"
                 raise InputError(f"Input {option} must be {rule}; instead received {shown(value)}.")
         return self

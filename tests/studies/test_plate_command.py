@@ -15,7 +15,7 @@ from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.shapes import Box, rotation_matrix
 from spinlev.studies.cli.main import app
 from spinlev.studies.plan import check_room
-from spinlev.studies.reaction import response
+from spinlev.studies.run import response
 
 SetNumThreads(1)
 SCENE = "scenes/tilt-over-plate.toml"

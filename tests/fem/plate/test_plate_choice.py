@@ -12,7 +12,7 @@ from spinlev.fem.plate.slab import Slab, edge_error, measured_edge_error, reacti
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.shapes import Box
-from spinlev.studies.reaction import plate_job
+from spinlev.studies.run import plate_job
 
 SCENE = load_scene(HORIZONTAL)
 PLACE = np.array([0.0, 0.0, -0.02])
