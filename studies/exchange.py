@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 def field_map_figure(found: xr.Dataset) -> Figure:
     """|B| with field lines through the magnets, by model; below, what they differ from the finite elements."""
     from matplotlib.colors import LogNorm
+    from matplotlib.ticker import LogLocator
 
     figure, axes = panels(2, 3, (PAGE, 4.6), sharex=True, sharey=True)
     size = 1e3 * np.linalg.norm(found["B"].values, axis=-1)
@@ -43,7 +44,11 @@ def field_map_figure(found: xr.Dataset) -> Figure:
         shown = _colours(axes[0, k], found, size[k], limits, "viridis")
         _lines(axes[0, k], found, model)
         axes[0, k].set_title("closed form (μr = 1)" if model == "cuboid" else NAMES[model])
-    figure.colorbar(shown, ax=axes[0].tolist(), label="|B| (mT)")
+    u, v, outside = 1e3 * found["u"].values, 1e3 * found["v"].values, found["outside"].values
+    for axis in axes[:, 0]:  # a dipole's field means nothing there
+        axis.contourf(u, v, outside, levels=[-np.inf, 0.0], colors=["0.85"], hatches=["////"], zorder=2)
+    bar = figure.colorbar(shown, ax=axes[0].tolist(), label="|B| (mT)", ticks=LogLocator(subs=(1, 2, 5)), format="%g")
+    bar.ax.yaxis.set_minor_formatter("")
     apart = LogNorm(1e-6, 1.0)
     error = found["error"].values / np.linalg.norm(found["B"].sel(model="fem").values, axis=-1)
     titles = ("dipole, difference", "closed form, difference", "finite elements, stated error")
@@ -59,11 +64,9 @@ def field_map_figure(found: xr.Dataset) -> Figure:
 
 
 def _colours(axes: Axes, found: xr.Dataset, values: Any, norm: Any, cmap: str) -> Any:
-    u, v = 1e3 * found["u"].values, 1e3 * found["v"].values
+    u, v, inside = 1e3 * found["u"].values, 1e3 * found["v"].values, -found["outside"].values
     shown = axes.pcolormesh(u, v, values, norm=norm, cmap=cmap, shading="gouraud", rasterized=True)
-    magnet = found["magnet"].values
-    for number in range(1, int(magnet.max()) + 1):
-        axes.contour(u, v, (magnet == number).astype(float), levels=[0.5], colors="white", linewidths=0.8)
+    axes.contour(u, v, inside, levels=[0.0], colors="white", linewidths=0.8)
     axes.set_aspect("equal")
     axes.grid(False)
     return shown
@@ -224,6 +227,7 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
     points = np.zeros((len(v), len(u), 3))
     points[..., along], points[..., up], points[..., across] = u, v[:, None], offset
     places = points.reshape(-1, 3)
+    outside = np.min([magnet.body.distance(places) for magnet in scene.rotor], axis=0)
     clear = np.min([magnet.body.edge_distance(places) for magnet in scene.rotor], axis=0) > OFF_EDGE
     b, h = (np.full((3, len(places), 3), np.nan) for _ in range(2))
     b[0], h[0] = (_dipoles(scene, places),) * 2
@@ -246,6 +250,7 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
             "M": (vectors, (b - h).reshape(3, *shape, 3) / MU_0, {"units": "A/m", "long_name": "magnetisation"}),
             "difference": (("model", *dims), difference.reshape(3, *shape), {"units": "1", "long_name": "|ΔB|/|B|"}),
             "error": (dims, error.reshape(shape), attrs | {"long_name": "estimated error of the finite elements"}),
+            "outside": (dims, outside.reshape(shape), {"units": "m", "long_name": "distance to the next magnet"}),
             "magnet": (dims, magnet.reshape(shape) + 1, {"units": "1", "long_name": "number of the magnet, 0 in air"}),
         },
         {

@@ -19,6 +19,7 @@ from ...geometry.scene.contents import Plate, Scene
 from .view import FieldPlane, Frames, View, field_lines, frame_times
 
 ORDER = 3  # Of the elements: a picture needs no more
+PATH = 12  # Turns of the rotor at the end of a flight whose path is drawn
 LATEST = 200  # Samples at the end of a flight among which one is shown
 ANGLES = 8  # Of the rotor, from which the part of its field at the rotor's frequency is taken
 
@@ -45,7 +46,9 @@ def seen_from(scene: Scene, time: Array, motion: State) -> View:
         frame, angle = "laboratory", scene.angular_velocity * time
         motion = motion.to_lab(angle)
         last -= int(np.argmax(np.cos(angle[:-LATEST:-1])))
-    return View(scene, motion.position[last], motion.moment[last], motion.position, frame=frame)
+    seconds = PATH / scene.frequency if scene.frequency else np.inf
+    path = motion.position[(time <= time[last]) & (time >= time[last] - seconds)]  # all of it would be a solid band
+    return View(scene, motion.position[last], motion.moment[last], path, frame=frame)
 
 
 def drawn_field(scene: Scene, table: FieldTable) -> Callable[[Array], Array]:

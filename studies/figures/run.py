@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
 
 from ...geometry.common import Array
 from .style import COLORS, COLUMN, DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DISTANCE = "distance below the rotor (mm)"
+DISTANCE = "levitation distance (mm)"
 MARKS = (
     (False, 1, "o", None, "stable, no plate"),
     (False, 0, "o", "white", "unstable, no plate"),
@@ -33,30 +34,33 @@ UNITS = {"hz": "Hz", "mm": "mm", "deg": "°", "T": "T", "s": "s"}
 QUANTITIES = {
     "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
     "flight": ("levitated", "height_spread"),
-    "field": ("size", "B_error"),
+    "field": ("across", "along", "B_error"),
 }  # Quantities drawn for each question, those of the motion in the laboratory
 
 
 @styled
 def field_figure(result: xr.Dataset) -> Figure:
-    """Field components on the axis below the rotor for every model, and how far the models are apart."""
+    """The field's two components on the axis below the rotor, and how far the models are from the best of them."""
     figure, ((left, right),) = panels(1, 2, (PAGE, 3.2))
-    distance = -1e3 * result["axis_height"].values
-    reference = str(result.attrs["best_model"])
-    true = result["axis_field"].sel(model=reference).values
-    for model in result["model"].values.tolist():
-        field = result["axis_field"].sel(model=model).values
-        look: dict[str, Any] = {"color": COLORS[model], "linestyle": DASHES[model]}
-        left.semilogy(distance, 1e3 * np.hypot(field[:, 0], field[:, 1]), label=NAMES[model], **look)
-        left.semilogy(distance, 1e3 * np.abs(field[:, 2]), **{**look, "lw": 0.6})
-        if model != reference:
-            apart = np.linalg.norm(field - true, axis=1) / np.linalg.norm(true, axis=1)
-            right.semilogy(distance, apart, label=NAMES[model], **look)
-    left.plot([], [], color="0.3", lw=0.6, label="thin: along the axis, else across it")
+    distance, reference = -1e3 * result["axis_height"].values, str(result.attrs["best_model"])
+    fields = {str(model): result["axis_field"].sel(model=model).values for model in result["model"].values}
+    best = fields.pop(reference)
+    left.semilogy(distance, 1e3 * np.hypot(best[:, 0], best[:, 1]), color=COLORS[reference], label="across the axis")
+    left.semilogy(distance, 1e3 * np.abs(best[:, 2]), "--", color=COLORS[reference], label="along the axis")
+    size = np.linalg.norm(best, axis=1)
+    looks = {model: (COLORS[model], DASHES[model], NAMES[model]) for model in fields}
+    far = np.flatnonzero(np.isfinite(best).all(axis=1))[-1]
+    if "dipole" in fields:  # of the moment that B_r V / mu_0 is not, where the magnets are permeable
+        moment = float(best[far] @ fields["dipole"][far] / (fields["dipole"][far] @ fields["dipole"][far]))
+        fields["true"] = moment * fields["dipole"]
+        looks["true"] = PALETTE[5], ":", f"point dipole of the true moment ({100 * (moment - 1):+.2g} %)"
+    for model, field in fields.items():
+        color, style, label = looks[model]
+        right.semilogy(distance, np.linalg.norm(field - best, axis=1) / size, style, color=color, label=label)
     error = result["axis_error"].sel(model=reference).values
     right.fill_between(distance, np.nanmin(error) / 3, error, color="0.85", label=f"error estimate, {NAMES[reference]}")
-    left.set(xlabel=DISTANCE, ylabel="|B component| (mT)")
-    right.set(xlabel=DISTANCE, ylabel=f"deviation from {NAMES[reference]}, |ΔB| / |B|")
+    left.set(xlabel=DISTANCE, ylabel=f"|B component| (mT), {NAMES[reference]}")
+    right.set(xlabel=DISTANCE, ylabel=f"|ΔB| / |B| against {NAMES[reference]}")
     legend_below(figure, columns=3)
     return figure
 
@@ -65,25 +69,34 @@ def field_figure(result: xr.Dataset) -> Figure:
 def force_figure(result: xr.Dataset) -> Figure:
     """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
     figure, ((axes, near),) = panels(1, 2, (PAGE, 3.6))
-    weight, felt = -1e3 * float(result.attrs["weight_N"]), _with_plate(result)
+    weight = -1e3 * float(result.attrs["weight_N"])
+    felt = result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1  # older results do not say
+    depth = -1e3 * result["equilibrium_position"].sel(axis="z")
+    curves = result[["curve_model", "curve_number", "curve_position", "curve_force"]]  # not the flight's many samples
+    peaks = [3.5 * weight]
     for panel in (axes, near):
         panel.axhline(weight, color="0.3", lw=0.8, label="weight of the floater")
         for model in dict.fromkeys(result["curve_model"].values.tolist()):
-            _draw_curves(panel, result, model)
-            for plate, stable, marker, fill, _ in MARKS:
-                chosen = (felt == plate) & (result["equilibrium_stable"] == stable)
-                chosen &= result["equilibrium_model"] == model
-                place = -1e3 * result["equilibrium_position"].sel(axis="z").where(chosen).dropna("equilibrium").values
-                look: dict[str, Any] = {"color": COLORS[model], "mfc": fill or COLORS[model]}
-                panel.plot(place, np.full(place.shape, weight), marker, ms=5, clip_on=True, **look)
-        for _, _, marker, fill, label in MARKS if felt.any() else MARKS[:2]:
-            panel.plot([], [], marker, color="0.3", mfc=fill or "0.3", label=label)
+            look: dict[str, Any] = {"color": COLORS[model], "linestyle": DASHES[model]}
+            panel.plot([], [], label=NAMES[model], **look)
+            of_model = curves.isel(curve_point=(curves["curve_model"] == model).values)
+            for number in np.unique(of_model["curve_number"]):
+                one = of_model.isel(curve_point=(of_model["curve_number"] == number).values)
+                distance, force = -1e3 * one["curve_position"].sel(axis="z").values, 1e3 * one["curve_force"].values
+                panel.plot(*_smooth(np.arange(float(len(force))), distance, force), **look)
+                peaks += force[1:-1][(force[1:-1] > force[:-2]) & (force[1:-1] > force[2:])].tolist()
+        for plate, stable, marker, fill, label in MARKS:
+            chosen = (felt == plate) & (result["equilibrium_stable"] == stable)
+            if chosen.any():
+                panel.plot([], [], marker, color="0.3", mfc=fill or "0.3", label=label)
+            for model in np.unique(result["equilibrium_model"].values[chosen.values]).tolist():
+                place = depth.values[(chosen & (result["equilibrium_model"] == model)).values]
+                panel.plot(place, 0 * place + weight, marker, color=COLORS[model], mfc=fill or COLORS[model], ms=5)
         panel.set(xlabel=DISTANCE)
     axes.set(xlim=(5, 60), ylabel="axial magnetic force (mN), up positive")
     if weight > 0:
-        axes.set_ylim(-2.5 * weight, 3.5 * weight)
-    stable_ones = result["equilibrium_position"].sel(axis="z").where(result["equilibrium_stable"] == 1)
-    first = -1e3 * stable_ones.dropna("equilibrium").values[:1]
+        axes.set_ylim(-2.5 * weight, min(1.1 * max(peaks), 30 * weight))
+    first = depth.values[result["equilibrium_stable"].values == 1][:1]
     if first.size and weight > 0:
         near.set(xlim=(first[0] - 1.0, first[0] + 1.0), ylim=(0.0, 2 * weight))
         near.locator_params(nbins=5)
@@ -91,21 +104,6 @@ def force_figure(result: xr.Dataset) -> Figure:
         near.set_axis_off()
     legend_below(figure, axes, columns=3)
     return figure
-
-
-def _draw_curves(axes: Axes, result: xr.Dataset, model: str) -> None:
-    curves = result[["curve_model", "curve_number", "curve_position", "curve_force"]]  # not the flight's many samples
-    curves = curves.isel(curve_point=(curves["curve_model"] == model).values)
-    for number in np.unique(curves["curve_number"]):
-        points = curves.isel(curve_point=(curves["curve_number"] == number).values)
-        distance, force = -1e3 * points["curve_position"].sel(axis="z").values, 1e3 * points["curve_force"].values
-        axes.plot(*_smooth(np.arange(float(len(force))), distance, force), DASHES[model], color=COLORS[model])
-    axes.plot([], [], DASHES[model], color=COLORS[model], label=NAMES[model])
-
-
-def _with_plate(result: xr.Dataset) -> xr.DataArray:
-    """Which equilibria feel the plate's currents; older results do not say."""
-    return xr.DataArray(result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1)
 
 
 @styled
@@ -120,10 +118,12 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     near = slice(0, SHOWN) if up else slice(-SHOWN, None)
     parts = np.array_split(np.arange(len(time)), min(PARTS, max(1, len(time) // 8)))
     for panel, values in ((far, distance), (tilt, angle)):
-        rows = [(time[p].mean(), values[p].min(), values[p].mean(), values[p].max()) for p in parts]
-        middle, low, mean, high = np.array(rows).T
+        # A weighted mean over some parts: that of each part would have a beat with the modes for a motion.
+        mean = gaussian_filter1d(values, 2 * len(time) / len(parts))
+        rows = [(time[p].mean(), values[p].min(), mean[p].mean(), values[p].max()) for p in parts]
+        middle, low, middling, high = np.array(rows).T
         panel.fill_between(middle, low, high, color=PALETTE[5], alpha=0.6, lw=0, label="smallest to largest")
-        panel.plot(middle, mean, color=PALETTE[0], lw=1.0, label="mean")
+        panel.plot(middle, middling, color=PALETTE[0], lw=1.0, label="mean")
         panel.axvspan(time[near][0], time[near][-1], color=PALETTE[4], alpha=0.4, lw=0, label="shown in (b) and (d)")
         if "lowered_from_s" in result.attrs:
             ends = [min(float(result.attrs[f"lowered_{word}_s"]), seconds[-1]) for word in ("from", "until")]
@@ -143,9 +143,9 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     above.plot(close[2], close[3], style, lw=0.8, ms=3)
     above.plot(x[0], y[0], "o", color=PALETTE[2], ms=4, label="start of (d)")
     above.plot(x[-1], y[-1], "o", color=PALETTE[1], ms=4, label="end of (d)")
-    far.set(ylabel="distance along the axis (mm)")
+    far.set(ylabel=DISTANCE)
     tilt.set(ylabel="polar angle of the moment (°)")
-    look.set(xlabel=f"time ({unit})", ylabel="distance along the axis (mm)")
+    look.set(xlabel=f"time ({unit})", ylabel=DISTANCE)
     above.set(xlabel=f"x (mm), {frame}", ylabel="y (mm)", aspect="equal", adjustable="datalim")
     for panel in (far, look, tilt, above):
         panel.locator_params(axis="x", nbins=5)
@@ -258,8 +258,9 @@ def _derived(result: xr.Dataset) -> xr.Dataset:
         angle = result["polar_angle"].assign_attrs(long_name="polar angle")
         result = result.assign(lateral_offset=aside, polar_angle=angle)
     if "B" in result:
-        size = 1e3 * (result["B"] ** 2).sum("axis", skipna=False) ** 0.5
-        return result.assign(size=size.assign_attrs(units="mT", long_name="|B|"))
+        x, y, z = (1e3 * result["B"].sel(axis=axis, drop=True) for axis in "xyz")
+        parts = {"across": np.hypot(x, y), "along": abs(z)}
+        result = result.assign({k: v.assign_attrs(units="mT", long_name=f"|B| {k} the axis") for k, v in parts.items()})
     return result
 
 
@@ -291,13 +292,15 @@ def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
 
 
 def _label(values: xr.DataArray) -> str:
-    return f"{values.attrs['long_name']} ({values.attrs['units'].replace('deg', '°')})"
+    unit = {"1": "", "deg": " (°)"}.get(values.attrs["units"], f" ({values.attrs['units']})")
+    return f"{values.attrs['long_name']}{unit}"
 
 
 def _axis(key: str) -> str:
-    """A key of the scene file with its unit apart."""
+    """A key of the scene file as words, its unit apart."""
     name, _, unit = key.rpartition("_")
-    return f"{name} ({UNITS[unit]})" if unit in UNITS else key
+    words = f"{name} ({UNITS[unit]})" if unit in UNITS else key
+    return words.replace(".", " ").replace("_", " ")
 
 
 def _varied(result: xr.Dataset) -> list[str]:

@@ -23,7 +23,7 @@ from .view import FINE, SEEN, Currents, Frames, View, arrow, near_plate, triangl
 
 NORTH, METAL, DARK = "#D55E00", "#9AA5B1", "#4C566A"
 PER_SECOND = 12
-FIELD, CURRENT = "field (mT)", "J (A/mm²)"  # VTK takes | for borders of cells
+FIELD, CURRENT = "B (mT)", "J (A/mm²)"  # VTK takes | for borders of cells
 BAR: dict[str, Any] = {"color": "black", "vertical": True, "position_y": 0.3, "height": 0.4}
 BAR |= {"title_font_size": 24, "label_font_size": 22}
 NAME: dict[str, Any] = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7}
@@ -179,7 +179,7 @@ def _add_bodies(plotter: pv.Plotter, view: View) -> float:
     steps = [times for k in range(7) for times in (10.0**k, 2 * 10.0**k, 5 * 10.0**k)]
     times = max([1.0, *(t for t in steps if t * reach <= 800 * scene.floater.radius)])
     shown = middle + times * (path - middle)[:: max(1, len(path) // 20000)]
-    plotter.add_mesh(pv.MultipleLines(shown), color="#0072B2", line_width=2, opacity=0.8)
+    plotter.add_mesh(pv.MultipleLines(shown), color="#0072B2", line_width=2)
     return times
 
 

@@ -169,47 +169,34 @@ def field_lines(scene: Scene, field: Callable[[Array], Array], low: Array, high:
     field : B (n, 3) at points (n, 3) m
     low, high : (3,) corners m of the box in which they are followed
     """
-    seeds = _seeds(scene, field)
-    ways = [_followed(scene, field, seeds, sign, low, high) for sign in (-1.0, 1.0)]
-    lines = [np.concatenate([back[::-1], ahead[1:]]) for back, ahead in zip(*ways, strict=True)]
-    seen = [line[((line > low) & (line < high)).all(axis=1)] for line in lines]
-    return [line for line in seen if len(line) > 2]
-
-
-def _seeds(scene: Scene, field: Callable[[Array], Array]) -> Array:
-    """Places (LINES, 3) m on a circle around the magnets."""
     corners = np.concatenate([magnet.box.corners for magnet in scene.rotor])
     middle = corners.mean(axis=0) * (1, 0, 1)
     radius = 1.03 * np.linalg.norm((corners - middle)[:, [0, 2]], axis=1).max()
-    angles = np.linspace(-np.pi, np.pi, 721)
+    angles = np.linspace(-np.pi, np.pi, 721)  # of a circle around the magnets, on which all begin
     outwards = np.column_stack([np.cos(angles), 0 * angles, np.sin(angles)])
     flux = np.cumsum(np.abs(np.einsum("nk,nk->n", field(middle + radius * outwards), outwards)))
     if not flux[-1] > 0:
-        return np.zeros((0, 3))
-    return np.asarray(middle + radius * outwards[np.searchsorted(flux, (np.arange(LINES) + 0.5) / LINES * flux[-1])])
+        return []
+    start = middle + radius * outwards[np.searchsorted(flux, (np.arange(LINES) + 0.5) / LINES * flux[-1])]
+    found: list[list[Array]] = [[place] for place in start]
+    for sign in (-1.0, 1.0):
 
+        def slope(places: Array, sign: float = sign) -> Array:
+            b = field(places)
+            return np.asarray(sign * b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-30))
 
-def _followed(
-    scene: Scene, field: Callable[[Array], Array], start: Array, sign: float, low: Array, high: Array
-) -> list[Array]:
-    """From each start (n, 3) along the field or against it, to a magnet or out of the box."""
-
-    def slope(places: Array) -> Array:
-        b = field(places)
-        return np.asarray(sign * b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-30))
-
-    lines, active, places = [[place] for place in start], np.arange(len(start)), start
-    for _ in range(STEPS):
-        free = ((places > low) & (places < high)).all(axis=1)
-        for magnet in scene.rotor:
-            free &= magnet.body.distance(places) > 0.2 * STEP
-        active, places = active[free], places[free]
-        if not len(active):
-            break
-        one = slope(places)
-        two = slope(places + STEP / 2 * one)
-        three = slope(places + STEP / 2 * two)
-        places = places + STEP / 6 * (one + 2 * two + 2 * three + slope(places + STEP * three))
-        for k, place in zip(active, places, strict=True):
-            lines[k].append(place)
-    return [np.array(line) for line in lines]
+        active, places = np.arange(len(start)), start
+        for _ in range(STEPS):
+            one = slope(places)
+            two = slope(places + STEP / 2 * one)
+            three = slope(places + STEP / 2 * two)
+            places = places + STEP / 6 * (one + 2 * two + 2 * three + slope(places + STEP * three))
+            free = ((places > low) & (places < high)).all(axis=1)
+            for magnet in scene.rotor:
+                free &= magnet.body.distance(places) > 0.2 * STEP
+            active, places = active[free], places[free]
+            for k, place in zip(active, places, strict=True):
+                found[k].insert(0 if sign < 0 else len(found[k]), place)
+            if not len(active):
+                break
+    return [np.array(line) for line in found if len(line) > 2]
