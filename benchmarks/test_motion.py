@@ -15,7 +15,8 @@ from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.choice import rotor_nearby
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.studies.cli.options import Models
-from spinlev.studies.levitation import Levitation, plate_memory
+from spinlev.studies.levitation import Levitation
+from spinlev.studies.plan import PlatePlan
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 LONG = 20.0
@@ -109,7 +110,8 @@ def test_flights_side_by_side(benchmark, start):
 def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
     """A floater that hangs over the plate's currents, at the tolerance and in the fields that `simulate` uses."""
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
-    memory = plate_memory(SCENE, SCENE.plate, plate_model, table, start.position, rtol)
+    levitation = Levitation(SCENE, Models(model, interaction="rigid"))
+    memory = levitation.plate_about(start.position, PlatePlan(plate_model, 0.0, rtol))
     table = rotor_nearby(table, SCENE.rotor, start.position, SCENE.floater.radius, 3e-6)
     equilibria = with_plate(SCENE, table, survey(SCENE, table), memory, Rates(table)).equilibria
     begun, currents = initial_state(SCENE, table, equilibria, memory)

@@ -16,7 +16,9 @@ from spinlev.fem.plate.eddy import solve_eddy
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.meshes.magnets import MeshSettings
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
-from spinlev.studies.levitation import plate_memory
+from spinlev.studies.cli.options import Models
+from spinlev.studies.levitation import Levitation
+from spinlev.studies.plan import PlatePlan
 
 FREE = replace(SCENE, plate=None, drag=replace(SCENE.drag, linear=0.0, angular=0.0))
 LONG = 20.0
@@ -61,7 +63,7 @@ def test_states(benchmark, rtol):
     """A flight over a plate whose network has more and more states."""
     table = rotor_table(SCENE.rotor, "cuboid", nearest=SCENE.floater.radius)
     start, _ = initial_state(FREE, table)
-    memory = plate_memory(SCENE, SCENE.plate, "slab", table, start.position, rtol)
+    memory = Levitation(SCENE, Models("cuboid")).plate_about(start.position, PlatePlan("slab", 0.0, rtol))
     flight = Flight(SCENE, table, LONG, PLATE_TOLERANCE, True, memory)
     still = np.zeros(len(memory.table.rates))
     flown = benchmark.pedantic(lambda: integrate(flight, start, 0.2, currents=still), rounds=10, warmup_rounds=1)

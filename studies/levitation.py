@@ -31,10 +31,11 @@ from ..fem.rotor.models import AccuracyError
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
 from ..geometry.common import Array, SpinlevError, Watch, unwatched
-from ..geometry.scene.contents import AbsoluteStart, Plate, Scene
+from ..geometry.scene.contents import AbsoluteStart, Plate
 from .cli.console import detail, note, progress, stages
 from .cli.options import FieldModel, Models, finite, positive
 from .plan import (
+    PlatePlan,
     RotorField,
     SceneLike,
     SharedTables,
@@ -53,36 +54,6 @@ from .plan import (
 
 AHEAD = 1.0  # of a trajectory, s, that is looked at beforehand
 PLACES = 50  # on a trajectory, at which the error by a slab's missing edges is looked at
-
-
-def plate_memory(
-    scene: Scene,
-    plate: Plate,
-    model: str,
-    table: RotorTable,
-    place: Array,
-    rtol: float,
-    edges: float = 0.0,
-    tables: SharedTables | None = None,
-    region: Region | None = None,
-) -> PlateMemory:
-    """The plate's currents for a floater about a place that turns with the rotor.
-
-    Parameters
-    ----------
-    model, table, place, rtol, region : as of `plate_around`, whose errors and those of the model are raised
-    edges : relative error by edges that the model leaves out
-    tables : shared with other scenes
-    """
-    asked = plate_around(plate, model, table, place, scene.floater.radius, scene.frequency, rtol, region)
-
-    def make(watch: Watch) -> tuple[tuple[PlateTable, RotorShare], bool]:
-        made, share, found = asked.made(note, watch)
-        detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
-        return (made, share), found
-
-    made, share = (tables or SharedTables()).table(asked.key, "plate", "Eddy currents in the plate", make)
-    return PlateMemory(asked.plate, made, share, model, edges)
 
 
 class Levitation:
@@ -336,20 +307,33 @@ class Levitation:
             plan = far_plan(plan, self.models, far)
             if plan.model == "slab":
                 return far
-        return self._plate_memory(place, plan.model, plan.rtol, plan.edges, plan.region)
+        return self.plate_about(place, plan)
 
     def use_plate_of(self, other: Levitation) -> None:
         """Take the model and the region of another's plate, so that both have one network of its currents."""
         known, rtol = other.plate, self.models.plate_rtol
         if known is not None:
             region = known.table.region
-            known = self._plate_memory(np.zeros(3), known.model, rtol, known.neglected, region)
+            known = self.plate_about(np.zeros(3), PlatePlan(known.model, known.neglected, rtol, region))
         self.plate = known
 
-    def _plate_memory(self, place: Array, model: str, rtol: float, edges: float, region: Region | None) -> PlateMemory:
+    def plate_about(self, place: Array, plan: PlatePlan) -> PlateMemory:
+        """The plate's currents as planned, for a floater about a place (3,) m that turns with the rotor.
+
+        Raises what `plate_around` and the plate's models raise.
+        """
         assert self.scene.plate is not None
-        table = sources(self.table)
-        return plate_memory(self.scene, self.scene.plate, model, table, place, rtol, edges, self._tables, region)
+        radius, frequency = self.scene.floater.radius, self.scene.frequency
+        field = sources(self.table), place, radius, frequency
+        asked = plate_around(self.scene.plate, plan.model, *field, plan.rtol, plan.region)
+
+        def make(watch: Watch) -> tuple[tuple[PlateTable, RotorShare], bool]:
+            made, share, found = asked.made(note, watch)
+            detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
+            return (made, share), found
+
+        made, share = self._tables.table(asked.key, "plate", "Eddy currents in the plate", make)
+        return PlateMemory(asked.plate, made, share, plan.model, plan.edges)
 
     def _foreseen(self) -> PlateMemory | None:
         """An infinite slab for where a flight goes at first, if that is far, and what it misses without edges.
@@ -504,13 +488,14 @@ class Levitation:
 
     def _widen(self, region: Region) -> None:
         """Have the plate's table for a region, plate's frame, with more error than asked for where it must be."""
-        known, place, rtol = self.plate, self._flight_place, self.models.plate_rtol
+        known, place = self.plate, self._flight_place
         assert known is not None
         assert place is not None
+        plan = PlatePlan(known.model, known.neglected, self.models.plate_rtol, region)
         try:
-            self.wider = self._plate_memory(place, known.model, rtol, known.neglected, region)
+            self.wider = self.plate_about(place, plan)
         except AccuracyError:
-            self.wider = self._plate_memory(place, known.model, looser(rtol), known.neglected, region)
+            self.wider = self.plate_about(place, replace(plan, rtol=looser(plan.rtol)))
 
 
 def _seen(plate: Plate, flown: Trajectory, most: int | None = None) -> Array:
