@@ -436,7 +436,7 @@ def sweep(
     progress: bool = False,
     **asked: Unpack[Asked],
 ) -> xr.Dataset:
-    """Any quantity of a scene over a grid of its parameters; each key becomes a dimension.
+    """Any quantity of a scene over a grid of its parameters; each key becomes a dimension, `_` for its dots.
 
     Models and `spin` hold at all points unless they are varied.
 

@@ -24,7 +24,7 @@ from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text
 from .cli.options import NAMES, Models, Quantity, positive
 from .levitation import Levitation
 from .plan import equations_key, nearest_faces
-from .result import AXIS, found_dataset, variable
+from .result import AXIS, found_dataset, label_of_key, variable
 from .study import Point
 from .words import kind_of_flight
 
@@ -198,10 +198,12 @@ class Question:
         for name, column in joined.data_vars.items():
             if column.dtype == object:
                 joined[name] = column.fillna("").astype(str)
-        for key in values:
-            joined[key].attrs["long_name"] = key
+        names = {key: key.replace(".", "_") for key in values}  # what `result.frequency_hz` and `sel(...)` take
+        joined = joined.rename(names)
+        for key, name in names.items():
+            joined[name].attrs |= label_of_key(key)
         asked = {f"asked_{name}": value for name, value in asdict(self.models).items()}
-        return joined.assign_attrs(scene=scene_text(self.scene), ask=self.ask, varied=list(values), **asked)
+        return joined.assign_attrs(scene=scene_text(self.scene), ask=self.ask, varied=list(names.values()), **asked)
 
 
 def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:

@@ -208,6 +208,23 @@ def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr
     return xr.Variable(dims, values, {"units": units, "long_name": long_name})
 
 
+# How a key of the scene file ends, for its unit
+ENDS = {"kg_m3": "kg/m³", "S_m": "S/m", "kA_m": "kA/m", "mm_s": "mm/s", "m_s2": "m/s²", "N_s_m": "N s/m"}
+ENDS |= {"N_m_s": "N m s", "hz": "Hz", "mm": "mm", "deg": "deg", "T": "T", "s": "s"}
+
+
+def label_of_key(key: str) -> dict[str, str]:
+    """Unit and name for an axis label of a scene file's key.
+
+    >>> label_of_key("rotor.magnets.1.center_mm.2")
+    {'units': 'mm', 'long_name': 'rotor magnets 1 center 2'}
+    """
+    words, _, number = key.rpartition(".") if key.rpartition(".")[2].isdecimal() else (key, "", "")
+    end = next((end for end in ENDS if words.endswith(f"_{end}")), "")
+    name = " ".join([*words.removesuffix(f"_{end}").replace(".", " ").replace("_", " ").split(), number]).strip()
+    return {"units": ENDS.get(end, "1"), "long_name": name}
+
+
 def columns(table: Columns, found: Mapping[str, Any], **sizes: int) -> dict[str, xr.Variable]:
     """Variables by name as a table of columns has them; NaN, in these sizes, where nothing was found."""
     return {

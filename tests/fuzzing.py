@@ -541,7 +541,7 @@ VALUES = ["", "0", "1", "-1", "3.5", "1e-5", "nan", "inf", "dipole", "slab", "au
           "/nonexistent", "../..", "ä", "9" * 400,
           "-1,0,-40"]  # fmt: skip
 JOBS = [
-    "run.main_job", "run.field_job", "run.equilibria_job", "run.simulate_job", "reaction.plate_job",
+    "run.main_job", "run.field_job", "run.equilibria_job", "run.simulate_job", "run.plate_job",
     *(f"catalogue.runner.{job}" for job in ("study_job", "question_job", "draw_result", "show_job")),
     "catalogue.report.report_job",
 ]  # fmt: skip

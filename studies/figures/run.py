@@ -30,7 +30,6 @@ COARSE = 0.05
 HOURS = 7200.0  # Flights that take longer are drawn over hours, s
 MODE_MARKERS = "osD^v"
 NO_GROWTH = 1e-9  # Growth that counts as none, 1/s
-UNITS = {"hz": "Hz", "mm": "mm", "deg": "°", "T": "T", "s": "s"}
 QUANTITIES = {
     "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
     "flight": ("levitated", "height_spread"),
@@ -259,7 +258,7 @@ def _derived(result: xr.Dataset) -> xr.Dataset:
         result = result.assign(lateral_offset=aside, polar_angle=angle)
     if "B" in result:
         x, y, z = (1e3 * result["B"].sel(axis=axis, drop=True) for axis in "xyz")
-        parts = {"across": np.hypot(x, y), "along": abs(z)}
+        parts = {"across": (x**2 + y**2) ** 0.5, "along": abs(z)}
         result = result.assign({k: v.assign_attrs(units="mT", long_name=f"|B| {k} the axis") for k, v in parts.items()})
     return result
 
@@ -273,7 +272,7 @@ def _curves(axes: Axes, result: xr.Dataset, name: str, key: str, color: str, of:
             chosen = values.where(result["stable"] == stable).transpose(key, "equilibrium").values
             axes.plot([], [], "o", color=color, mfc=fill, ms=4, label=f"{of}{'stable' if stable else 'unstable'}")
             axes.plot(x, chosen, "o", color=color, mfc=fill, ms=4)
-    axes.set(xlabel=_axis(key), ylabel=_label(values))
+    axes.set(xlabel=_label(result[key]), ylabel=_label(values))
     if name == "growth":
         axes.set_yscale("symlog", linthresh=1e-3)
 
@@ -286,21 +285,14 @@ def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
     drawn = axes.pcolormesh(
         result[keys[1]].values, result[keys[0]].values, values.transpose(*keys).values, shading="nearest"
     )
-    axes.set(xlabel=_axis(keys[1]), ylabel=_axis(keys[0]))
+    axes.set(xlabel=_label(result[keys[1]]), ylabel=_label(result[keys[0]]))
     if axes.figure is not None:
         axes.figure.colorbar(drawn, ax=axes, label=_label(values))
 
 
 def _label(values: xr.DataArray) -> str:
-    unit = {"1": "", "deg": " (°)"}.get(values.attrs["units"], f" ({values.attrs['units']})")
-    return f"{values.attrs['long_name']}{unit}"
-
-
-def _axis(key: str) -> str:
-    """A key of the scene file as words, its unit apart."""
-    name, _, unit = key.rpartition("_")
-    words = f"{name} ({UNITS[unit]})" if unit in UNITS else key
-    return words.replace(".", " ").replace("_", " ")
+    unit = {"1": "", "deg": " (°)"}.get(str(values.attrs.get("units", "1")), f" ({values.attrs.get('units')})")
+    return f"{values.attrs.get('long_name', values.name)}{unit}"
 
 
 def _varied(result: xr.Dataset) -> list[str]:

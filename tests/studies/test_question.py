@@ -114,7 +114,7 @@ def test_equilibria_over_a_grid_are_those_of_the_single_scenes(spinlev, tmp_path
     assert [f["point"]["frequency_hz"] for f in answer["failed_points"]] == [0.0, 0.0]
     assert "Earnshaw" in answer["failed_points"][0]["reason"]
     with xr.open_dataset(answer["result"], engine="h5netcdf") as result:
-        found = result["position"].sel({"frequency_hz": 110.0, "rotor.displacement_mm": 2.0})
+        found = result["position"].sel({"frequency_hz": 110.0, "rotor_displacement_mm": 2.0})
         found = found.transpose("equilibrium", "axis").dropna("equilibrium").values
         assert np.isnan(result["position"].sel(frequency_hz=0.0)).all()
     status, single, err = spinlev("equilibria", SCENE, "--plate-model", "none", "--model", "dipole", "--json")
@@ -129,7 +129,7 @@ def test_field_over_one_parameter(spinlev):
     )
     assert status == 0, err
     with xr.open_dataset(answer["result"], engine="h5netcdf") as result:
-        field = result["B"].transpose("rotor.remanence_T", "axis").values
+        field = result["B"].transpose("rotor_remanence_T", "axis").values
     np.testing.assert_allclose(field[2], 2 * field[0], rtol=1e-14)
 
 

@@ -17,7 +17,6 @@ from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.scene.files import load_scene
-from spinlev.studies import reaction as plate_job
 from spinlev.studies.catalogue import field_quality
 from spinlev.studies.catalogue.entries import CATALOGUE
 from spinlev.studies.catalogue.field_quality import CASES
@@ -29,6 +28,7 @@ from spinlev.studies.figures.pictures import plate_currents
 from spinlev.studies.figures.run import question_figure
 from spinlev.studies.figures.view import Currents, current_places
 from spinlev.studies.result import write_dataset
+from spinlev.studies.run import response
 
 
 @pytest.fixture(scope="module")
@@ -209,7 +209,7 @@ def test_a_small_plate_is_answered_by_finite_elements():
     plate = replace(load_scene(SCENES / "tilt-over-plate.toml").plate, lowering=None)
     small = replace(plate, box=replace(plate.box, size=np.array([0.1, 0.12, 0.01]), center=np.zeros(3)))
     place = small.box.rotation @ np.array([0.0, 0.01, 0.04])
-    answer, slab = (plate_job.response(small, place, 50.0, name, 0.1) for name in ("auto", "slab"))
+    answer, slab = (response(small, place, 50.0, name, 0.1) for name in ("auto", "slab"))
     (model, tensor, _, _), (_, flat, error, _) = answer, slab
     assert model == "fem"
     assert error > 0.1
@@ -222,7 +222,7 @@ def test_the_reduced_plate_is_that_of_the_finite_elements():
     plate = replace(load_scene(SCENES / "tilt-over-plate.toml").plate, lowering=None)
     small = replace(plate, box=replace(plate.box, size=np.array([0.1, 0.12, 0.01]), center=np.zeros(3)))
     place = small.box.rotation @ np.array([0.0, 0.01, 0.04])
-    reduced, fem = (plate_job.response(small, place, 50.0, name, 0.1) for name in ("reduced", "fem"))
+    reduced, fem = (response(small, place, 50.0, name, 0.1) for name in ("reduced", "fem"))
     apart = np.linalg.norm(reduced[1] - fem[1]) / np.linalg.norm(fem[1])
     assert apart < reduced[2] + fem[2]
     assert reduced[2] <= 0.1
