@@ -73,7 +73,7 @@
   const ball = grow(side.plane, "circle", { id: "ball", fill: "#9aa5b1", "fill-opacity": 0.6, stroke: COLORS.here });
   const curves = Object.fromEntries(Object.entries(running).map(([key, chart]) =>
     [key, grow(chart.plane, "path", { fill: "none", stroke: COLORS.curve, "stroke-width": 1.5 })]));
-  let point = [0, 0], places = [], drawn = null, held = false, samples = [[], [], []], playing = false, asked = false, last = 0;
+  let point = [0, 0], places = [], ghost = null, drawn = null, held = false, samples = [[], [], []], playing = false, asked = false, last = 0;
   let pose = { position: [0, 0, -20], moment: [0, 0, 1], seen: [0, 0, -20], angle: 0 };
 
   const drawHere = () => { here.setAttribute("cx", map.px(point[0])); here.setAttribute("cy", map.py(point[1])); };
@@ -91,6 +91,7 @@
         .map(([a, b, c]) => (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0]) ? [a, c, b] : [a, b, c]);  // else front and back are a hole
       grow(bodies, "path", { d: flat.map(face => `${side.path(face)}Z`).join(""), fill: color, stroke: color, "stroke-width": 0.5, opacity });
     }
+    if (ghost) grow(bodies, "circle", { cx: side.px(ghost[0]), cy: side.py(ghost[2]), r: side.px(drawn.radius) - side.px(0), fill: "none", stroke: "#6b7689", "stroke-dasharray": "4 3" });
     crosses.setAttribute("d", places.map(([x, z]) => [[-1, -1], [1, 1], [-1, 1], [1, -1]]
       .map(([a, b], k) => `${k % 2 ? "L" : "M"}${side.px(x) + 4 * a} ${side.py(z) + 4 * b}`).join("")).join(""));
   };
@@ -123,16 +124,17 @@
   const strokes = (lines, color, width) =>
     ({ type: "scatter3d", mode: "lines", ...xyz(lines.flatMap(points => [...points, [null, null, null]])), line: { color, width } });
   const axis = (low, high) => ({ range: [low, high], visible: false });
-  let busy = false, again = false, took = 0, waiting = null;
+  let busy = false, again = false, took = 0, waiting = null, idle = 0;
   const draw = async () => {
     if (!drawn) return;
     if (busy) { again = true; return; }
     busy = true;
-    const [half, low, high] = drawn.reach, began = performance.now();
+    const [half, low, high] = drawn.reach, began = performance.now(), turn = pose.flying ? 0 : idle;
+    const [position, moment] = turned([pose.position, pose.moment], turn);
     await Plotly.react("picture", [
-      ...drawn.turning.map(body => mesh(body, turned(body.at, pose.angle))),
-      strokes(drawn.lines.map(points => turned(points, pose.angle)), "#5e81ac", 2),
-      ...drawn.floater.map(body => mesh(body, moved(body.at, pose.position, pose.moment))),
+      ...drawn.turning.map(body => mesh(body, turned(body.at, pose.angle + turn))),
+      strokes(drawn.lines.map(points => turned(points, pose.angle + turn)), "#5e81ac", 2),
+      ...drawn.floater.map(body => mesh(body, moved(body.at, position, moment))),
       ...drawn.fixed.map(body => mesh(body, body.at)),
       strokes(drawn.edges, "#4c566a", 3),
     ], {
@@ -145,6 +147,12 @@
     busy = false;
     if (again) { again = false; requestAnimationFrame(draw); }
   };
+  // At rest the floater is locked to the rotor: both turn slowly together, where the browser draws fast enough.
+  setInterval(() => {
+    if (!drawn || pose.flying || busy || !took || took > 60 || document.hidden || at("picture").matches(":active")) return;
+    idle += 0.08;
+    draw();
+  }, 80);
   // While a slider moves its numbers come first; a picture that takes long to draw follows when it rests.
   const drawSoon = () => { clearTimeout(waiting); waiting = setTimeout(draw, took < 40 ? 0 : 350); };
 
@@ -163,9 +171,16 @@
     at(id).hidden = !Object.keys(options).length;
   };
   const slide = (name, value) => { at(name).value = value; at(name).previousSibling.textContent = +(+value).toFixed(2); };
+  const millimetres = place => `${(-place[2]).toPrecision(4)} mm`;
   const texts = id => text => { at(id).textContent = text; };
   const show = {
-    message: texts("message"), says: texts("says"), map_says: texts("map_says"),
+    message: texts("message"), says: texts("says"), map_says: texts("map_says"), command: texts("command"),
+    place: place => { at("place").textContent = place ? millimetres(place) : "–"; },
+    beside: found => {
+      ghost = found && found[0];
+      at("beside").textContent = found ? `${found[1]}: ${millimetres(ghost)}` : "";
+      if (drawn) drawSide();
+    },
     controls: known => {
       at("sliders").replaceChildren();
       for (const { name, title, value, start, end, step } of known.sliders) {
@@ -210,10 +225,10 @@
     pose: async found => {
       pose = found;
       if (!held) drawBall(pose.seen);
-      if (!pose.flying) { asked &&= playing; drawSoon(); return; }
-      if (pose.ended) show.playing(false);
+      if (!found.flying) { asked &&= playing; drawSoon(); return; }
+      if (found.ended) show.playing(false);
       await draw();
-      asked = asked && !pose.piece;  // the next one may come
+      if (found.piece) asked = false;  // the next one may come
       setTimeout(fly, Math.max(0, last + FRAME - performance.now()));
     },
     samples: found => {

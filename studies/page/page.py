@@ -55,6 +55,7 @@ class Page:
         self.flyer = Worker("The trajectory", LONG, self._lost)
         self.number = 0  # of answers
         self.shown: Shown | None = None
+        self.preview: Shown | None = None
         self.regions: Regions | None = None
         self.samples = np.zeros((3, 0))  # of the flight: time s, height mm and polar angle °
         self.resting: asyncio.TimerHandle | None = None
@@ -118,9 +119,11 @@ class Page:
             self._land()
         if work.has_map(self.state):
             self.tell(point=[control.value for control in controls(self.state)[:2]])
+        self.tell(command=f"spinlev equilibria scene.toml {self.state.command}")
         if isinstance(preview, str):
             self._failed(preview)
         else:
+            self.preview = preview
             self._answered("" if self.state.is_preview else FOLLOW, preview)
         if self.resting is not None:
             self.resting.cancel()
@@ -148,6 +151,9 @@ class Page:
         sign = f"Preview: {found.sign}. {follows}" if follows else f"By: {found.sign}."
         tables = {"rows": found.rows, "modes": found.modes, "left_out": found.left_out}
         self.tell(numbers={"number": self.number, "headline": found.headline, "sign": sign, **tables})
+        first, other = (one.places[0][0] if one and one.places else None for one in (found, self.preview))
+        beside = [other, self.preview.sign] if self.preview is not found and other and self.preview else None
+        self.tell(place=first, beside=beside)
         keys = self.state.keys
         rotor, whole = str(keys["rotor"]), str((keys["rotor"], keys["floater"], keys.get("plate")))
         if found.lines or self.drawn[1] != whole:  # field lines are kept as far as they hold

@@ -110,6 +110,8 @@ def test_everything_that_can_be_done(server, browser, tmp_path):
     tab = opened(browser, server.address)
     values, lines = equilibria_job(load_scene(OVER_PLATE), Models("dipole", "slab"), 0.0, tmp_path)
     assert said(tab, "text('headline')") == lines[0]
+    assert said(tab, "/^\\d\\d\\.\\d\\d mm$/.test(text('place')) && /dipole.*: \\d\\d\\.\\d\\d mm$/.test(text('beside'))")
+    assert said(tab, "text('command')") == "spinlev equilibria scene.toml --model dipole --plate-model slab"
     shown = said(tab, "at('table').innerText").split()
     rows = len(values["equilibria"])
     listed = " ".join(lines[1 : 2 + rows]).split()
