@@ -1,6 +1,7 @@
 """The live page in a browser: everything its reader can do, two pages at once, and what a closed page leaves behind."""
 
 import json
+import re
 import statistics
 import subprocess
 import sys
@@ -110,7 +111,8 @@ def test_everything_that_can_be_done(server, browser, tmp_path):
     tab = opened(browser, server.address)
     values, lines = equilibria_job(load_scene(OVER_PLATE), Models("dipole", "slab"), 0.0, tmp_path)
     assert said(tab, "text('headline')") == lines[0]
-    assert said(tab, "/^\\d\\d\\.\\d\\d mm$/.test(text('place')) && /dipole.*: \\d\\d\\.\\d\\d mm$/.test(text('beside'))")
+    assert re.fullmatch(r"\d\d\.\d\d mm", said(tab, "text('place')"))
+    assert re.fullmatch(r"point dipole.*: \d\d\.\d\d mm", said(tab, "text('beside')"))
     assert said(tab, "text('command')") == "spinlev equilibria scene.toml --model dipole --plate-model slab"
     shown = said(tab, "at('table').innerText").split()
     rows = len(values["equilibria"])
