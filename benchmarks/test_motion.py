@@ -60,7 +60,7 @@ def test_flight(benchmark, start, model, compact):
     flight = Flight(FREE, table, LONG, 1e-14, compact)
     trajectory = benchmark.pedantic(lambda: integrate(flight, start, 1.0, None), rounds=3, warmup_rounds=1)
     print(f"\n{model}: compiled in {flight.compile_seconds:.1f} s, {trajectory.realtime_factor:.0f} x real time")
-    benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
+    benchmark.extra_info["error"] = f"energy balance {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
 
 
@@ -71,7 +71,7 @@ def test_flight_in_balls(benchmark, start, compact):
     table = rotor_table(SCENE.rotor, "fem", nearest=SCENE.floater.radius)
     flight = Flight(FREE, table, LONG, compact=compact)
     trajectory = benchmark.pedantic(lambda: integrate(flight, start, 1.0, None), rounds=3, warmup_rounds=1)
-    benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
+    benchmark.extra_info["error"] = f"energy balance {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
 
 
@@ -87,7 +87,7 @@ def test_flight_with_effects(benchmark, start, effects):
     trajectory = benchmark.pedantic(lambda: integrate(flight, start, 1.0, None), rounds=3, warmup_rounds=1)
     operations = [len(part.integrator.decomposition) for part in flight.parts.values()]
     print(f"\n{effects}: {operations} operations, {trajectory.realtime_factor:.0f} x real time")
-    benchmark.extra_info["error"] = f"ledger {trajectory.energy_error:.0e} in 110 turns"
+    benchmark.extra_info["error"] = f"energy balance {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
 
 
@@ -119,10 +119,10 @@ def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
     integrate(flight, begun, 0.05, currents=currents)
     fly_on = lambda: integrate(flight, begun, 0.5, currents=currents)  # noqa: E731
     flown = benchmark.pedantic(fly_on, rounds=3)
-    benchmark.extra_info.update(count=0.5, error=f"ledger {flown.energy_error:.0e}, {len(currents)} states")
+    benchmark.extra_info.update(count=0.5, error=f"energy balance {flown.energy_error:.0e}, {len(currents)} states")
     print(
         f"\n{model}, {plate_model}: {len(currents)} states, {len(memory.table.multipoles.kinds)} multipoles, "
         f"{len(memory.share.series) // 2} harmonics; {flown.steps / (0.5 * SCENE.frequency):.1f} steps a turn, "
-        f"{0.5 / benchmark.stats.stats.min:.1f} x real time; ledger {flown.energy_error:.0e}"
+        f"{0.5 / benchmark.stats.stats.min:.1f} x real time; energy balance {flown.energy_error:.0e}"
     )
     assert flown.ended_by == "duration"

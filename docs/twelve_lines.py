@@ -1,4 +1,4 @@
-"""How far does a tilted cube hold the floater, against its edge, by two models, over a plate of copper?"""
+"""Levitation distance below a tilted cube against its edge, by two models, over a plate of copper."""
 
 import spinlev as sl
 

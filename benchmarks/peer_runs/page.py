@@ -1,4 +1,4 @@
-"""The peers' part of docs/benchmarks.md: one table and one figure for each work, written from the rows alone."""
+"""The tables of docs/peers.md and docs/peers-motion.md: one table and one figure a work, from the rows alone."""
 
 from pathlib import Path
 
@@ -6,7 +6,11 @@ import numpy as np
 from growth import at_equal_error, at_equal_time, best_for_them, error_of, exponent, limit
 from works import WORKS
 
-PAGE = Path("docs/benchmarks.md")
+PAGES = {
+    Path("docs/peers.md"): ("field", "points", "force"),
+    Path("docs/peers-motion.md"): ("plate", "fall", "flight", "equilibria"),
+}
+"""And the works of each."""
 BEGIN, END = "<!-- peers begin -->\n", "<!-- peers end -->\n"
 OURS = "spinlev"
 HEAD = (
@@ -16,10 +20,11 @@ HEAD = (
 
 
 def write_page(rows):
-    """Put the tables between the two marks of the page, and draw the figures."""
-    before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-    after = rest.split(END)[1]
-    PAGE.write_text(before + BEGIN + report(rows) + END + after, encoding="utf-8")
+    """Put the tables between the two marks of each page, and draw the figures."""
+    for page, names in PAGES.items():
+        before, rest = page.read_text(encoding="utf-8").split(BEGIN)
+        after = rest.split(END)[1]
+        page.write_text(before + BEGIN + report(rows, names) + END + after, encoding="utf-8")
     from figure import draw  # matplotlib takes longer to load than the tables to write
 
     for work in WORKS.values():
@@ -27,9 +32,9 @@ def write_page(rows):
             draw(work, curves)
 
 
-def report(rows):
-    """All works in Markdown, with what was skipped and the spread of a second run."""
-    return "".join(_section(work, rows) for work in WORKS.values())
+def report(rows, names=tuple(WORKS)):
+    """Works in Markdown, with what was skipped and the spread of a second run."""
+    return "".join(_section(WORKS[name], rows) for name in names)
 
 
 def error_curves(work, rows):
@@ -102,7 +107,7 @@ def _own_limit(work, case, peer, mine, rows):
         return ""
     found = limit([row["h"] for row in mine], [row["values"] for row in mine])
     if found is None:
-        return "does not settle"
+        return "does not converge"
     return f"{error_of(found[0], _references(work, rows)[case]['values']):.1e} off (h^{found[1]:.1f})"
 
 

@@ -146,7 +146,7 @@ FALL = Work(
 )
 FLIGHT = Work(
     "flight",
-    "A second of flight, 110 turns, without plate and drag",
+    "A simulated second, 110 turns, without plate and drag",
     "Error of the position after a second over the distance from the rotor. Time with compilation of the equations.",
     ("closed form", "dipole"),
     (_reference("flight_spinlev.py", "1e-16"),),
@@ -162,7 +162,7 @@ EQUILIBRIA = Work(
     "All equilibria of a scene, and a map of 20 scenes",
     "Largest relative error of the three places below the rotor, or of the nearest of each scene; one that is not "
     "found counts as 1 or more (the reference differentiates numerically: 1e-9). Time with compilation of the "
-    "equations; ours tells stability as well.",
+    "equations; ours includes stability.",
     ("one scene", "map"),
     (_reference("equilibria_scipy.py", "near"),),
     (

@@ -2,10 +2,10 @@
 How wrong is the dipole?
 ========================
 
-The field of a cube against that of a point dipole, distance by distance.
+The field of a cube against that of a point dipole, by distance.
 
-Finite elements give the true field; the closed form knows the shape of the cube but not its recoil permeability.
-What is left at a large distance is the permeability alone: it weakens the cube's moment by 1.6 %.
+Finite elements include shape and recoil permeability of the cube, the closed form its shape alone. At a large distance
+only the permeability matters: it reduces the cube's moment by 1.6 %.
 """
 
 from importlib.resources import files
@@ -26,7 +26,7 @@ for model in ("dipole", "cuboid"):
     apart[model] = np.linalg.norm(field[model] - field["fem"], axis=1) / np.linalg.norm(field["fem"], axis=1)
     axes.plot(1e3 * distance, 100 * apart[model], label=model)
 axes.set(
-    xlabel="distance below the cube's centre (mm)",
+    xlabel="distance from the cube's centre (mm)",
     ylim=(0, 9),
     ylabel="difference from finite elements (%)",
     title="|ΔB| / |B|",
@@ -34,5 +34,5 @@ axes.set(
 axes.legend()
 
 dipole_error_percent = 100 * np.interp(20e-3, distance, apart["dipole"])
-print(f"At 20 mm the point dipole is off by {dipole_error_percent:.2f} %")
+print(f"At 20 mm the point dipole errs by {dipole_error_percent:.2f} %")
 figure

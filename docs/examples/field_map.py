@@ -2,11 +2,11 @@
 A map of the field
 ==================
 
-The two parts that hold and push the floater, for each displacement of the cube.
+Off-axis and on-axis field for each displacement of the cube.
 
-Off-axis, the field turns with the rotor and drives the floater's tilt; on-axis, it stays and pulls or pushes (the
-article's supplementary figure 1). 20 mm below the rotor, by the closed form of the cube (lines) and by finite
-elements with its recoil permeability (points).
+The off-axis field rotates with the rotor and drives the coning of the floater; the on-axis field is constant and
+attracts or repels (the article's supplementary figure 1). Closed form of the cube (lines) and finite elements with its
+recoil permeability (points), 20 mm from the rotor.
 """
 
 from importlib.resources import files
@@ -37,8 +37,6 @@ figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
 for k, name in enumerate(("off-axis", "on-axis")):
     (line,) = axes.plot(fine, closed[:, k], label=f"{name}, closed form")
     axes.plot(coarse, elements[:, k], "o", color=line.get_color(), label=f"{name}, finite elements")
-axes.set(
-    xlabel="displacement of the cube (mm)", ylabel="field 20 mm below the rotor (mT)", title="Two parts of the field"
-)
+axes.set(xlabel="displacement of the cube (mm)", ylabel="field at 20 mm (mT)", title="Two parts of the field")
 axes.legend()
 figure

@@ -2,11 +2,10 @@
 First steps
 ===========
 
-Where does the floater hang, and is it held there?
+Where does the floater levitate, and is it stable?
 
-``equilibria`` gives every place at which force and torque are balanced in the frame that turns with the rotor, by
-finite elements of the rotor's field; the stable ones come first. The figure shows how each small motion about them
-grows or dies out: below zero on all five counts means held.
+``equilibria`` gives every balance of force and torque in the frame that rotates with the rotor, the stable ones first.
+The figure shows the growth rate of each normal mode: stable equilibria have none above zero.
 """
 
 from importlib.resources import files
@@ -18,7 +17,7 @@ print(scene)
 
 found = equilibria(scene, model="fem", plate_model="none")
 depth_mm = -1e3 * float(found["position"].sel(axis="z")[0])
-print(f"The floater hangs {depth_mm:.3f} mm below the rotor, stable: {bool(found['stable'][0])}")
+print(f"Levitation distance {depth_mm:.3f} mm, stable: {bool(found['stable'][0])}")
 
 figure = draw(found)["modes"]
 figure

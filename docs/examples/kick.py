@@ -1,11 +1,11 @@
 """
-A flight with a kick
-====================
+A kick
+======
 
-The floater is hit upwards and bounces at the frequency that its stability foretells.
+After a kick the floater oscillates at the frequency of its axial mode.
 
-Any state may be the start of a flight. Here it is the equilibrium, to which 5 mm/s along the axis are added; the
-bounce is then counted from the flight and compared with the eigenvalue.
+Any state may be the start of a trajectory. Here it is the equilibrium plus 5 mm/s along the axis; the frequency is
+counted from the trajectory and compared with the eigenvalue.
 """
 
 from dataclasses import replace
@@ -29,9 +29,9 @@ time = flight["time"].values
 crossing = time[upwards] - height[upwards] * (time[upwards + 1] - time[upwards]) / (
     height[upwards + 1] - height[upwards]
 )
-bounce_hz = (len(crossing) - 1) / (crossing[-1] - crossing[0])
+axial_hz = (len(crossing) - 1) / (crossing[-1] - crossing[0])
 
-foretold_hz = rest.modes[0].frequency_hz
-print(f"{rest.modes[0].name}: {bounce_hz:.2f} Hz seen, {foretold_hz:.2f} Hz foretold")
+eigenvalue_hz = rest.modes[0].frequency_hz
+print(f"Axial mode: {axial_hz:.2f} Hz in the trajectory, {eigenvalue_hz:.2f} Hz by its eigenvalue")
 figure = draw(flight)["trajectory"]
 figure

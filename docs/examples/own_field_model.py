@@ -6,8 +6,8 @@ The cube as charges on two of its faces.
 
 A magnet polarised along its edge is, seen from outside, a sheet of positive magnetic charge on one face and one of
 negative charge on the other. Put at Gauss's points of both faces they are a field model with five members; the
-equations of motion are written with ``expressions``, and nothing else has to know. At 20 mm this one is as good as
-the closed form.
+equations of motion use its ``expressions``, and nothing else changes. At 20 mm this model is as good as the closed
+form.
 """
 
 from importlib.resources import files
@@ -80,6 +80,6 @@ true = tables["closed form"].evaluate(points)[0]
 for count in (1, 2, 3, 5):
     difference = ChargeTable(scene.rotor[0], count).evaluate(points)[0] - true
     axes.semilogy(1e3 * depth, np.linalg.norm(difference, axis=1) / np.linalg.norm(true, axis=1), label=f"2 × {count}²")
-axes.set(xlabel="distance below the rotor (mm)", ylabel="|ΔB| / |B|", title="Charges instead of the closed form")
+axes.set(xlabel="distance (mm)", ylabel="|ΔB| / |B|", title="Charges instead of the closed form")
 axes.legend(title="charges")
 figure

@@ -2,10 +2,10 @@
 Your own scene
 ==============
 
-Two cubes of your choice, and a flight of half a second.
+Two cubes of your choice, and half a second of motion.
 
 A scene is a text (a file, or a string as here) in which every key carries its unit. These two cubes have recoil
-permeability 1, and the point dipole is asked for: an equilibrium that can be found with pencil and paper.
+permeability 1, and the model is the point dipole: an equilibrium that can be found with pencil and paper.
 """
 
 from spinlev import draw, equilibria, parse_scene, simulate
@@ -32,13 +32,13 @@ recoil_permeability = 1.0
 density_kg_m3 = 7500.0
 
 [start]
-offset_mm = [0.0, 0.0, 0.2]     # let go 0.2 mm above the equilibrium
+offset_mm = [0.0, 0.0, 0.2]     # released 0.2 mm above the equilibrium
 """)
 
 found = equilibria(scene, model="dipole")
 height_mm = 1e3 * float(found["position"].sel(axis="z")[0])
 flight = simulate(scene, duration=0.5, model="dipole")
-print(f"Equilibrium at {height_mm:.2f} mm; the flight was ended by {flight.attrs['ended_by']}")
+print(f"Equilibrium at {height_mm:.2f} mm; the trajectory ended by {flight.attrs['ended_by']}")
 
 figure = draw(flight)["trajectory"]
 figure

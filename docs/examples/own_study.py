@@ -2,11 +2,11 @@
 A study of your own
 ===================
 
-How the bounce depends on the floater's density.
+Frequency of the axial mode against the floater's density.
 
-A study is a pure function of a point, the points at which it is asked, and what is drawn and said of the joined
-result. One object joins them, and it is resumable and runs on any number of workers; put into
-``studies/catalogue/entries.py``, the command line knows it too.
+A study is a pure function of a point, its points, and the figures and report of the joined result. One object joins
+them; it is resumable and runs on any number of workers. Put into ``studies/catalogue/entries.py``, it is also on the
+command line.
 """
 
 import tempfile
@@ -30,38 +30,40 @@ def points(quick):
 
 
 def compute(point):
-    """Bounce and place of one floater: a dataset over `case` of length one."""
+    """Axial mode and position of one floater: a dataset over `case` of length one."""
     scene = parse_scene(TEXT, changes={"floater.density_kg_m3": point["density"]})
     found = stability(scene, model="dipole", plate_model="none")
-    bounce = found["mode_frequency"].sel(mode="bounce").item()
+    axial = found["mode_frequency"].sel(mode="bounce").item()
     return xr.Dataset({
         "density": variable(("case",), [point["density"]], "kg/m³", "density of the floater"),
-        "bounce": variable(("case",), [bounce], "Hz", "frequency of the bounce"),
+        "axial": variable(("case",), [axial], "Hz", "frequency of the axial mode"),
         "height": variable(("case",), [found["position"].sel(axis="z").item()], "m", "height"),
     })  # fmt: skip
 
 
 @styled
 def picture(result):
-    """The bounce against the density."""
+    """The axial mode against the density."""
     figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
-    axes.plot(result["density"], result["bounce"], "o-")
-    axes.set(xlabel="density of the floater (kg/m³)", ylabel="bounce (Hz)", title="A heavier floater bounces faster")
+    axes.plot(result["density"], result["axial"], "o-")
+    axes.set(
+        xlabel="density of the floater (kg/m³)", ylabel="axial mode (Hz)", title="A heavier floater oscillates faster"
+    )
     return figure
 
 
 def report(result):
-    """What it says, in lines."""
-    rows = zip(result["density"].values, result["bounce"].values, strict=True)
-    return [f"{density:.0f} kg/m³: {bounce:.2f} Hz" for density, bounce in rows]
+    """The report, in lines."""
+    rows = zip(result["density"].values, result["axial"].values, strict=True)
+    return [f"{density:.0f} kg/m³: {axial:.2f} Hz" for density, axial in rows]
 
 
 STUDY = Study(
-    name="bounce",
-    summary="bounce against the floater's density",
+    name="axial-mode",
+    summary="frequency of the axial mode against the floater's density",
     points=points,
     compute=compute,
-    figures={"bounce": picture},
+    figures={"axial-mode": picture},
     report=report,
 )
 CATALOGUE[STUDY.name] = STUDY
@@ -69,6 +71,6 @@ CATALOGUE[STUDY.name] = STUDY
 with tempfile.TemporaryDirectory() as folder:
     result = run_study(STUDY.name, quick=True, out=folder)
 print(*report(result), sep="\n")
-bounce_hz = float(result["bounce"].sel(case=2))
+axial_hz = float(result["axial"].sel(case=2))
 figure = draw(result)[STUDY.name]
 figure

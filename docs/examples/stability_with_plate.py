@@ -2,11 +2,11 @@
 Stability with a plate
 ======================
 
-Its currents damp every small motion of the floater above it.
+Eddy currents in a plate damp every mode of the floater above it.
 
-Without a plate only the air damps, and the floater swings for hours. The plate of the scene ``tilt-over-plate`` lies
-18 mm below the floater; its memory enters the equations as some tens of states, and the slowest motion then dies
-out within a third of a second.
+Without a plate only the air damps, and oscillations last for hours. The plate of the scene ``tilt-over-plate`` is 18 mm
+below the floater; the relaxation of its eddy currents adds some tens of states, and the least stable mode decays within
+a third of a second.
 """
 
 from importlib.resources import files
@@ -27,6 +27,6 @@ place = np.arange(bare.sizes["mode"])
 for shift, result, name in ((-0.2, bare, "air alone"), (0.2, damped, "with the plate")):
     axes.bar(place + shift, -result["mode_growth"], 0.38, label=name)
 axes.set_xticks(place, [name.replace(", ", ",\n") for name in bare["mode"].values])
-axes.set(yscale="log", ylabel="damping (1/s)", title="Small motions over a plate")
+axes.set(yscale="log", ylabel="damping rate (s⁻¹)", title="Modes over a plate")
 axes.legend()
 figure

@@ -2,7 +2,7 @@
 A sweep
 =======
 
-Distance and polar angle over the frequency.
+Levitation distance and polar angle against the frequency.
 
 Every number of a scene can be changed by its key, and results are labelled datasets, so that a loop and
 ``xarray.concat`` make a sweep. (``spinlev study SCENE --vary ...`` does the same from the command line, on many cores
@@ -31,6 +31,6 @@ print(f"At 118 Hz {distance_mm_118:.2f} mm")
 figure, ((left, right),) = panels(1, 2, (7.5, 3.2))
 left.plot(frequencies, distance_mm, "o-")
 right.plot(frequencies, swept["polar_angle"], "o-")
-left.set(xlabel="frequency (Hz)", ylabel="distance (mm)", title="Where the floater hangs")
-right.set(xlabel="frequency (Hz)", ylabel="polar angle (°)", title="How far it is tilted")
+left.set(xlabel="frequency (Hz)", ylabel="levitation distance (mm)", title="Distance")
+right.set(xlabel="frequency (Hz)", ylabel="polar angle (°)", title="Polar angle")
 figure

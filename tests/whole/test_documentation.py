@@ -1,5 +1,6 @@
 """What the documentation names is there: modules, tests, pictures; the dependencies are all accounted for."""
 
+import ast
 import doctest
 import pkgutil
 import re
@@ -10,6 +11,7 @@ from importlib import import_module
 from numpydoc.docscrape import FunctionDoc
 from numpydoc.validate import validate
 from places import ROOT
+from words import left_column
 
 import spinlev as sl
 from spinlev.studies.cli.console import PACKAGES
@@ -37,6 +39,23 @@ def test_modules_that_are_named_exist():
             except (ImportError, AttributeError):
                 missing.append(f"{page.name}: {name}")
     assert missing == []
+
+
+def test_the_words_are_those_of_the_field():
+    """Also in the gallery; what decisions.md says of earlier days stays."""
+    written = [page for page in PAGES if page.name not in ("words.md", "decisions.md")]
+    written += [ROOT / "CITATION.cff", *(ROOT / "docs" / "examples").glob("*.rst")]
+    texts = {page.name: page.read_text(encoding="utf-8") for page in written}
+    for example in (ROOT / "docs" / "examples").glob("*.py"):
+        texts[example.name] = ast.get_docstring(ast.parse(example.read_text(encoding="utf-8")))
+    unreleased = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").split("\n## [")[1]
+    texts["CHANGELOG.md"] = unreleased
+    assert [f"{name}:{line}: {word}" for name, text in texts.items() for line, word in left_column(text)] == []
+
+
+def test_words_of_another_field_are_found():
+    said = "The floater hangs.\n\n```python\nflight = 1\n```\nA `flight` [flew](flights.md).\n"
+    assert left_column(said) == [(1, "hangs"), (6, "flew")]
 
 
 FUNCTIONS = [name for name in dir(sl) if name.islower() and callable(getattr(sl, name))]
@@ -78,10 +97,11 @@ def test_examples_in_the_code_give_what_they_show():
 
 
 def test_every_section_of_the_mathematics_names_the_code_that_is_it():
-    text = (ROOT / "docs" / "mathematics.md").read_text(encoding="utf-8")
-    sections = re.split(r"^## ", text, flags=re.MULTILINE)[1:]
-    assert len(sections) >= 5
-    assert [section.splitlines()[0] for section in sections if not NAMED.search(section)] == []
+    for name in ("mathematics.md", "mathematics-currents.md"):
+        text = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        sections = re.split(r"^## ", text, flags=re.MULTILINE)[1:]
+        assert len(sections) >= 5
+        assert [section.splitlines()[0] for section in sections if not NAMED.search(section)] == []
 
 
 def test_dependencies_are_listed_with_reason_and_licence():

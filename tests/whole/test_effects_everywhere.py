@@ -88,11 +88,11 @@ def sweep(text, asked):
     return sl.sweep(scene, over, "equilibria", plate_model=asked.plate_model, **chosen).growth.values
 
 
-def live_flight(text, asked):
-    return levitation(text + START, asked).live_flight().onward(0.1).lab.position[-1]
+def live_motion(text, asked):
+    return levitation(text + START, asked).live_motion().onward(0.1).lab.position[-1]
 
 
-USES = (equilibria, modes, trajectory, ensemble, sweep, live_flight)
+USES = (equilibria, modes, trajectory, ensemble, sweep, live_motion)
 REFUSED = {
     ("a floater that is no sphere", "ensemble"): "many fly side by side",
 }

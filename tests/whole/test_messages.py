@@ -10,6 +10,7 @@ import re
 from importlib import import_module
 
 from places import ROOT
+from words import PROGRAM
 
 from spinlev.geometry.common import ComputationError
 
@@ -130,11 +131,6 @@ def test_every_sentence_about_input_follows_the_grammar():
     assert found > 100
 
 
-LEFT = re.compile(
-    r"\bhangs?\b|in step with|stays? up|still up|\bledgers?\b|(?i:small|slowest) motion|\b[Ff]lew\b|e-fold in|"
-    "true field"
-)
-"""Words in place of which the field has others: levitates, mode, energy balance, e-folding time."""
 ELSEWHERE = ("catalogue", "page")
 
 
@@ -147,6 +143,6 @@ def test_the_words_are_those_of_the_field():
                       if isinstance(node, owners) and node.body and isinstance(node.body[0], ast.Expr)}  # fmt: skip
         for node in ast.walk(tree):
             text = literal(node) or ""
-            if " " in text and LEFT.search(text) and (id(node) not in docstrings or path.name == "commands.py"):
+            if " " in text and PROGRAM.search(text) and (id(node) not in docstrings or path.name == "commands.py"):
                 wrong.append(f"{path}:{node.lineno}: {text}")
     assert wrong == []

@@ -97,10 +97,12 @@ def test_no_error_is_said_that_is_less_than_the_references_own(modules):
 
 
 def test_the_page_is_what_the_raw_numbers_say(modules):
-    text = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
     found = modules["run"].load(ROOT / "benchmarks" / "peers.json")
     page = modules["page"]
-    assert text.split(page.BEGIN)[1].split(page.END)[0] == page.report(found)
+    for path, names in page.PAGES.items():
+        text = (ROOT / path).read_text(encoding="utf-8")
+        assert text.split(page.BEGIN)[1].split(page.END)[0] == page.report(found, names)
+    assert sorted(name for names in page.PAGES.values() for name in names) == sorted(modules["works"].WORKS)
     named = {row["work"] for row in found if "values" in row}
     assert [name for name in named if not (ROOT / "docs" / "pictures" / f"peers-{name}.png").is_file()] == []
 
