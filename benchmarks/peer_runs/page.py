@@ -63,7 +63,7 @@ def _references(work, rows):
 
 def _section(work, rows):
     curves = error_curves(work, rows)
-    lines = [f"### {work.title}", "", work.measured, ""]
+    lines = [f"## {work.title}", "", work.measured, ""]
     if not curves:
         return "\n".join([*lines, "Not run yet.", "", ""])
     better, table = [], []
