@@ -219,6 +219,12 @@ def _add_field(plotter: pv.Plotter, view: View) -> None:
     bar["n_labels"] = int(high - low) + 1
     look: dict[str, Any] = {"log_scale": True, "cmap": "viridis", "opacity": 0.6, "nan_opacity": 0.0}
     plotter.add_mesh(grid, scalars=FIELD, clim=[10**low, 10**high], scalar_bar_args=bar, lighting=False, **look)
+    shown = plotter.scalar_bars[bar["title"]]
+    table = pv.LookupTable()  # as the half transparent plane is seen on white
+    table.DeepCopy(shown.GetLookupTable())
+    for k in range(table.GetNumberOfTableValues()):
+        table.SetTableValue(k, *(1 - look["opacity"] * (1 - c) for c in table.GetTableValue(k)[:3]), 1.0)
+    shown.SetLookupTable(table)
     if view.lines:
         plotter.add_mesh(_polylines(view.lines).tube(radius=0.004 * width), color="#2E3440")
     ends = np.array([(-width, 0.0, 0.8 * depth + 2), (10 - width, 0.0, 0.8 * depth + 2)])
