@@ -46,11 +46,11 @@ html_static_path = ["static"]
 html_css_files = ["narrow.css"]
 
 
-def told(app, what, name, obj, options, lines):
+def shown_docstring(app, what, name, obj, options, lines):
     """Let |B| in docstrings be a magnitude, not a substitution; a room's question stands in "The house" alone."""
     lines[:] = [] if what == "module" else [line.replace("|", r"\|") for line in lines]
 
 
 def setup(app):
     """Connect the above."""
-    app.connect("autodoc-process-docstring", told)
+    app.connect("autodoc-process-docstring", shown_docstring)
