@@ -107,6 +107,7 @@ fuzz: develop
 
 # Runs the gallery's programs too, those that have changed since.
 docs: develop
+	$(BIN)/python docs/draw_architecture.py
 	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 

@@ -1,4 +1,4 @@
-"""Draws the house and the way of the data from the code itself: docs/pictures/house.png and data.png.
+"""Draws the house, the way of the data and the walk of a run from the code itself, in docs/pictures.
 
 .venv/bin/python docs/draw_architecture.py
 """
@@ -6,13 +6,22 @@
 from __future__ import annotations
 
 import ast
+import sys
+import threading
+import time
 from collections.abc import Mapping
 from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Event, Thread
+from types import FrameType
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
+
+from spinlev.studies.cli.main import run
 
 ROOT = Path(__file__).parent.parent
 PICTURES = Path(__file__).parent / "pictures"
@@ -161,6 +170,58 @@ def draw_data() -> Figure:
     return figure
 
 
+LEAST = 0.01  # share of a run's time that a stay in a room has, at least, to be drawn
+INTERVAL = 5e-3  # between two looks at where a run is, s
+
+
+def walk(arguments: list[str]) -> list[tuple[str, float, float]]:
+    """Rooms that a command calls out of the top of `studies`: each with the begin and the length of the stay, s."""
+    seen: list[tuple[str, float]] = []
+    runs, over = threading.get_ident(), Event()
+
+    def room(frame: FrameType) -> str:
+        parts = Path(frame.f_code.co_filename).parts
+        floor = next((k for k in range(len(parts) - 1, 0, -1) if parts[k] in FLOORS), None)
+        return "" if floor is None or "site-packages" in parts[floor:] else "/".join(parts[floor:-1])
+
+    def look() -> None:
+        while not over.wait(INTERVAL):
+            frame, path = sys._current_frames().get(runs), list[str]()
+            while frame:
+                path.append(room(frame))
+                frame = frame.f_back
+            known = [here for here in reversed(path) if here not in ("", "studies/cli")]
+            seen.append((next((here for here in known if here != "studies"), ""), time.perf_counter()))
+
+    watcher = Thread(target=look)
+    watcher.start()
+    run(arguments, Event())
+    over.set()
+    watcher.join()
+    begin, end = seen[0][1], seen[-1][1]
+    stays = [(here, [t for _, t in looks]) for here, looks in groupby(seen, key=itemgetter(0)) if here]
+    long = [(here, looks) for here, looks in stays if looks[-1] - looks[0] > LEAST * (end - begin)]
+    return [(here, looks[0] - begin, looks[-1] - looks[0]) for here, looks in long]
+
+
+def draw_walk() -> Figure:
+    """The rooms of a run one after the other: how long each stay takes, and how often a room is come back to."""
+    with TemporaryDirectory() as folder:
+        scene = str(ROOT / "scenes" / "horizontal.toml")
+        stays = walk(["run", scene, "--plate-model", "reduced", "--duration-s", "2", "--out", folder])
+    order = list(dict.fromkeys(here for here, _, _ in stays))
+    visits = [here for here, _ in groupby(here for here, _, _ in stays)]
+    figure = Figure(figsize=(11, 0.4 * len(order) + 1.2), layout="constrained")
+    axes = figure.add_subplot()
+    for here, begin, spent in stays:
+        axes.barh(order.index(here), spent, left=begin, color=COLORS[here.split("/")[0]], edgecolor="0.4")
+    axes.set_yticks(range(len(order)), order)
+    axes.invert_yaxis()
+    axes.set_xlabel("time (s)")
+    axes.set_title(f"{len(order)} rooms, {len(visits) - len(order)} returns", loc="left")
+    return figure
+
+
 if __name__ == "__main__":
-    for name, figure in (("house", draw_house()), ("data", draw_data())):
+    for name, figure in (("house", draw_house()), ("data", draw_data()), ("walk", draw_walk())):
         figure.savefig(PICTURES / f"{name}.png", dpi=110)
