@@ -4,12 +4,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import scipy
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.optimize import brentq
 
 from ...dynamics.continuation.frequencies import kicked, levitating_branch
 from ...dynamics.flights.flight import simulate
@@ -28,17 +29,18 @@ from .article import (
     MODELS,
     QUICK,
     WEIGHT,
+    article_scene,
     label_of,
+    levitation_of,
     polar_angle,
     stable_in_flight,
 )
 from .article_formulas import field, force, side_radius
-from .drawing import by_configuration, by_rotor, configuration_panels, explain, plot_branch, rotor_panels
-from .scenes import article_scene, levitation_of
+from .drawing import by_configuration, by_rotor, configuration_panels, drawn, explain, plot_branch, rotor_panels
 from .tables import span, text_table
 
 # On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
-DISTANCES = (15e-3, 20e-3, 25e-3, 30e-3, 40e-3)
+DISTANCES = np.array([15e-3, 20e-3, 25e-3, 30e-3, 40e-3])
 """Places of the floater on the axis below the rotor, m; the article's text does not give its own."""
 FIELD_MODELS = ("article", "dipole", "cuboid", "fem")
 FIELD_COLUMNS: Columns = {
@@ -60,17 +62,15 @@ def field_points(quick: bool) -> list[Point]:
 
 def field_components(point: Point) -> xr.Dataset:
     """Field of one rotor by one model over `distance`, with the model's own error (0 for the article's formula)."""
-    distance = np.array(DISTANCES)
+    rotor = point["configuration"], point["value"]
     if point["model"] == "article":
-        across, along = field(point["configuration"], point["value"], distance)
-        error = np.zeros_like(distance)
+        across, along, error = *field(*rotor, DISTANCES), np.zeros_like(DISTANCES)
     else:
-        scene = article_scene(point["configuration"], point["value"])
-        model = sources(levitation_of(scene, point["model"]).table)
-        places = distance[:, None] * np.array([0.0, 0.0, -1.0])
+        model = sources(levitation_of(article_scene(*rotor), point["model"]).table)
+        places = DISTANCES[:, None] * np.array([0.0, 0.0, -1.0])
         b, _ = model.evaluate(places)
         across, along, error = np.hypot(b[:, 0], b[:, 1]), b[:, 2], model.absolute_error(places)[0]
-    there = variable(("distance",), distance, "m", "distance below the rotor's origin")
+    there = variable(("distance",), DISTANCES, "m", "distance below the rotor's origin")
     return recorded(point, FIELD_COLUMNS, (across, along, error), {"distance": there})
 
 
@@ -78,36 +78,38 @@ def _of(part: xr.Dataset, model: str) -> xr.Dataset:
     return cases_with(part, model=model).sortby("value")
 
 
-def deviations(part: xr.Dataset) -> dict[str, Any]:
+def deviations(part: xr.Dataset) -> dict[str, xr.DataArray]:
     """|B - B_fem| / |B_fem| (case, distance) of each simpler model, and last the finite elements' own error."""
     true = _of(part, "fem")
     size = np.hypot(true["off_axis"], true["on_axis"])
-    found: dict[str, Any] = {}
+    found: dict[str, xr.DataArray] = {}
     for model in FIELD_MODELS[:-1]:
-        apart = _of(part, model)[["off_axis", "on_axis"]] - true[["off_axis", "on_axis"]]
-        found[model] = np.hypot(apart["off_axis"], apart["on_axis"]) / size
+        other = _of(part, model)
+        found[model] = np.hypot(other["off_axis"] - true["off_axis"], other["on_axis"] - true["on_axis"]) / size
     return {**found, "fem": true["field_error"] / size}
 
 
-@styled
+@drawn
 def component_figure(result: xr.Dataset, quantity: str, ylabel: str) -> Figure:
     """One component of the field below the rotor against the parameter of each configuration."""
-    figure, rows = configuration_panels(result, 2.7, ylabel=ylabel, sharey=True)
+    styles = {"fem": DASHES["fem"], "dipole": DASHES["dipole"], "article": "+"}
+    figure, rows = configuration_panels(result, 2.7, ylabel=ylabel)
     for axes, configuration, part in rows:
-        for model, style in (("fem", DASHES["fem"]), ("dipole", DASHES["dipole"]), ("article", "+")):
+        for model, style in styles.items():
             found = _of(part, model)
             for k, color in zip(range(found.sizes["distance"]), PALETTE, strict=False):
                 axes.plot(found["value"], 1e3 * found[quantity][:, k], style, color=color, ms=4)
         axes.set(xlabel=label_of(configuration), yscale="log")
     rows[0][0].yaxis.set_major_formatter(ScalarFormatter())
-    _legend(figure, result, {"fem": NAMES["fem"], "dipole": NAMES["dipole"]}, {"formulas of the article": "+"})
+    names = {**NAMES, "article": "formulas of the article"}
+    _explain(rows[0][0], result, {names[model]: style for model, style in styles.items()})
     return figure
 
 
-@styled
+@drawn
 def differences_figure(result: xr.Dataset) -> Figure:
     """How far the simpler models are from the finite elements."""
-    figure, rows = configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)", sharey=True)
+    figure, rows = configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
     for axes, configuration, part in rows:
         value, off = _of(part, "fem")["value"], deviations(part)
         for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
@@ -115,16 +117,14 @@ def differences_figure(result: xr.Dataset) -> Figure:
                 axes.plot(value, 100 * off[model][:, k], DASHES[model], color=color)
         axes.plot(value, 100 * off["fem"].max("distance"), ":", color="0.5", lw=1.6)
         axes.set(xlabel=label_of(configuration), yscale="log")
-    names = {model: NAMES[model] for model in ("dipole", "cuboid")}
-    _legend(figure, result, names, {"largest error of the finite elements": ":"})
+    names = {NAMES[model]: DASHES[model] for model in ("dipole", "cuboid")}
+    _explain(rows[0][0], result, names | {"largest error of the finite elements": ":"})
     return figure
 
 
-def _legend(figure: Figure, result: xr.Dataset, models: dict[str, str], more: dict[str, str]) -> None:
-    axes = figure.axes[0]
+def _explain(axes: Axes, result: xr.Dataset, models: dict[str, str]) -> None:
     explain(axes, {f"{1e3 * distance:g} mm below": f"C{k}-" for k, distance in enumerate(result["distance"].values)})
-    explain(axes, {name: DASHES[model] for model, name in models.items()} | more)
-    legend_below(figure, columns=4)
+    explain(axes, models)
 
 
 def components_lines(result: xr.Dataset) -> list[str]:
@@ -156,7 +156,7 @@ FIELD_COMPONENTS = Study(
 
 
 # Force along the axis against distance, with its repelling and its attracting part: the article's second figure.
-CONFIGURATION, VALUE = "horizontal", 1.0  # The rotor of the article's figure; its text does not give the frequency
+ROTOR = {"configuration": "horizontal", "value": 1.0}  # Of the article's figure; its text does not give the frequency
 FREQUENCIES = (165.0, 170.0, 185.0, 200.0)
 FORCE_MODELS = ("semi-analytic", "small angles", "dipole", "fem")
 TOLD_ANGLE, TOLD_DISTANCE = 9.0, 0.04
@@ -178,21 +178,19 @@ FORCE_COLUMNS: Columns = {
 def force_points(quick: bool) -> list[Point]:
     """The rotor of the figure by both formulas and in both fields; `quick` has a coarser grid and one frequency."""
     frequencies, spacing = (FREQUENCIES[1:2], 5e-4) if quick else (FREQUENCIES, 1e-4)
-    asked = {"configuration": CONFIGURATION, "value": VALUE, "frequencies_hz": list(frequencies), "spacing": spacing}
-    return [{**asked, "model": model} for model in FORCE_MODELS]
+    return [{**ROTOR, "frequencies_hz": list(frequencies), "spacing": spacing, "model": m} for m in FORCE_MODELS]
 
 
 def force_curve(point: Point) -> xr.Dataset:
     """Axial force by one formula or in one field, where everything else is balanced, see `FORCE_COLUMNS`."""
-    grid = np.arange(CONTACT, 0.0451, point["spacing"])
+    grid, rotor = np.arange(CONTACT, 0.0451, point["spacing"]), (point["configuration"], point["value"])
     frequencies = np.asarray(point["frequencies_hz"], float)
     if point["model"] in FORCE_MODELS[:2]:
-        simple = point["model"] == "small angles"
-        found = [force(CONFIGURATION, VALUE, grid, frequency, simple) for frequency in frequencies]
+        found = [force(*rotor, grid, frequency, point["model"] == "small angles") for frequency in frequencies]
         rows = np.array([[one.attracting, one.repelling, np.zeros_like(grid), one.polar_angle] for one in found])
     else:
-        shared = levitation_of(article_scene(CONFIGURATION, VALUE, frequencies[0]), point["model"])
-        rows = np.array([_full(shared.elsewhere(frequency=float(f)), grid) for f in frequencies])
+        shared = levitation_of(article_scene(*rotor, frequencies[0]), point["model"])
+        rows = np.array([_along_curve(shared.elsewhere(frequency=float(f)), grid) for f in frequencies])
     marks = np.array([balance_points(grid, row[0] + row[1], row[3]) for row in rows])
     frequency = variable(ONE, frequencies, "Hz", "frequency of the rotor")
     distance = variable(("distance",), grid, "m", "distance along the axis")
@@ -200,17 +198,16 @@ def force_curve(point: Point) -> xr.Dataset:
     return recorded(point, FORCE_COLUMNS, (*rows.swapaxes(0, 1), *marks.T), axes)
 
 
-def _full(levitation: Levitation, grid: Array) -> list[Array]:
-    """The first four columns on the curve that holds the stable equilibrium; NaN beyond its ends."""
+def _along_curve(levitation: Levitation, grid: Array) -> Array:
+    """The first four columns (4, n) on the curve that holds the stable equilibrium; NaN beyond its ends."""
     # along the axis the moment comes nearest to upright on the curve that holds the stable equilibrium
     model, curves = sources(levitation.table), levitation.without_plate.curves
     curve = max(curves, key=lambda curve: float(curve.moment[:, 2].max()))
     parts = FLOATER.moment * curve.moment * model.evaluate(curve.position)[1][:, :, 2]
     error = FLOATER.moment * model.absolute_error(curve.position)[1]
-    depth = -curve.position[:, 2]
-    order = np.argsort(depth)
-    found = (parts[:, 2], parts[:, 0] + parts[:, 1], error, polar_angle(curve.moment))
-    return [scipy.interpolate.CubicSpline(depth[order], column[order], extrapolate=False)(grid) for column in found]
+    found = np.stack([parts[:, 2], parts[:, 0] + parts[:, 1], error, polar_angle(curve.moment)])
+    order = np.argsort(-curve.position[:, 2])
+    return np.asarray(CubicSpline(-curve.position[order, 2], found[:, order], axis=1, extrapolate=False)(grid))
 
 
 def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[float, float, float, float, float]:
@@ -219,16 +216,16 @@ def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[floa
     At the near one the force has done as much work up to the far one as is needed to come to rest there.
     """
     known = np.isfinite(magnetic)
-    rest = scipy.interpolate.PchipInterpolator(distance[known], magnetic[known] - WEIGHT)
+    rest = PchipInterpolator(distance[known], magnetic[known] - WEIGHT)
     roots = rest.roots(extrapolate=False)
     roots = roots[np.isfinite(roots)]
     if len(roots) < 2:
         return (np.nan,) * 5
-    stable, far = float(roots[-2]), float(roots[-1])
-    work = rest.antiderivative()
-    low, high = distance[known][0], stable
-    near = float(scipy.optimize.brentq(lambda d: work(far) - work(d), low, high)) if work(far) < work(low) else np.nan
-    theta = scipy.interpolate.PchipInterpolator(distance[known], angle[known])
+    stable, far = roots[-2:].tolist()
+    work, low, near = rest.antiderivative(), distance[known][0], np.nan
+    if work(far) < work(low):
+        near = brentq(lambda d: work(far) - work(d), low, stable)
+    theta = PchipInterpolator(distance[known], angle[known])
     return stable, far, near, float(theta(near)), float(theta(stable))
 
 
@@ -241,7 +238,7 @@ STYLES = {
 POINTS = {"near_tipping": ("<", "near tipping point"), "equilibrium": ("o", "stable"), "far_tipping": (">", "far one")}
 
 
-@styled
+@drawn
 def parts_figure(result: xr.Dataset) -> Figure:
     """Attraction, repulsion and net force at one frequency by each way of computing, and how far these are apart."""
     figure, ((left, right),) = panels(1, 2, (PAGE, 3.9))
@@ -257,32 +254,29 @@ def parts_figure(result: xr.Dataset) -> Figure:
         _plot(left, found, _net(found), style, color="k")
         explain(left, {text: style})
     explain(left, {"attracting part": "C0-", "repelling part": "C1-", "net force, with gravity": "k-"})
-    _points(left, true, PALETTE[2], named=True)
+    _mark(left, true, PALETTE[2])
     left.axhline(0.0, color="0.3", lw=0.6)
     left.set(ylabel="force, upwards (mN)", ylim=(-470, 350), title=f"(a) δx = 1 mm, {float(one['frequency']):g} Hz")
     right.set(ylabel="deviation from finite elements\n(% of the weight)", ylim=(-25, 25))
-    legend_below(figure, columns=5)
     return figure
 
 
-@styled
+@drawn
 def net_figure(result: xr.Dataset) -> Figure:
     """The net force at every frequency, and the polar angle that goes with it."""
     figure, ((net, angle),) = panels(1, 2, (PAGE, 3.2))
     for k, color in zip(range(result.sizes["frequency"]), PALETTE, strict=False):
-        for model in ("fem", "dipole"):
+        for model in ("dipole", "fem"):
             found = case_with(result, model=model).isel(frequency=k)
             _plot(net, found, _net(found), STYLES[model][0], color=color)
-        true = case_with(result, model="fem").isel(frequency=k)
-        _points(net, true, color, named=False)
-        _plot(angle, true, 1e-3 * np.degrees(true["polar_angle"].values), "-", color=color)
-        explain(net, {f"{float(true['frequency']):g} Hz": f"C{k}-"})
-    explain(net, {text: style for style, text in list(STYLES.values())[:2]} | {t: s for s, t in POINTS.values()})
+        _mark(net, found, color)
+        _plot(angle, found, 1e-3 * np.degrees(found["polar_angle"].values), "-", color=color)
+        explain(net, {f"{float(found['frequency']):g} Hz": f"C{k}-"})
+    explain(net, {text: style for style, text in list(STYLES.values())[:2]})
     net.axhline(0.0, color="0.3", lw=0.6)
-    net.set(ylabel="net force, with gravity (mN)", ylim=(-60, 40))
+    net.set(ylabel="net force, with gravity (mN)", ylim=(-60, 1.1e3 * float(_net(result).max())))
     angle.axhline(TOLD_ANGLE, color="0.4", lw=0.8, ls="-.", label="near tipping point in the article")
     angle.set(ylabel="polar angle θ (°)", ylim=(0, 20))
-    legend_below(figure, columns=5)
     return figure
 
 
@@ -296,9 +290,9 @@ def _plot(axes: Axes, found: xr.Dataset, values: ArrayLike, style: str, **more: 
     axes.set(xlabel="distance along the axis (mm)", xlim=(11, 45))
 
 
-def _points(axes: Axes, found: xr.Dataset, color: str, named: bool) -> None:
-    for mark, (symbol, text) in POINTS.items():
-        axes.plot(1e3 * float(found[mark]), 0.0, symbol, color=color, ms=5, label=text if named else None)
+def _mark(axes: Axes, found: xr.Dataset, color: str) -> None:
+    for name, (symbol, text) in POINTS.items():
+        axes.plot(1e3 * float(found[name]), 0.0, symbol, color=color, ms=5, label=text)
 
 
 def force_lines(result: xr.Dataset) -> list[str]:
@@ -306,8 +300,8 @@ def force_lines(result: xr.Dataset) -> list[str]:
     for k, frequency in enumerate(result["frequency"].values):
         for model, (_, text) in STYLES.items():
             found = case_with(result, model=model).isel(frequency=k)
-            far = np.interp(TOLD_DISTANCE, result["distance"].values, found["polar_angle"].values)
-            places = [f"{1e3 * float(found[name]):.3f}" for name in ("near_tipping", "equilibrium", "far_tipping")]
+            far = np.interp(TOLD_DISTANCE, result["distance"], found["polar_angle"])
+            places = [f"{1e3 * float(found[name]):.3f}" for name in POINTS]
             angles = [f"{np.degrees(float(a)):.2f}" for a in (found["angle_near"], found["angle_equilibrium"], far)]
             rows.append((f"{frequency:g} Hz, {text}", *places, *angles))
     head = ("δx = 1 mm", "near tipping (mm)", "stable (mm)", "far tipping (mm)", "θ near (°)", "θ stable", "θ at 40 mm")
@@ -328,8 +322,7 @@ FORCE_CURVE = Study(
 KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
 """Speed upwards with which the flight begins, m/s; its duration, s; samples of its last turns that are kept."""
 FLOWN_HZ, TURNS = 170.0, 3
-"""Of the flight in the article's figure, for δx = 1 mm: Hz, and how many of its last turns are shown."""
-FLOWN = {"configuration": "horizontal", "value": 1.0}
+"""Of the flight of `ROTOR` in the article's figure: Hz, and how many of its last turns are shown."""
 TYPICAL = (0.1, 0.3)  # Radii that the article calls typical, mm
 SIDE_COLUMNS: Columns = {
     "radius": (("frequency",), "m", "radius of the floater's circle"),
@@ -361,12 +354,12 @@ def side_mode(point: Point) -> xr.Dataset:
     field = sources(levitation.table)
     branch = levitating_branch(scene, field, levitation.rates, HIGHEST)
     rows = np.full((len(grid), 3), np.nan)
-    for k, there in enumerate(branch.side("near", grid)):
+    for row, there in zip(rows, branch.side("near", grid), strict=True):
         if there is not None:
-            rows[k] = np.hypot(*there.position[:2]), -there.position[2], there.growth_per_s
+            row[:] = np.hypot(*there.position[:2]), -there.position[2], there.growth_per_s
     simulated = np.full((4, SAMPLES), np.nan)
-    start = branch.side("near", np.array([FLOWN_HZ]))[0] if all(point[k] == v for k, v in FLOWN.items()) else None
-    if start is not None:
+    (start,) = branch.side("near", np.array([FLOWN_HZ]))
+    if start is not None and ROTOR.items() <= point.items():
         flight = simulate(kicked(scene, start, KICK), field, SECONDS, [])
         times = flight.time[-1] - np.linspace(TURNS / FLOWN_HZ, 0.0, SAMPLES)
         place = [np.interp(times, flight.time, column) for column in flight.lab.position.T]
@@ -385,7 +378,7 @@ def _predicted(simulated: xr.Dataset) -> float:
 def orbit_figure(result: xr.Dataset) -> Figure:
     """The orbit of rotor and floater seen from above, and their coordinates, in one flight."""
     figure, ((above, *others),) = panels(1, 3, (PAGE, 2.9))
-    simulated = case_with(result, model="fem", **FLOWN)
+    simulated = case_with(result, model="fem", **ROTOR)
     circle, radius = np.linspace(0, 2 * np.pi, 200), _predicted(simulated)
     x, y, turned = 1e3 * simulated["flight_x"], 1e3 * simulated["flight_y"], simulated["flight_angle"].values
     above.plot(np.cos(circle), np.sin(circle), color=PALETTE[1], label="rotor's cube")
@@ -395,35 +388,33 @@ def orbit_figure(result: xr.Dataset) -> Figure:
     above.plot(x[-1], y[-1], "o", color=PALETTE[0], ms=4)
     above.set(xlabel="x (mm)", ylabel="y (mm)", title=f"(a) from above, {FLOWN_HZ:g} Hz", aspect="equal")
     time = 1e3 * (turned - turned[0]) / (2 * np.pi * FLOWN_HZ)
-    for panel, floater, turn in zip(others, (x, y), (np.cos, np.sin), strict=True):
+    for panel, name, floater, turn in zip(others, "xy", (x, y), (np.cos, np.sin), strict=True):
         panel.plot(time, turn(turned), color=PALETTE[1])
         panel.plot(time, floater, color=PALETTE[0])
         for sign in (-1, 1):
             panel.axhline(sign * radius, color="k", ls=":", lw=1.6)
-        panel.set(xlabel="time (ms)", ylabel=f"{str(floater.name)[-1]} (mm)")
+        panel.set(xlabel="time (ms)", ylabel=f"{name} (mm)")
     legend_below(figure, above)
     return figure
 
 
-@styled
+@drawn
 def radius_figure(result: xr.Dataset) -> Figure:
     """The radius of the side mode against frequency for every rotor, and the article's formula."""
     figure, rotors = rotor_panels(result, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")
     for axes, rotor, color in rotors:
         axes.axhspan(*TYPICAL, color="0.92", lw=0, label="called typical in the article")
         found = case_with(rotor, model="fem")
-        frequency, stable = found["frequency"].values, stable_in_flight(found["growth"])
-        plot_branch(axes, frequency, 1e3 * found["radius"].values, stable, color=color)
-        axes.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
+        plot_branch(axes, found["frequency"], 1e3 * found["radius"], stable_in_flight(found["growth"]), color=color)
+        axes.plot(found["frequency"], 1e3 * found["article_radius"], ":", lw=1.6, color=color)
         axes.set(xlim=(35, 255), ylim=(0, None))
     explain(rotors[0][0], {"stable": "-", "unstable": "--", "$\\mathcal{G}/\\mu_f\\omega^2$ of the article": ":"})
-    legend_below(figure)
     return figure
 
 
 def side_lines(result: xr.Dataset) -> list[str]:
     lines, rows = [], []
-    for simulated in (case_with(result, model=model, **FLOWN) for model in MODELS):
+    for simulated in (case_with(result, model=model, **ROTOR) for model in MODELS):
         radius = 1e3 * np.hypot(simulated["flight_x"].values, simulated["flight_y"].values)
         lines.append(
             f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {simulated['model'].item()}: radius {radius.mean():.4f} mm "
@@ -433,9 +424,8 @@ def side_lines(result: xr.Dataset) -> list[str]:
     for label, rotor in by_rotor(result):
         cells = []
         for found in (case_with(rotor, model=model) for model in MODELS):
-            good = stable_in_flight(found["growth"])
-            radius, formula = found["radius"].values[good], found["article_radius"].values[good]
-            cells += [span(1e3 * radius, ".3f"), span(100 * (formula / radius - 1), "+.1f")]
+            radius = found["radius"].where(stable_in_flight(found["growth"]))
+            cells += [span(1e3 * radius, ".3f"), span(100 * (found["article_radius"] / radius - 1), "+.1f")]
         rows.append((label, *cells))
     head = ("where stable", *(f"{model} {words}" for model in MODELS for words in ("(mm)", "formula off (%)")))
     return [*lines, *text_table(head, rows)]

@@ -5,28 +5,39 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import binned_statistic
 
-from ...dynamics.continuation.branch import BranchPoint, Family
+from ...dynamics.continuation.branch import BranchPoint
 from ...dynamics.continuation.frequencies import by_frequency, distance_error, kicked, levitating_branch
 from ...dynamics.continuation.slow_drift import drift
 from ...dynamics.flights.flight import simulate
-from ...dynamics.flights.trajectory import Trajectory, flight_kind
-from ...dynamics.motion.rates import Rates
+from ...dynamics.flights.trajectory import flight_kind
 from ...dynamics.motion.state import Scales
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..figures.style import PALETTE, legend_below, styled
+from ..figures.style import PALETTE
+from ..levitation import Levitation
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
-from .article import CONFIGURATIONS, FLIGHT, HIGHEST, LOWEST, QUICK, WEIGHT, polar_angle, rotor_label, stable_in_flight
+from .article import (
+    CONFIGURATIONS,
+    FLIGHT,
+    HIGHEST,
+    LOWEST,
+    QUICK,
+    WEIGHT,
+    article_scene,
+    levitation_of,
+    losses,
+    polar_angle,
+    rotor_label,
+    stable_in_flight,
+)
 from .article_formulas import analytic_distance, balanced
-from .drawing import by_configuration, by_rotor, explain, plot_branch, rotor_panels, small_multiples
-from .scenes import article_scene, conducting, levitation_of
+from .drawing import by_configuration, by_rotor, drawn, explain, plot_branch, rotor_panels, small_multiples
 from .tables import span, text_table
 
 # Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.
@@ -68,10 +79,10 @@ def distance_points(quick: bool) -> list[Point]:
 def levitation_distance(point: Point) -> xr.Dataset:
     """Distances of one rotor by one formula, or in one field, at all frequencies, see `DISTANCE_COLUMNS`."""
     grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
-    rotor, formula = (point["configuration"], point["value"]), point["model"]
-    if formula == "semi-analytic":
+    rotor = point["configuration"], point["value"]
+    if point["model"] == "semi-analytic":
         found = {"distance": np.array([balanced(*rotor, frequency, WEIGHT) for frequency in grid])}
-    elif formula == "analytic":
+    elif point["model"] == "analytic":
         near = analytic_distance(*rotor, grid)
         found = {"distance": np.stack([near, np.full(near.shape, np.nan)], axis=1)}
     else:
@@ -81,29 +92,24 @@ def levitation_distance(point: Point) -> xr.Dataset:
     return recorded(point, DISTANCE_COLUMNS, found, axes, **sizes, flight=point["flights"])
 
 
-def _in_field(point: Point, grid: Array) -> dict[str, Array]:
+def _in_field(point: Point, grid: Array) -> dict[str, Any]:
     scene = article_scene(point["configuration"], point["value"], HIGHEST)
     levitation = levitation_of(scene, point["model"], interaction=point.get("interaction", "rigid"))
-    field = levitation.interaction
+    field, family = levitation.interaction, by_frequency(scene, levitation.rates)
     branch = levitating_branch(scene, field, levitation.rates, HIGHEST)
-    found = [branch.side(side, grid) for side in SIDES]
-    family = by_frequency(scene, levitation.rates)
-    rows = np.array([[_distance_row(scene, field, family, p) for p in side] for side in found])
-    fold = branch.fold
-    simulated = found[0] if point["model"] == FLOWN else []
-    known = [p for p in simulated if p is not None and stable_in_flight(p.growth_per_s)]
-    places = np.unique(np.linspace(0, len(known) - 1, point["flights"] if known else 0).astype(int))
-    flights = np.full((3, point["flights"]), np.nan)
-    for k, place in enumerate(places):
-        flights[:, k] = known[place].parameter, *mean_height(scene, field, known[place])
-    return dict(zip(DISTANCE_COLUMNS, (*rows.T, fold.parameter, -fold.position[2], *flights), strict=True))
-
-
-def _distance_row(scene: Scene, field: FieldTable, family: Family, point: BranchPoint | None) -> list[float]:
-    if point is None:
-        return [np.nan] * 4
-    error = distance_error(scene, field, family, point)
-    return [-point.position[2], error, point.growth_per_s, float(polar_angle(point.state[6:9]))]
+    rows, flights = np.full((len(SIDES), len(grid), 4), np.nan), np.full((3, point["flights"]), np.nan)
+    for side, row in zip(SIDES, rows, strict=True):
+        known = [(k, there) for k, there in enumerate(branch.side(side, grid)) if there is not None]
+        for k, there in known:
+            error = distance_error(scene, field, family, there)
+            row[k] = -there.position[2], error, there.growth_per_s, polar_angle(there.state[6:9])
+        stable = [there for _, there in known if stable_in_flight(there.growth_per_s)]
+        if side == "near" and point["model"] == FLOWN and stable:
+            places = np.unique(np.linspace(0, len(stable) - 1, point["flights"]).astype(int))
+            for k, place in enumerate(places):
+                flights[:, k] = stable[place].parameter, *mean_height(scene, field, stable[place])
+    fold = branch.fold.parameter, -branch.fold.position[2]
+    return dict(zip(DISTANCE_COLUMNS, (*rows.transpose(2, 1, 0), *fold, *flights), strict=True))
 
 
 def mean_height(scene: Scene, field: FieldTable, point: BranchPoint) -> tuple[float, float]:
@@ -131,7 +137,7 @@ def _smooth_mean(values: Array) -> float:
 AXES = "frequency of the rotor (Hz)", "levitation distance (mm)"
 
 
-@styled
+@drawn
 def models_figure(result: xr.Dataset) -> Figure:
     """The levitation distance of every rotor by finite elements and by the dipole."""
     figure, rotors = rotor_panels(result, 4.0, *AXES)
@@ -139,35 +145,32 @@ def models_figure(result: xr.Dataset) -> Figure:
         width = 1.8 if _levitated(rotor) else 0.8
         for side in SIDES:
             frequency, distance, stable = _side(rotor, "fem", side)
-            plot_branch(axes, frequency, 1e3 * distance, stable, color=color, lw=width)
-            axes.plot(frequency, 1e3 * _side(rotor, "dipole", side)[1], ":", color=color, lw=0.8)
+            plot_branch(axes, frequency, distance, stable, color=color, lw=width)
+            axes.plot(frequency, _side(rotor, "dipole", side)[1], ":", color=color, lw=0.8)
         found = case_with(rotor, model="fem")
         axes.plot(found["fold_frequency"], 1e3 * found["fold_distance"], "o", color=color, ms=3)
         axes.set_ylim(8, 52)
     key = {"finite elements, stable": "-", "unstable": "--", "point dipole": ":", "lowest frequency (fold)": "o"}
     explain(rotors[0][0], key, ms=3)
     explain(rotors[0][0], {"thick: levitated in the experiment": "-"}, lw=1.8)
-    legend_below(figure, columns=3)
     return figure
 
 
-@styled
+@drawn
 def formulas_figure(result: xr.Dataset) -> Figure:
     """The article's formulas and simulated flights beside the dipole's equilibrium, for the rotors that levitated."""
     levitated = [k for k, one in enumerate(each_case(result)) if _levitated(one.expand_dims("case"))]
     figure, rotors = rotor_panels(result.isel(case=levitated), 3.4, *AXES)
     for axes, rotor, color in rotors:
-        frequency, distance, stable = _side(rotor, "dipole", "near")
-        plot_branch(axes, frequency, 1e3 * distance, stable, lw=0.8, color=color)
+        plot_branch(axes, *_side(rotor, "dipole", "near"), lw=0.8, color=color)
         for model, style in (("semi-analytic", ":"), ("analytic", "-.")):
-            if model in rotor["model"].values:
-                axes.plot(frequency, 1e3 * _side(rotor, model, "near")[1], style, color=color)
+            if model in rotor["model"]:
+                axes.plot(*_side(rotor, model, "near")[:2], style, color=color)
         simulated = case_with(rotor, model=FLOWN)
         axes.plot(simulated["flight_frequency"], 1e3 * simulated["flight_distance"], "x", ms=4, color=color)
         axes.set_ylim(8, 62)
     key = {"point dipole, stable": "-", "unstable": "--", "semi-analytic formula": ":"}
     explain(rotors[0][0], key | {"analytic formula, no gravity": "-.", "simulated flight, mean": "x"})
-    legend_below(figure, columns=3)
     return figure
 
 
@@ -177,28 +180,23 @@ def _levitated(rotor: xr.Dataset) -> bool:
 
 
 def _side(rotor: xr.Dataset, model: str, side: str) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Frequency (Hz), distance (m) and whether it is stable on one side, by one model."""
+    """Frequency (Hz), distance (mm) and whether it is stable on one side, by one model."""
     found = case_with(rotor, model=model).sel(side=side)
-    return found["frequency"].values, found["distance"].values, stable_in_flight(found["growth"])
+    return found["frequency"].values, 1e3 * found["distance"].values, stable_in_flight(found["growth"])
 
 
 def distance_lines(result: xr.Dataset) -> list[str]:
     rows, lines = [], []
     for label, rotor in by_rotor(result):
         frequency, near, stable = _side(rotor, "dipole", "near")
+        other = {name: _side(rotor, name, "near")[1] for name in rotor["model"].values}
+        apart = [near - other["fem"], *(other.get(name, np.nan) - near for name in FORMULAS)]
         for model in FIELDS:
             _, distance, good = _side(rotor, model, "near")
             power = np.polyfit(np.log(frequency[good]), np.log(distance[good]), 1)[0] if good.sum() > 2 else np.nan
-            lowest = float(case_with(rotor, model=model)["fold_frequency"])
-            off = [""] * 3
-            if model == "dipole":
-                apart = {
-                    name: 1e3 * ((near - _side(rotor, name, "near")[1]) * (1 if name == "fem" else -1))[stable]
-                    for name in rotor["model"].values
-                }
-                off = [span(apart.get(name, np.nan), "+.2f") for name in ("fem", *FORMULAS)]
-            where = f"{lowest:.2f}", span(frequency[good]), span(1e3 * distance[good], ".2f"), power
-            rows.append((f"{label}, {model}", *where, *off))
+            lowest = f"{float(case_with(rotor, model=model)['fold_frequency']):.2f}"
+            off = [span(by[stable], "+.2f") for by in apart] if model == "dipole" else [""] * 3
+            rows.append((f"{label}, {model}", lowest, span(frequency[good]), span(distance[good], ".2f"), power, *off))
     for configuration, part in by_configuration(result):
         for model in FIELDS:
             found = cases_with(part, model=model)
@@ -208,13 +206,12 @@ def distance_lines(result: xr.Dataset) -> list[str]:
                     f"{configuration}, {model}: the levitated rotors lower the lowest frequency from {folds.max():.1f} "
                     f"to {folds.min():.1f} Hz, a factor of {folds.max() / folds.min():.2f}."
                 )
-    simulated = cases_with(result, model=FLOWN)
     off_mean = [
         one["flight_distance"] - np.interp(one["flight_frequency"], one["frequency"], one["distance"].sel(side="near"))
-        for one in each_case(simulated)
+        for one in each_case(cases_with(result, model=FLOWN))
     ]
-    worst = 1e6 * np.max(np.abs(off_mean), initial=0.0, where=np.isfinite(off_mean))
     if np.isfinite(off_mean).any():
+        worst = 1e6 * np.nanmax(np.abs(off_mean))
         lines.append(f"Means of simulated flights agree with the equilibria within {worst:.3g} µm.")
     head = ("rotor, model", "lowest (Hz)", "stable (Hz)", "distance (mm)", "power of f")
     last = "Last columns: point dipole less finite elements, and each formula less the point dipole, in mm."
@@ -237,7 +234,7 @@ LEVITATION_DISTANCE = Study(
 # is simulated in full, from equilibrium with spin s = 0, and compared with the averaged flight along the branch of
 # equilibria.  In the motion are real air, eddy currents in floater and rotor, and mutual magnetisation; in that of
 # `quick` Stokes drag and the floater's currents alone.
-FREQUENCIES = (115.0, 140.0, 150.0, 160.0, 170.0, 200.0)
+FREQUENCIES = np.array([115.0, 140.0, 150.0, 160.0, 170.0, 200.0])
 DISPLACEMENTS = (1.0, 1.5, 2.0)
 """δx in mm: as in the experiment, what gives its fall at 115 Hz, and what is lost in oscillations within these."""
 KICK = 1e-3  # Speed with which a flight begins upwards, m/s
@@ -257,8 +254,9 @@ FLIGHT_COLUMNS: Columns = {
     "highest": (("frequency", "part"), "m", "largest distance in the part"),
     "averaged_time": (("frequency", "sample"), "s", "time of the averaged flight"),
     "averaged_distance": (("frequency", "sample"), "m", "distance of the averaged flight"),
+    "kind": (("frequency",), "", "what became of the simulated flight"),
+    "averaged_end": (("frequency",), "", "what ended the averaged flight"),
 }
-SIZES = {"part": PARTS, "sample": SAMPLES}
 
 
 def flight_points(quick: bool) -> list[Point]:
@@ -270,31 +268,34 @@ def flight_points(quick: bool) -> list[Point]:
 def trajectories(point: Point) -> xr.Dataset:
     """The flights of one rotor, simulated and averaged, see `FLIGHT_COLUMNS`; and what became of each."""
     complete = point.get("complete", False)
-    scene = conducting(article_scene(point["configuration"], point["value"], HIGHEST), rotor=complete)
-    scene = replace(scene, drag=replace(scene.drag, air=complete))
+    scene = article_scene(point["configuration"], point["value"], HIGHEST)
+    scene = replace(scene, **losses(scene, complete, complete))
     levitation = levitation_of(scene, point["model"], interaction="auto" if complete else "rigid")
-    field, rates = levitation.interaction, levitation.rates
-    starts = levitating_branch(scene, field, rates, HIGHEST).side("near", np.array(FREQUENCIES))
-    rows = [_flight_row(scene, field, rates, start, point["duration_s"]) for start in starts]
-    frequency = variable(("frequency",), np.array(FREQUENCIES), "Hz", "frequency of the rotor")
-    found = {name: np.array([row[name] for row in rows]) for name in FLIGHT_COLUMNS}
-    kinds = {name: (("case", "frequency"), [[str(row[name]) for row in rows]]) for name in ("kind", "averaged_end")}
-    return recorded(point, FLIGHT_COLUMNS, found, {"frequency": frequency}).assign(kinds)
+    starts = levitating_branch(scene, levitation.interaction, levitation.rates, HIGHEST).side("near", FREQUENCIES)
+    sizes = {"frequency": len(FREQUENCIES), "part": PARTS, "sample": SAMPLES}
+    found = {
+        name: np.full([sizes[d] for d in dims], np.nan if unit else NONE, float if unit else "U20")
+        for name, (dims, unit, _) in FLIGHT_COLUMNS.items()
+    }
+    for k, start in enumerate(starts):
+        if start is not None:
+            for name, value in _flight_row(scene, levitation, start, point["duration_s"]).items():
+                found[name][k] = value
+    frequency = variable(("frequency",), FREQUENCIES, "Hz", "frequency of the rotor")
+    return recorded(point, FLIGHT_COLUMNS, found, {"frequency": frequency})
 
 
-def _flight_row(
-    scene: Scene, field: FieldTable, rates: Rates, start: BranchPoint | None, seconds: float
-) -> dict[str, Any]:
-    if start is None:
-        empty = {name: np.full([SIZES[d] for d in dims[1:]], np.nan) for name, (dims, _, _) in FLIGHT_COLUMNS.items()}
-        return {**empty, "kind": NONE, "averaged_end": NONE}
-    there = replace(scene, frequency=start.parameter)
-    slow = drift(there, field, 0.0, FLIGHT, rates, Scales.of(there).unpack(start.state), stokes=True)
+def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, seconds: float) -> dict[str, Any]:
+    there, field = replace(scene, frequency=start.parameter), levitation.interaction
+    slow = drift(there, field, 0.0, FLIGHT, levitation.rates, Scales.of(there).unpack(start.state), stokes=True)
     times = np.linspace(0.0, slow.time[-1], SAMPLES)
     flight = simulate(kicked(there, start, KICK), field, seconds, [])
     lost_at_once = flight.ended_by != "duration" and flight.levitated_s < SHORTEST
+    edges, distance = np.linspace(0.0, flight.time[-1], PARTS + 1), -flight.lab.position[:, 2]
+    kinds = {"lowest": "min", "mean": "mean", "highest": "max"}
     return {
-        **_parts(flight),
+        "time": (edges[1:] + edges[:-1]) / 2,
+        **{name: binned_statistic(flight.time, distance, kind, edges).statistic for name, kind in kinds.items()},
         "kind": SHORT if lost_at_once else flight_kind(flight),
         "averaged_end": slow.ended_by,
         "levitated": flight.levitated_s,
@@ -306,44 +307,29 @@ def _flight_row(
     }
 
 
-def _parts(flight: Trajectory) -> dict[str, Array]:
-    """Time, and least, mean and largest distance in equal parts of a flight; NaN in parts without a sample."""
-    edges = np.linspace(0.0, flight.time[-1], PARTS + 1)
-    kinds = {"lowest": "min", "mean": "mean", "highest": "max"}
-    distance = -flight.lab.position[:, 2]
-    found = {name: binned_statistic(flight.time, distance, kind, edges).statistic for name, kind in kinds.items()}
-    return {"time": (edges[1:] + edges[:-1]) / 2, **found}
-
-
-@styled
+@drawn
 def flight_figure(result: xr.Dataset) -> Figure:
     """The distance in each flight, one panel for each displacement."""
     titles = [rotor_label("horizontal", value) for value in result["value"].values]
     figure, axes = small_multiples(titles, 3.6, xlabel="time (s)", ylabel="levitation distance (mm)", sharey=True)
+    explain(axes[0], {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(result["frequency"].values)})
     for panel, rotor in zip(axes, each_case(result), strict=True):
         for k, color in zip(range(rotor.sizes["frequency"]), PALETTE, strict=False):
-            _flight(panel, rotor.isel(frequency=k), color)
+            one = rotor.isel(frequency=k)
+            if one["kind"] == NONE:
+                continue
+            time, mean = one["time"], 1e3 * one["mean"]
+            panel.fill_between(time, 1e3 * one["lowest"], 1e3 * one["highest"], color=color, alpha=0.3, lw=0)
+            panel.plot(time, mean, color=color)
+            panel.plot(one["averaged_time"], 1e3 * one["averaged_distance"], "--", color="k", lw=0.7)
+            # an averaged flight that ends at the fold falls; what is lost otherwise is lost in an oscillation
+            if one["kind"] not in ("stable", "drifting"):
+                last = int(np.flatnonzero(np.isfinite(mean))[-1])
+                mark = "v" if one["averaged_end"] == "fold" else "x"
+                panel.plot(time[last], np.clip(mean[last], 12, 34), mark, color=color, ms=5)
         panel.set_ylim(11, 40)
-    explain(axes[0], {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(result["frequency"].values)})
     explain(axes[0], {"averaged flight": "--", "lost in a fall": "v", "lost in oscillations": "x"}, ms=4)
-    legend_below(figure)
     return figure
-
-
-def _flight(axes: Axes, flight: xr.Dataset, color: str) -> None:
-    kind = str(flight["kind"].values)
-    if kind == NONE:
-        return
-    time = flight["time"].values
-    low, mean, high = (1e3 * flight[name].values for name in ("lowest", "mean", "highest"))
-    axes.fill_between(time, low, high, color=color, alpha=0.3, lw=0)
-    axes.plot(time, mean, color=color)
-    axes.plot(flight["averaged_time"], 1e3 * flight["averaged_distance"], "--", color="k", lw=0.7)
-    # an averaged flight that ends at the fold falls; what is lost otherwise is lost in an oscillation
-    if kind not in ("stable", "drifting"):
-        last = np.flatnonzero(np.isfinite(mean))[-1]
-        falls = str(flight["averaged_end"].values) == "fold"
-        axes.plot(time[last], np.clip(mean[last], 12, 34), "v" if falls else "x", color=color, ms=5)
 
 
 def flight_lines(result: xr.Dataset) -> list[str]:
@@ -353,11 +339,10 @@ def flight_lines(result: xr.Dataset) -> list[str]:
             one = rotor.isel(frequency=k)
             mean = 1e3 * one["mean"].dropna("part").values
             ends = "–" if not len(mean) else f"{mean[0]:.2f} to {mean[-1]:.2f}"
-            name = f"{rotor_label('horizontal', float(rotor['value']))}, {frequency:g} Hz"
-            seen = REPORTED.get(float(frequency), "")
-            kind, averaged = one["kind"].item(), one["averaged_end"].item()
             numbers = [float(one[key]) for key in ("averaged_levitated", "growth", "energy_error")]
-            rows.append((name, kind, float(one["levitated"]), ends, averaged, *numbers, seen))
+            cells = (one["kind"].item(), float(one["levitated"]), ends, one["averaged_end"].item(), *numbers)
+            name = f"{rotor_label('horizontal', float(rotor['value']))}, {frequency:g} Hz"
+            rows.append((name, *cells, REPORTED.get(float(frequency), "")))
     head = ("rotor", "simulated", "for (s)", "mean distance (mm)", "averaged", "for (s)", "growth (1/s)", "energy")
     return [
         *text_table((*head, "article"), rows),

@@ -34,7 +34,7 @@ class AxialForce:
 
 def field(configuration: str, value: float, distance: Array) -> tuple[Array, Array]:
     """|B⊥| and B_z (T) on the axis at `distance` (m), by the formulas of the polar angle without a side mode."""
-    across, along, _, _ = PARTS[configuration](CONFIGURATIONS[configuration].si(value), distance, 0 * distance)
+    across, along, _, _ = PARTS[configuration](CONFIGURATIONS[configuration].scale * value, distance, 0 * distance)
     unit = INTERACTION / FLOATER.moment
     return np.abs(unit * across), unit * along
 
@@ -51,7 +51,7 @@ def force(configuration: str, value: float, distance: ArrayLike, frequency: floa
     The simple form (horizontal and tilt) has θ = m_f B⊥/(I ω²), and in the tilted case no side mode.  `value` is in the
     configuration's unit.
     """
-    d, parameter = np.asarray(distance, float), CONFIGURATIONS[configuration].si(value)
+    d, parameter = np.asarray(distance, float), CONFIGURATIONS[configuration].scale * value
     scale, a = 3 * INTERACTION / d**4, side_radius(d, frequency)
     stiffness = FLOATER.inertia * (2 * np.pi * frequency) ** 2
     if simple:
@@ -114,7 +114,7 @@ def balanced(configuration: str, value: float, frequency: float, load: float) ->
 def analytic_distance(configuration: str, value: float, frequency: ArrayLike) -> Array:
     """Distance without gravity and for small angles, m: equations 17 and 36 of the supplement; NaN for vertical."""
     rate = 2 * np.pi * np.asarray(frequency, float)
-    parameter = CONFIGURATIONS[configuration].si(value)
+    parameter = CONFIGURATIONS[configuration].scale * value
     angular, linear = INTERACTION / (FLOATER.inertia * rate**2), INTERACTION / (FLOATER.mass * rate**2)
     if configuration == "horizontal":
         half = angular / (8 * parameter)

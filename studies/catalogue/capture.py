@@ -13,7 +13,7 @@ import scipy
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ...dynamics.continuation.frequencies import at_frequency
 from ...dynamics.equilibria.equilibrium import EquilibriumError
@@ -27,12 +27,21 @@ from ...fem.plate.tables import slab_and_rotor_table
 from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Lowering, Scene
-from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
+from ..figures.style import PAGE, PALETTE, panels, styled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
-from .article import CONFIGURATIONS, QUICK_ROTORS, label_of, rotor_label
-from .drawing import by_rotor, configuration_panels
-from .scenes import article_plate, article_scene, conducting, levitation_of, stable_frequencies
+from .article import (
+    CONFIGURATIONS,
+    QUICK_ROTORS,
+    article_plate,
+    article_scene,
+    label_of,
+    levitation_of,
+    losses,
+    stable_frequencies,
+    within,
+)
+from .drawing import by_rotor, configuration_panels, drawn
 from .tables import text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
@@ -45,7 +54,6 @@ BELOW = 0.018
 SETTLED, LOWERED, LOWERING_SPEED, AFTER = 1.0, 0.055, 0.01, 1.0
 """The plate goes down after (s), by (m), at (m/s: the article's), and the flight goes on for (s)."""
 PLATE_RTOL = 1e-2  # Of the plate's tables: capture is decided by the field's attraction, the plate only brakes
-ONE_SIGMA = math.erf(0.5**0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +61,7 @@ class Place:
     """A rotor at one frequency, and where the floater would levitate without a plate."""
 
     scene: Scene  # with the plate, which stays
+    field: RotorTable  # of the rotor
     distance: float  # of the floater from the rotor's origin, m
     low: float  # ends of the stable frequencies without a plate, Hz
     high: float
@@ -74,13 +83,14 @@ def place_of(configuration: str, measure: float, part: float) -> Place:
     EquilibriumError : it levitates stably at no frequency
     """
     scene = article_scene(configuration, measure, permeability=1.0)
-    rates = levitation_of(scene, "cuboid").rates
-    stable = stable_frequencies(scene, rates)
-    low, high = stable.low.parameter, stable.high.parameter
-    frequency = low + part * (high - low)
-    distance = at_frequency(scene, rates, stable.near(frequency), frequency).distance
-    whole = conducting(replace(scene, frequency=frequency, drag=replace(scene.drag, air=True)), rotor=False)
-    return Place(replace(whole, plate=article_plate(-distance - BELOW)), distance, low, high)
+    levitation = levitation_of(scene, "cuboid")
+    stable = stable_frequencies(scene, levitation.rates)
+    frequency = float(within(stable, part))
+    distance = at_frequency(scene, levitation.rates, stable.near(frequency), frequency).distance
+    plate = article_plate(-distance - BELOW)
+    there = replace(scene, frequency=frequency, plate=plate, **losses(scene, rotor=False))
+    assert isinstance(levitation.table, RotorTable)
+    return Place(there, levitation.table, distance, stable.low.parameter, stable.high.parameter)
 
 
 @cache
@@ -94,19 +104,10 @@ def plate_under(place: Place, lowered: bool = False) -> PlateMemory:
     if lowered:
         plate = replace(plate, lowering=Lowering(SETTLED, LOWERING_SPEED, LOWERED))
     middle = np.array([0.0, 0.0, -place.distance - (FARTHER - NEARER) / 2])
-    half = [SIDEWAYS, SIDEWAYS, (FARTHER + NEARER) / 2]
-    region = reachable_region(plate, middle, half, scene.floater.radius)
+    region = reachable_region(plate, middle, [SIDEWAYS, SIDEWAYS, (FARTHER + NEARER) / 2], scene.floater.radius)
     frequencies = (0.5, max(250.0, 2 * scene.frequency))
-    table, share = slab_and_rotor_table(plate, field_of(place), region, frequencies, PLATE_RTOL)
+    table, share = slab_and_rotor_table(plate, place.field, region, frequencies, PLATE_RTOL)
     return PlateMemory(plate, table, share, "slab")
-
-
-@cache
-def field_of(place: Place) -> RotorTable:
-    """The rotor's field."""
-    table = levitation_of(replace(place.scene, plate=None), "cuboid").table
-    assert isinstance(table, RotorTable)
-    return table
 
 
 def launches(place: Place, count: int, seed: list[int]) -> tuple[dict[str, Array], State]:
@@ -129,14 +130,15 @@ def launches(place: Place, count: int, seed: list[int]) -> tuple[dict[str, Array
     farther = -NEARER + (NEARER + FARTHER) * height
     sideways, spin = SIDEWAYS * np.sqrt(area), SPIN * (2 * along - 1)
     cosine = 1 - (1 - np.cos(LEAN)) * cap  # even over the sphere's cap
-    sine = np.sqrt(1 - cosine**2)
-    position = np.stack(
-        [sideways * np.cos(place_angle), sideways * np.sin(place_angle), -place.distance - farther], axis=-1
-    )
-    moment = np.stack([sine * np.cos(moment_angle), sine * np.sin(moment_angle), cosine], axis=-1)
+    position = _cylindrical(sideways, place_angle, -place.distance - farther)
+    moment = _cylindrical(np.sqrt(1 - cosine**2), moment_angle, cosine)
     turning = (spin * place.scene.angular_velocity)[:, None] * moment
     how = {"farther": farther, "sideways": sideways, "lean": np.arccos(cosine), "spin": spin}
     return how, State(position, velocity, moment, turning)
+
+
+def _cylindrical(radius: Array, angle: Array, height: Array) -> Array:
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
 
 
 def seed_of(configuration: str, measure: float, part: float, batch: int) -> list[int]:
@@ -194,23 +196,22 @@ def capture(point: Point) -> xr.Dataset:
         return recorded(point, COLUMNS, found, {}, flight=count)
     how, states = launches(place, count, seed_of(*rotor, point["batch"]))
     ended = _flown(place, states, SETTLED)
-    found |= {"rotor_frequency": place.scene.frequency, "distance": place.distance, "low": place.low}
     low = ended.last.position[:, 2] < -(place.distance + BELOW) / 2
     outcome = np.where(ended.ended_by == CONTACT, np.where(low, PLATE, ROTOR), LOST)
     outcome[ended.ended_by == DURATION] = HELD
+    found |= {"rotor_frequency": place.scene.frequency, "distance": place.distance, "low": place.low}
     found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": outcome.astype(float)}
     found |= {**how, "left_plate_table": ended.left_plate_table.astype(float)}
     if point["checked"]:
         first = states[: point["checked"]]
         later = _flown(place, first, SETTLED + LOWERED / LOWERING_SPEED + AFTER, lowered=True)
-        found["settled"] = np.sum(later.levitated_s >= SETTLED)
-        found["stayed"] = np.sum(later.ended_by == DURATION)
+        found |= {"settled": np.sum(later.levitated_s >= SETTLED), "stayed": np.sum(later.ended_by == DURATION)}
     return recorded(point, COLUMNS, found, {}, flight=count)
 
 
 def _flown(place: Place, states: State, seconds: float, lowered: bool = False) -> Endings:
     memory = plate_under(place, lowered)
-    return launched(replace(place.scene, plate=memory.plate), field_of(place), memory, states, seconds)
+    return launched(replace(place.scene, plate=memory.plate), place.field, memory, states, seconds)
 
 
 def share(hits: ArrayLike) -> tuple[float, float, float]:
@@ -219,7 +220,7 @@ def share(hits: ArrayLike) -> tuple[float, float, float]:
     if not trials.size:
         return np.nan, np.nan, np.nan
     found = scipy.stats.binomtest(int(trials.sum()), trials.size)
-    return float(found.statistic), *found.proportion_ci(ONE_SIGMA, "wilson")
+    return float(found.statistic), *found.proportion_ci(math.erf(0.5**0.5), "wilson")
 
 
 def share_text(hits: ArrayLike) -> str:
@@ -230,50 +231,39 @@ def share_text(hits: ArrayLike) -> str:
     return f"{100 * value:.{digits}f} ± {100 * error:.{digits}f} %"
 
 
-def each_place(result: xr.Dataset) -> list[xr.Dataset]:
-    """The launches of each rotor and frequency of a joined result, its batches put together over `flight`."""
+def each_place(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """The launches of each rotor and frequency of a joined result, by its label, its batches put together."""
     found = []
-    for _, rotor in by_rotor(result):
+    for label, rotor in by_rotor(result):
         for part in np.unique(rotor["part"].values):
             some = cases_with(rotor, part=part)
-            flights = {name: some[name].values.ravel() for name, (dims, *_) in COLUMNS.items() if dims}
-            known = np.isfinite(flights["outcome"])
-            one = xr.Dataset({name: ("flight", values[known]) for name, values in flights.items()})
-            for name in ("configuration", "measure", "part", "rotor_frequency"):
-                one[name] = (), some[name].values[0]
-            one["settled"], one["stayed"] = some["settled"].sum(), some["stayed"].sum()
-            found.append(one)
+            flights = some[[name for name, (dims, *_) in COLUMNS.items() if dims]].stack(trial=("case", "flight"))
+            one = flights.isel(trial=np.isfinite(flights["outcome"].values)).drop_vars(["trial", "case", "flight"])
+            one = one.assign(some[["configuration", "measure", "part", "rotor_frequency"]].isel(case=0))
+            found.append((label, one.assign(some[["settled", "stayed"]].sum())))
     return found
 
 
-def _held(one: xr.Dataset) -> NDArray[np.bool_]:
-    return np.asarray(one["outcome"].values == HELD)
-
-
-def _others(one: xr.Dataset) -> dict[str, float]:
-    """Shares of launches that ended otherwise, by name."""
-    return {word: float(np.mean(one["outcome"].values == k)) for k, word in enumerate(WORDS) if k != HELD}
-
-
-SHOWN = (("horizontal", 2.0), ("vertical", 14.0), ("vertical", 18.0), ("tilt", 10.0))
+SHOWN = ("δx = 2 mm", "δz = 14 mm", "δz = 18 mm", "δθ = 10°")
 """Rotors of which it is drawn from where they capture."""
 BINS = 6
 
 
-@styled
+@drawn
 def share_figure(result: xr.Dataset) -> Figure:
     """The capture probability of each rotor at each part of its frequencies; bars: one standard deviation."""
-    figure, rows = configuration_panels(result, 2.7, ylabel="capture probability (%)", sharey=True)
+    figure, rows = configuration_panels(result, 2.7, ylabel="capture probability (%)")
     for axes, name, own in rows:
-        every = each_place(own)
-        for part, color in zip(sorted({float(one["part"]) for one in every}), PALETTE, strict=False):
-            some = [one for one in every if float(one["part"]) == part]
+        every = [one for _, one in each_place(own)]
+        for part, color in zip(np.unique(own["part"]), PALETTE, strict=False):
+            some = [one for one in every if one["part"] == part]
             label = f"{part:.0%} of the stable range"
-            _shares(axes, [float(one["measure"]) for one in some], [_held(one) for one in some], color, label)
+            _shares(
+                axes, [one["measure"].item() for one in some], [one["outcome"] == HELD for one in some], color, label
+            )
         for measure in CONFIGURATIONS[name].levitated:
             axes.axvline(measure, color="0.85", lw=4, zorder=0, label="levitated in the article")
         axes.set(xlabel=label_of(name), ylim=(-2, 102))
-    legend_below(figure)
     return figure
 
 
@@ -288,18 +278,17 @@ def _shares(axes: Axes, x: ArrayLike, hits: Sequence[ArrayLike], color: str, lab
 def place_figure(result: xr.Dataset) -> Figure:
     """From where floaters are captured: over height and lateral offset, and over the moment's angle to the axis."""
     every = each_place(result)
-    found = [[one for one in every if (one["configuration"].item(), float(one["measure"])) == rotor] for rotor in SHOWN]
-    chosen = [some[len(some) // 2] for some in found if some]
+    found = [(label, [one for name, one in every if name == label]) for label in SHOWN]
+    chosen = [(label, some[len(some) // 2]) for label, some in found if some]
     figure, (maps, leans) = panels(2, len(chosen), (PAGE, 4.6), sharey="row")
     side, height = np.linspace(0, SIDEWAYS, 5), np.linspace(-NEARER, FARTHER, 9)
     edges = np.degrees(np.linspace(0, LEAN, BINS + 1))
-    for top, bottom, one in zip(maps, leans, chosen, strict=True):
-        at, hits = (one["sideways"].values, one["farther"].values), _held(one)
+    for top, bottom, (label, one) in zip(maps, leans, chosen, strict=True):
+        at, hits = (one["sideways"].values, one["farther"].values), one["outcome"].values == HELD
         mean = 100 * scipy.stats.binned_statistic_2d(*at, hits.astype(float), bins=(side, height)).statistic
-        drawn = top.pcolormesh(1e3 * side, 1e3 * height, mean.T, vmin=0, vmax=100, cmap="viridis")
+        shades = top.pcolormesh(1e3 * side, 1e3 * height, mean.T, vmin=0, vmax=100, cmap="viridis")
         top.grid(False)
-        rotor = rotor_label(one["configuration"].item(), float(one["measure"]))
-        top.set_title(f"{top.get_title('left')} {rotor}, {float(one['rotor_frequency']):.0f} Hz")
+        top.set_title(f"{top.get_title('left')} {label}, {float(one['rotor_frequency']):.0f} Hz")
         top.set_xlabel("lateral offset (mm)")
         lean = np.digitize(np.degrees(one["lean"].values), edges) - 1
         _shares(bottom, (edges[1:] + edges[:-1]) / 2, [hits[lean == k] for k in range(BINS)], PALETTE[0], "")
@@ -307,31 +296,31 @@ def place_figure(result: xr.Dataset) -> Figure:
     maps[0].set_ylabel("farther from the rotor (mm)")
     maps[0].invert_yaxis()  # shared by all
     leans[0].set_ylabel("capture probability (%)")
-    figure.colorbar(drawn, ax=maps, label="captured (%)")
+    figure.colorbar(shades, ax=maps, label="captured (%)")
     return figure
 
 
 def capture_lines(result: xr.Dataset) -> list[str]:
     found, rows = each_place(result), []
-    for one in found:
-        rest = sorted(((part, word) for word, part in _others(one).items() if part > 0), reverse=True)
+    for label, one in found:
         after = f"{int(one['stayed'])} of {int(one['settled'])}" if one["settled"] else ""
         seen = "levitated" if _levitated(one) else "did not levitate"
-        rotor = rotor_label(one["configuration"].item(), float(one["measure"]))
-        ends = ", ".join(f"{100 * part:.0f} % {word}" for part, word in rest)
-        name = f"{rotor}, {float(one['rotor_frequency']):.1f} Hz"
-        rows.append((name, share_text(_held(one)), str(one.sizes["flight"]), seen, after, ends))
+        rest = sorted(_others(one).items(), key=lambda other: -other[1])
+        ends = ", ".join(f"{100 * part:.0f} % {word}" for word, part in rest if part > 0)
+        name, held = f"{label}, {float(one['rotor_frequency']):.1f} Hz", share_text(one["outcome"] == HELD)
+        rows.append((name, held, str(one.sizes["trial"]), seen, after, ends))
     head = ("rotor", "captured", "launches", "article", "stay, plate lowered", "others")
     lines = text_table(head, rows)
-    every = xr.concat([one[["outcome", "left_plate_table"]] for one in found], "flight")
+    every = xr.concat([one[["outcome", "left_plate_table"]] for _, one in found], "trial", coords="minimal")
     beyond = every["left_plate_table"] == 1
     if beyond.any():
+        captured = int((beyond & (every["outcome"] == HELD)).sum())
         lines.append(
-            f"{int(beyond.sum())} of {int(every['left_plate_table'].count())} trajectories, "
-            f"{int((beyond & _held(every)).sum())} of them captured, were for a while beyond the range of the "
-            "plate's table, where the field of its currents is a continuation of unknown error."
+            f"{int(beyond.sum())} of {int(every['left_plate_table'].count())} trajectories, {captured} of them captured, "
+            "were for a while beyond the range of the plate's table, where the field of its currents is a "
+            "continuation of unknown error."
         )
-    settled, stayed = (int(sum(one[name] for one in found)) for name in ("settled", "stayed"))
+    settled, stayed = (int(result[name].sum()) for name in ("settled", "stayed"))
     if settled:
         lines.append(
             f"Of {settled} captured floaters {stayed} still levitate after the plate was lowered (10 mm/s over 55 mm): "
@@ -344,28 +333,29 @@ def _levitated(one: xr.Dataset) -> bool:
     return float(one["measure"]) in CONFIGURATIONS[one["configuration"].item()].levitated
 
 
+def _others(one: xr.Dataset) -> dict[str, float]:
+    """Shares of launches that ended otherwise, by name."""
+    return {word: float((one["outcome"] == k).mean()) for k, word in enumerate(WORDS) if k != HELD}
+
+
 def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
     """The shares as numbers: `shares`, one entry for each rotor and frequency; and what the plate's lowering loses."""
-    found, rows = each_place(result), []
-    for one in found:
-        value, low, high = share(_held(one))
+    rows = []
+    for _, one in each_place(result):
+        value, low, high = share(one["outcome"] == HELD)
         frequency = float(one["rotor_frequency"])
         rows.append({
             "configuration": one["configuration"].item(),
             "value": float(one["measure"]),
             "levitated_in_article": _levitated(one),
             "frequency_hz": None if np.isnan(frequency) else frequency,
-            "flights": one.sizes["flight"],
+            "flights": one.sizes["trial"],
             "held": value,
             "held_error": (high - low) / 2,
-            "left_plate_table": float(np.mean(one["left_plate_table"] == 1)),
+            "left_plate_table": float((one["left_plate_table"] == 1).mean()),
             **{word.replace(" ", "_"): part for word, part in _others(one).items()},
         })  # fmt: skip
-    return {
-        "shares": rows,
-        "flown_on": int(sum(one["settled"] for one in found)),
-        "stayed_up": int(sum(one["stayed"] for one in found)),
-    }
+    return {"shares": rows, "flown_on": int(result["settled"].sum()), "stayed_up": int(result["stayed"].sum())}
 
 
 STUDY = Study(

@@ -1,7 +1,8 @@
-"""What figures and reports of several studies share: panels, legends, colours of rotors, tables and numbers as text."""
+"""What figures of several studies share: panels, legends, colours of rotors."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import wraps
+from typing import Any, ParamSpec
 
 import matplotlib as mpl
 import numpy as np
@@ -10,15 +11,31 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
+from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
+from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import Array
-from ..figures.style import PAGE, PALETTE, panels
+from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
 from ..study import cases_with
 from .article import CONFIGURATIONS, label_of, rotor_label
 
 TITLES = {"horizontal": "displaced cube", "vertical": "two cubes", "tilt": "tilted cube"}
+LINE = 135  # Characters of a legend across the page
+Arguments = ParamSpec("Arguments")
+
+
+def drawn(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
+    """Let a function draw in the project's style; all that has a name is explained below the panels."""
+
+    @styled
+    @wraps(draw)
+    def inside(*arguments: Arguments.args, **options: Arguments.kwargs) -> Figure:
+        figure = draw(*arguments, **options)
+        names = [name for axes in figure.axes for name in axes.get_legend_handles_labels()[1]]
+        legend_below(figure, columns=LINE // (8 + max(map(len, names), default=0)) or 1)
+        return figure
+
+    return inside
 
 
 def small_multiples(
@@ -76,7 +93,8 @@ def configuration_panels(
 ) -> tuple[Figure, list[tuple[Axes, str, xr.Dataset]]]:
     """A panel for each configuration of a joined result, with its name and its cases; options of `small_multiples`."""
     parts = list(by_configuration(result))
-    figure, axes = small_multiples([TITLES[name] for name, _ in parts], height, 3, xlabel, ylabel, **shared)
+    titles = [TITLES[name] for name, _ in parts]
+    figure, axes = small_multiples(titles, height, 3, xlabel, ylabel, sharey=True, **shared)
     return figure, [(panel, *part) for panel, part in zip(axes, parts, strict=True)]
 
 
@@ -88,23 +106,20 @@ def rotor_panels(
     Colours go from dark to bright along viridis with displacement or tilt; a bar below the panel tells them.
     Parameters are those of `small_multiples`.
     """
-    figure, rows = configuration_panels(result, height, xlabel, ylabel, sharey=True)
+    figure, rows = configuration_panels(result, height, xlabel, ylabel)
     found: list[tuple[Axes, xr.Dataset, Any]] = []
     for axes, configuration, part in rows:
-        rotors = [rotor for _, rotor in by_rotor(part)]
-        known = [float(rotor[_measure(rotor)][0]) for rotor in rotors]
-        if len(known) == 1:
-            axes.set_title(axes.get_title("left").replace(TITLES[configuration], rotor_label(configuration, known[0])))
-            found.append((axes, rotors[0], PALETTE[0]))
+        rotors = dict(by_rotor(part))
+        if len(rotors) == 1:
+            axes.set_title(axes.get_title("left").replace(TITLES[configuration], next(iter(rotors))))
+            found.append((axes, part, PALETTE[0]))
             continue
-        colors = mpl.colormaps["viridis"](np.linspace(0, 0.88, len(known)))
-        norm = BoundaryNorm(np.arange(len(known) + 1) - 0.5, len(known))
-        bar = figure.colorbar(
-            ScalarMappable(norm, ListedColormap(colors)), ax=axes, location="bottom", ticks=range(len(known)), aspect=25
-        )
-        bar.ax.set_xticklabels([f"{value:g}" for value in known])
+        colors, count = mpl.colormaps["viridis"](np.linspace(0, 0.88, len(rotors))), len(rotors)
+        shown = ScalarMappable(BoundaryNorm(np.arange(count + 1) - 0.5, count), ListedColormap(colors))
+        bar = figure.colorbar(shown, ax=axes, location="bottom", ticks=range(count), aspect=25)
+        bar.ax.set_xticklabels([f"{value:g}" for value in np.unique(part[_measure(part)])])
         bar.set_label(label_of(configuration))
-        found += [(axes, rotor, color) for rotor, color in zip(rotors, colors, strict=True)]
+        found += [(axes, rotor, color) for rotor, color in zip(rotors.values(), colors, strict=True)]
     return figure, found
 
 
@@ -130,15 +145,23 @@ def explain(axes: Axes, formats: Mapping[str, str], **style: Any) -> None:
         axes.plot([], [], shape, **{**grey, "label": words, **style})
 
 
-def plain_log(axes: Axes, ticks: Sequence[float]) -> None:
-    """A logarithmic x axis of less than a decade, its ticks as plain numbers."""
+def plain_log(axes: Axes, ticks: Sequence[float] = ()) -> None:
+    """A logarithmic x axis of few decades, its ticks (1, 3, 10 … if not given) as plain numbers."""
     axes.set_xscale("log")
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set(
+        major_locator=FixedLocator(ticks) if ticks else LogLocator(subs=(1.0, 3.0)),
+        major_formatter="{x:g}",
+        minor_locator=NullLocator(),
+    )
 
 
-def plot_branch(axes: Axes, x: Array, y: Array, solid: NDArray[np.bool_], **style: Any) -> None:
+def plot_branch(axes: Axes, x: ArrayLike, y: ArrayLike, solid: NDArray[np.bool_], **style: Any) -> None:
     """A curve, solid where `solid`, else dashed, without a gap between."""
     inside = solid & np.append(solid[1:], True) & np.append(True, solid[:-1])
     axes.plot(x, np.where(inside, np.nan, y), "--", **{**style, "label": None})
     axes.plot(x, np.where(solid, y, np.nan), "-", **style)
+
+
+def mode_label(mode: str) -> str:
+    """A mode of a result in words."""
+    return {"bounce": "axial", "side, backward": "backward whirl", "side, forward": "forward whirl"}.get(mode, mode)

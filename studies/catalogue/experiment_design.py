@@ -36,9 +36,8 @@ from ...geometry.solids import moved
 from ..cli.options import FieldModel
 from ..result import variable
 from ..study import Point
-from .article import EDGE, FLOATER, REMANENCE
+from .article import EDGE, FLOATER, REMANENCE, levitation_of
 from .regions import spacer
-from .scenes import levitation_of
 
 GRAVITY = 9.81
 PER_MILLIMETRE = 5.0  # Tilt, in degrees, that does about what a millimetre of displacement does

@@ -22,28 +22,32 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Floater, Scene
 from ...geometry.scene.files import load_scene
 from ..cli.options import Models, shipped_scene
-from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
+from ..figures.style import PAGE, PALETTE, panels
 from ..levitation import Levitation
-from ..result import AXIS, columns, variable
-from ..study import Point, Study, one_case, study_of_one
-from .article import polar_angle
-from .drawing import by_configuration, by_rotor, configuration_panels, explain, rotor_panels, rotor_places
-from .scenes import article_scene, levitated_rotors, levitation_of
+from ..result import AXIS, MODES, Columns, columns, variable
+from ..study import Point, Study, recorded, study_of_one
+from .article import article_scene, levitated_rotors, levitation_of, polar_angle
+from .drawing import by_configuration, by_rotor, configuration_panels, drawn, explain, rotor_panels, rotor_places
 from .tables import last_crossing, range_text, text_table, uncertain
 
 # How wrong is the dipole? Levitation of the article's rotors by dipoles and by finite magnets, cause by cause.
 MODELS = ("article", "dipole", "cuboid", "fem", "mutual")
 """Point dipoles of the full remanence; the floater's moment lowered by its own permeability; the rotor's shape; its
 permeability; both bodies magnetise each other."""
-COLUMNS: dict[str, Any] = {
+QUANTITIES: Columns = {
     "distance": (("model", "step"), "m", "distance from the rotor"),
     "polar_angle": (("model", "step"), "°", "polar angle of the moment"),
     "mode_frequency": (("model", "step", "mode"), "Hz", "frequency of a mode, rotor's frame"),
     "lowest": (("model",), "Hz", "lowest frequency of stable levitation"),
     "highest": (("model",), "Hz", "highest frequency of stable levitation"),
 }
-ERRORS = {f"{key}_error": (dims, unit, f"error of the {of}") for key, (dims, unit, of) in COLUMNS.items()}
-MODES = ("bounce", "side, backward", "side, forward", "precession", "nutation")
+COLUMNS: Columns = {
+    **QUANTITIES,
+    **{f"{key}_error": (dims, unit, f"error of the {of}") for key, (dims, unit, of) in QUANTITIES.items()},
+    "frequency": (("step",), "Hz", "frequency of the rotor"),
+    "low_kind": (("model",), "", "what is at the lower end"),
+    "high_kind": (("model",), "", "what is at the upper end"),
+}
 RTOL, COARSE = 1e-5, 1e-4
 """Accuracy of the finite elements, and of those whose distance from them is the error estimate."""
 ROUND_OFF = 1e-10  # Relative error of what needs no finite elements
@@ -80,26 +84,22 @@ def dipole_vs_fem(point: Point) -> xr.Dataset:
     errors["mutual"] = {
         key: doubt * np.abs(value - rows["fem"][key]) + errors["fem"][key] for key, value in rows["mutual"].items()
     }
-    found = {name: np.array([rows[model][name] for model in MODELS]) for name in COLUMNS}
-    found |= {f"{name}_error": np.array([errors[model][name] for model in MODELS]) for name in COLUMNS}
-    data = columns(COLUMNS | ERRORS, found)
-    data["frequency"] = variable(("step",), grid, "Hz", "frequency of the rotor")
+    found: dict[str, Any] = {"frequency": grid}
+    for name in QUANTITIES:
+        found |= {name: [rows[m][name] for m in MODELS], f"{name}_error": [errors[m][name] for m in MODELS]}
     for end in ("low", "high"):
-        data[f"{end}_kind"] = xr.Variable(("model",), [getattr(ranges[model], end).kind for model in MODELS])
-    return one_case(point, xr.Dataset(data, {"model": list(MODELS), "mode": list(MODES)}))
+        found[f"{end}_kind"] = [getattr(ranges[model], end).kind for model in MODELS]
+    return recorded(point, COLUMNS, found, {"model": list(MODELS), "mode": list(MODES)})
 
 
 def _levitation(scene: Scene, rates: Rates, stable: StableRange, grid: Array) -> dict[str, Array]:
     """What one model gives at the frequencies of a grid, and between which it levitates."""
     found = [at_frequency(scene, rates, stable.near(float(f)), float(f)) for f in grid]
-    modes = [named_modes(point.motion, point.time_unit) for point in found]
-    return {
-        "distance": np.array([point.distance for point in found]),
-        "polar_angle": np.degrees(polar_angle(np.array([point.state[6:9] for point in found]))),
-        "mode_frequency": np.array([[mode.frequency_hz for mode in row] for row in modes]),
-        "lowest": np.array(stable.low.parameter),
-        "highest": np.array(stable.high.parameter),
-    }
+    modes = [[mode.frequency_hz for mode in named_modes(point.motion, point.time_unit)] for point in found]
+    angles = np.degrees(polar_angle(np.array([point.state[6:9] for point in found])))
+    ends = np.array([stable.low.parameter, stable.high.parameter])
+    values = (np.array([point.distance for point in found]), angles, np.array(modes), *ends)
+    return dict(zip(QUANTITIES, values, strict=True))
 
 
 CAUSES = {
@@ -131,24 +131,24 @@ PAIR = {"article": ("--", PALETTE[5], "point dipoles"), "mutual": ("-", PALETTE[
 """Models that are compared in figures: line, colour, name."""
 
 
-@styled
+@drawn
 def distances_figure(result: xr.Dataset) -> Figure:
     """The levitation distance by point dipoles and in the field of the finite magnets."""
     figure, rotors = rotor_panels(result, 3.0, "frequency of the rotor (Hz)", "levitation distance (mm)")
     for axes, rotor, color in rotors:
         one = rotor.isel(case=0)
         for model, (style, _, name) in PAIR.items():
-            look: Any = {"ms": 3} if model == "mutual" else {"ms": 3, "mfc": "white"}
-            axes.plot(one["frequency"], 1e3 * one["distance"].sel(model=model), f"o{style}", color=color, **look)
-            explain(rotors[0][0], {name: f"o{style}"}, **look)
-    legend_below(figure)
+            mfc = None if model == "mutual" else "white"
+            distance = 1e3 * one["distance"].sel(model=model)
+            axes.plot(one["frequency"], distance, f"o{style}", color=color, ms=3, mfc=mfc)
+            explain(axes, {name: f"o{style}"}, ms=3, mfc=mfc)
     return figure
 
 
-@styled
+@drawn
 def causes_figure(result: xr.Dataset) -> Figure:
     """By how much each cause changes the distance: mean and range over the frequencies."""
-    figure, rows = configuration_panels(result, 2.8, ylabel="change of the distance (mm)", sharey=True)
+    figure, rows = configuration_panels(result, 2.8, ylabel="change of the distance (mm)")
     width = 0.8 / (len(CAUSES) + 1)
     for axes, configuration, part in rows:
         places = rotor_places(axes, configuration, part)
@@ -161,14 +161,13 @@ def causes_figure(result: xr.Dataset) -> Figure:
             axes.bar(places + (k - len(CAUSES) / 2) * width, mean, width, yerr=spread, **style)
         axes.axhline(0.0, color="0.3", lw=0.8)
     explain(rows[0][0], {"bar: range over the frequencies, with errors": "|"})
-    legend_below(figure, columns=3)
     return figure
 
 
-@styled
+@drawn
 def ranges_figure(result: xr.Dataset) -> Figure:
     """The frequencies of stable levitation by point dipoles and in the field of the finite magnets."""
-    figure, rows = configuration_panels(result, 2.8, ylabel="stable frequencies (Hz)", sharey=True)
+    figure, rows = configuration_panels(result, 2.8, ylabel="stable frequencies (Hz)")
     for axes, configuration, part in rows:
         for (model, (_, color, name)), offset in zip(PAIR.items(), (-0.2, 0.2), strict=True):
             places = rotor_places(axes, configuration, part) + offset
@@ -182,7 +181,6 @@ def ranges_figure(result: xr.Dataset) -> Figure:
         axes.use_sticky_edges = False
         axes.margins(y=0.08)
     explain(rows[0][0], {words: marker for marker, words in ENDS.values()}, color="k", ms=4)
-    legend_below(figure)
     return figure
 
 
@@ -269,12 +267,24 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     stable = next((e for e in alone.equilibria if e.stable), None)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
     balance = Balance(Rates(with_effects(scene, alone.table)), values, 0.0)
-    places = np.stack([0 * depths, 0 * depths, -depths], axis=1)
+    places = _on_axis(depths)
     start, guess = (stable.distance, stable.state.moment) if stable else (FARTHEST, np.array([-1.0, 0.0, 0.0]))
     dataset = missed(rotors, scene.floater, places, balanced_directions(scene, balance, places, start, guess))
     weight = scene.floater.mass * float(np.linalg.norm(scene.gravity))
     dataset = dataset.merge(sufficient(dataset)).assign_attrs(weight_N=weight)
     return dataset.merge(shifted(rotors, scene, balance, stable)) if stable else dataset
+
+
+def _on_axis(depths: Array) -> Array:
+    return np.stack([0 * depths, 0 * depths, -depths], axis=1)
+
+
+def _depths(scene: Scene, number: int) -> Array:
+    """From contact on the axis to `FARTHEST`, evenly in their logarithm."""
+    step = 1e-5
+    heights = np.arange(0.0, FARTHEST, step)
+    gap = np.min([magnet.body.distance(_on_axis(heights)) for magnet in scene.rotor], axis=0) - scene.floater.radius
+    return np.geomspace(heights[gap < 0].max(initial=0.0) + step, FARTHEST, number)
 
 
 def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:
@@ -307,13 +317,22 @@ def sufficient(dataset: xr.Dataset) -> xr.Dataset:
 
     Between computed distances by interpolation of logarithms; the error is added to what is missed.
     """
-    rising = dataset.sortby("distance")
-    rows = []
-    for quantity in ("force", "torque"):
-        share = (rising[f"{quantity}_missed"] + rising[f"{quantity}_missed_error"]).values
-        rows.append([last_crossing(rising["distance"].values, share, level) for level in LEVELS])
+    rising, quantities = dataset.sortby("distance"), ["force", "torque"]
+    shares = [(rising[f"{name}_missed"] + rising[f"{name}_missed_error"]).values for name in quantities]
+    rows = [[last_crossing(rising["distance"].values, share, level) for level in LEVELS] for share in shares]
     values = variable(("quantity", "level"), rows, "m", "distance from which on the rigid dipole suffices")
-    return xr.Dataset({"sufficient_from": values}, {"quantity": ["force", "torque"], "level": list(LEVELS)})
+    return xr.Dataset({"sufficient_from": values}, {"quantity": quantities, "level": list(LEVELS)})
+
+
+SHIFTED: Columns = {
+    "rigid_position": (("axis",), "m", "stable equilibrium of the rigid dipole"),
+    "missed_force": (("axis",), "N", "force that the rigid dipole misses there"),
+    "missed_force_error": (("axis",), "N", "its estimated error"),
+    "missed_torque": (("axis",), "N m", "torque that the rigid dipole misses there"),
+    "linear_shift": (("axis",), "m", "shift of the equilibrium, linearised"),
+    "shift": (("axis",), "m", "shift of the equilibrium"),
+    "shift_error": (("axis",), "m", "its estimated error"),
+}
 
 
 def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, stable: Equilibrium) -> xr.Dataset:
@@ -336,26 +355,8 @@ def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, sta
         shifted_equilibrium(scene, balance, place, moment, partial(added, rotor)) for rotor in rotors[-2:]
     )
     extra, doubt = both.total - both.rigid, np.abs(fine - coarse) + stable.position_error
-    rows = {
-        "rigid_position": (place, "m", "stable equilibrium of the rigid dipole"),
-        "missed_force": (extra.force, "N", "force that the rigid dipole misses there"),
-        "missed_force_error": (error.force, "N", "its estimated error"),
-        "missed_torque": (extra.torque, "N m", "torque that the rigid dipole misses there"),
-        "linear_shift": (linear, "m", "shift of the equilibrium, linearised"),
-        "shift": (fine - place, "m", "shift of the equilibrium"),
-        "shift_error": (doubt, "m", "its estimated error"),
-    }
-    return xr.Dataset({name: variable(("axis",), *row) for name, row in rows.items()}, {"axis": list(AXIS)})
-
-
-def _depths(scene: Scene, number: int) -> Array:
-    """From contact on the axis to `FARTHEST`, evenly in their logarithm."""
-    radius, step = scene.floater.radius, 1e-5
-    heights = np.arange(0.0, FARTHEST, step)
-    places = np.stack([0 * heights, 0 * heights, -heights], axis=1)
-    gap = np.min([magnet.body.distance(places) for magnet in scene.rotor], axis=0) - radius
-    nearest = heights[gap < 0].max(initial=0.0) + step
-    return np.geomspace(nearest, FARTHEST, number)
+    found = (place, extra.force, error.force, extra.torque, linear, fine - place, doubt)
+    return xr.Dataset(columns(SHIFTED, dict(zip(SHIFTED, found, strict=True))), {"axis": list(AXIS)})
 
 
 def in_the_horizontal_scene(quick: bool) -> xr.Dataset:
@@ -369,7 +370,7 @@ LABELS = {
 }
 
 
-@styled
+@drawn
 def floater_figure(result: xr.Dataset) -> Figure:
     """What the rigid dipole misses against distance: share of force and torque; axial force by its two causes."""
     figure, ((left, right),) = panels(1, 2, (PAGE, 3.3))
@@ -392,7 +393,6 @@ def floater_figure(result: xr.Dataset) -> Figure:
     right.plot([], [], "o", ms=3, mfc="white", color="0.3", label="open: downwards")
     left.set_ylabel("missed share")
     right.set_ylabel("missed axial force (% of the weight)")
-    legend_below(figure, columns=3)
     return figure
 
 

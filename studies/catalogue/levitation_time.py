@@ -23,9 +23,8 @@ from ..cli.options import FieldModel
 from ..figures.style import PALETTE, legend_below, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
-from .article import FLOATER, PERMEABILITY, REMANENCE
+from .article import FLOATER, PERMEABILITY, REMANENCE, article_scene, levitation_of, losses
 from .drawing import explain, small_multiples
-from .scenes import article_scene, conducting, levitation_of
 from .tables import span, text_table
 
 
@@ -96,7 +95,7 @@ def scene_of(case: DriftCase, variant: Variant) -> Scene:
         case.configuration, measure, case.reference,
         remanence=variant.remanence, permeability=permeability, floater=replace(FLOATER, remanence=variant.remanence),
     )  # fmt: skip
-    scene = conducting(scene, rotor=variant.rotor == "conducting")
+    scene = replace(scene, **losses(scene, variant.rotor == "conducting", False))
     return replace(scene, floater=replace(scene.floater, conductivity=variant.conductivity))
 
 

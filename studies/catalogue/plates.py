@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from ...dynamics.continuation.frequencies import StableRange, at_frequency
-from ...dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
+from ...dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
 from ...dynamics.equilibria.perturbed import plate_action
 from ...fem.closed_forms.potentials import Dipole, Racetrack
 from ...fem.plate.eddy import solve_eddy
@@ -22,23 +22,30 @@ from ...geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box, rotation_matrix
 from ..cli.options import PlateModel
-from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
+from ..figures.style import PAGE, PALETTE, panels
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with, each_case, study_of_one
-from .article import PLATE_CONDUCTIVITY, PLATE_SIZE, rotor_label
-from .drawing import explain, plain_log, small_multiples
-from .scenes import article_scene, conducting, levitated_rotors, levitation_of, stable_frequencies
+from .article import (
+    PLATE_CONDUCTIVITY,
+    PLATE_SIZE,
+    article_scene,
+    equilibrium_at,
+    levitated_rotors,
+    levitation_of,
+    losses,
+    over_plate,
+    rotor_label,
+    stable_frequencies,
+    within,
+)
+from .drawing import drawn, explain, mode_label, plain_log, small_multiples
 from .tables import range_text, text_table, uncertain
 
 # What a plate does to each mode of the floater, against its place, conductivity, thickness, and the rotor.
 DISTANCE = 0.018  # Face below or beside the floater's centre in the sweeps over all else, m
-CONFIGURATION, MEASURE, FREQUENCY = "tilt", 10.0, 130.0
-"""The rotor of the sweeps over plates, that of the scene `tilt-over-plate`: tilt in degrees, Hz."""
-REAL = (DISTANCE,)
-"""Distances of the face at which the real plate, with its edges, is computed beside the infinite slab, m."""
-FIELD_RTOL = 1e-4
-MIDDLE = 0.5
+FREQUENCY = 130.0  # Of the rotor of the sweeps over plates, that of the scene `tilt-over-plate`, Hz
+FIELD_RTOL, RTOL = 1e-4, 3e-3  # Of the rotor's field and of the plate's reaction
 ROTORS = ("rotors, below", "rotors, beside")  # Sweeps over the article's rotors
 PLACES, REAL_PLATE = ("below", "beside"), ", real plate"
 
@@ -54,8 +61,8 @@ class PlateCase:
     distance: float = DISTANCE  # of the face from the floater's centre, m
     thickness: float = PLATE_SIZE[2]  # m
     conductivity: float = PLATE_CONDUCTIVITY  # S/m
-    configuration: str = CONFIGURATION  # of the rotor
-    measure: float = MEASURE
+    configuration: str = "tilt"  # of the rotor
+    measure: float = 10.0
     # place of the rotor's frequency in its range of stable frequencies, 0 to 1; None: `FREQUENCY`
     part: float | None = None
     # rotor and floater magnetise each other and have eddy currents, in real air; else Stokes drag alone
@@ -63,8 +70,7 @@ class PlateCase:
 
     def plate(self, place: Array) -> Plate:
         """The plate for a floater at `place` (3,) m."""
-        size = np.array([*PLATE_SIZE[:2], self.thickness])
-        away = self.distance + self.thickness / 2
+        size, away = np.array([*PLATE_SIZE[:2], self.thickness]), self.distance + self.thickness / 2
         if self.upright:
             center = np.array([away, 0.0, place[2]])
             return Plate(Box(size, center, rotation_matrix((0.0, 90.0, 0.0))), self.conductivity)
@@ -72,8 +78,8 @@ class PlateCase:
 
 
 def cases(quick: bool) -> list[PlateCase]:
-    """The plates and rotors of the study."""
-    few, real = (3, ()) if quick else (10, REAL)
+    """The plates and rotors of the study; the real plate, with its edges, at one distance beside the infinite slab."""
+    few, real = (3, ()) if quick else (10, (DISTANCE,))
     found: list[PlateCase] = []
     for sweep, nearest, upright in (("below", 0.0085, False), ("beside", 0.01, True)):
         places = (*np.geomspace(nearest, 0.06, few).tolist(), *real)
@@ -82,23 +88,19 @@ def cases(quick: bool) -> list[PlateCase]:
     found += [PlateCase("thickness", t, thickness=t) for t in np.geomspace(1e-3, 5e-2, few).tolist()]
     found += [PlateCase("frequency", p, part=p) for p in np.linspace(0.02, 0.98, 2 if quick else 9).tolist()]
     for sweep, upright in zip(ROTORS, (False, True), strict=True):
-        for rotor in levitated_rotors(quick):
-            found.append(PlateCase(sweep, rotor["measure"], upright=upright, part=MIDDLE, **rotor))
+        rotors = levitated_rotors(quick)
+        found += [PlateCase(sweep, rotor["measure"], upright=upright, part=0.5, **rotor) for rotor in rotors]
     for place, upright in zip(PLACES, (False, True), strict=True):
-        found += [PlateCase(place + REAL_PLATE, d, "reduced", upright=upright, distance=d) for d in real]
+        found += [PlateCase(place + REAL_PLATE, d, "reduced", upright, d) for d in real]
     return [replace(case, complete=not quick) for case in found]
 
 
 @cache
-def _in_field(configuration: str, measure: float, complete: bool) -> Levitation:
-    """A rotor in air, its field and compiled motion, once for all points that a process computes; without currents."""
+def _in_air(configuration: str, measure: float, complete: bool) -> tuple[Levitation, StableRange]:
+    """A rotor, its field and compiled motion, once for all points that a process computes; without currents."""
     scene = article_scene(configuration, measure, FREQUENCY)
-    return levitation_of(scene, "fem", FIELD_RTOL, "auto" if complete else "rigid")
-
-
-@cache
-def _stable_range(levitation: Levitation) -> StableRange:
-    return stable_frequencies(levitation.scene, levitation.rates)
+    alone = levitation_of(scene, "fem", FIELD_RTOL, "auto" if complete else "rigid")
+    return alone, stable_frequencies(scene, alone.rates)
 
 
 @cache
@@ -107,39 +109,32 @@ def without_plate(
 ) -> tuple[Levitation, Equilibrium]:
     """A rotor's scene without plate, and its equilibrium that is stable but for the currents in rotor and floater.
 
-    Parameters
-    ----------
-    configuration, measure, part, complete : as of a `PlateCase`
-
-    Raises
-    ------
-    EquilibriumError : nothing levitates there
+    Parameters are those of a `PlateCase`. Raises EquilibriumError where nothing levitates.
     """
-    alone, frequency = _in_field(configuration, measure, complete), FREQUENCY
-    if part is not None:
-        stable = _stable_range(alone)
-        frequency = stable.low.parameter + part * (stable.high.parameter - stable.low.parameter)
-        near = at_frequency(alone.scene, alone.rates, stable.near(frequency), frequency).distance
-    else:
-        near = next((e.distance for e in alone.equilibria if e.stable), np.nan)
-    levitation = alone.elsewhere(frequency=frequency)
-    if complete:
-        scene = conducting(levitation.scene)
-        whole = Levitation(replace(scene, drag=replace(scene.drag, air=True)), alone.models)
-        whole.share(levitation)
-        levitation = whole
-    known = [e for e in levitation.equilibria if abs(e.distance - near) < 1e-6]
-    if not known:
+    alone, stable = _in_air(configuration, measure, complete)
+    frequency = FREQUENCY if part is None else float(within(stable, part))
+    near = at_frequency(alone.scene, alone.rates, stable.near(frequency), frequency).distance
+    levitation = alone.elsewhere(frequency=frequency, **(losses(alone.scene) if complete else {}))
+    found = equilibrium_at(levitation, near)
+    if found is None:
         raise EquilibriumError("There is no stable levitation without the plate.")
-    return levitation, known[0]
+    return levitation, found
 
 
-RTOL = 3e-3
-
-
-def damping_points(quick: bool) -> list[Point]:
-    """The plates and rotors as points of the study."""
-    return [asdict(case) for case in cases(quick)]
+COLUMNS: Columns = {
+    "growth": (("mode",), "1/s", "growth rate of a mode"),
+    "growth_without": (("mode",), "1/s", "growth rate without a plate"),
+    "frequency": (("mode",), "Hz", "frequency of a mode, rotor's frame"),
+    "shift": (("axis",), "m", "displacement of the equilibrium by the plate"),
+    "force": (("axis",), "N", "mean force of the plate on the floater"),
+    "torque": (("axis",), "N m", "mean torque of the plate on the floater"),
+    "loss": ((), "W", "heat in the plate, by floater and rotor"),
+    "error": ((), "1", "estimated relative error of the plate's table"),
+    "value": ((), "SI, mm or °", "what is varied in the sweep"),
+    "rotor_frequency": ((), "Hz", "frequency of the rotor"),
+    "sweep": ((), "", "what is varied"),
+    "configuration": ((), "", "rotor"),
+}
 
 
 def plate_damping(point: Point) -> xr.Dataset:
@@ -156,53 +151,29 @@ def plate_damping(point: Point) -> xr.Dataset:
     """
     case = PlateCase(**point)
     alone, start = without_plate(case.configuration, case.measure, case.part, case.complete)
-    models = replace(alone.models, plate_model=case.model, plate_rtol=RTOL)
-    beside = alone.elsewhere(models, plate=case.plate(start.position))
-    beside.adopt(Survey((start,), ()))
-    row, scene = _damping_row(beside, start), alone.scene
+    row: dict[str, Any] = {name: point[name] for name in ("value", "sweep", "configuration")}
+    row |= {"growth_without": [mode.growth_per_s for mode in start.modes], "rotor_frequency": alone.scene.frequency}
+    found = over_plate(alone, start, case.plate(start.position), case.model, RTOL)
+    if found:
+        beside, there, error = found
+        assert beside.plate is not None
+        row |= {
+            "growth": [mode.growth_per_s for mode in there.modes],
+            "frequency": [mode.frequency_hz for mode in there.modes],
+            "shift": there.position - start.position,
+            **plate_action(beside.scene, beside.plate, there),
+            "error": error,
+        }
     return xr.Dataset(
-        {
-            **columns(COLUMNS, row, mode=len(MODES), axis=len(AXIS)),
-            "sweep": ((), case.sweep),
-            "configuration": ((), case.configuration),
-            "value": variable((), case.value, "SI, mm or °", "what is varied in the sweep"),
-            "rotor_frequency": variable((), scene.frequency, "Hz", "frequency of the rotor"),
-        },
+        columns(COLUMNS, row, mode=len(MODES), axis=len(AXIS)),
         {"mode": list(MODES), "axis": list(AXIS)},
-        {"weight_N": scene.floater.mass * 9.81, "plate_rtol": RTOL},
+        {"weight_N": alone.scene.floater.mass * 9.81, "plate_rtol": RTOL},
     ).expand_dims("case")
 
 
 def gather_damping(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """The plates one after the other."""
     return xr.concat(parts, "case", data_vars="minimal", coords="minimal", compat="override", join="exact")
-
-
-COLUMNS: Columns = {
-    "growth": (("mode",), "1/s", "growth rate of a mode"),
-    "growth_without": (("mode",), "1/s", "growth rate without a plate"),
-    "frequency": (("mode",), "Hz", "frequency of a mode, rotor's frame"),
-    "shift": (("axis",), "m", "displacement of the equilibrium by the plate"),
-    "force": (("axis",), "N", "mean force of the plate on the floater"),
-    "torque": (("axis",), "N m", "mean torque of the plate on the floater"),
-    "loss": ((), "W", "heat in the plate, by floater and rotor"),
-    "error": ((), "1", "estimated relative error of the plate's table"),
-}
-
-
-def _damping_row(levitation: Levitation, start: Equilibrium) -> dict[str, ArrayLike]:
-    memory, found = levitation.plate, levitation.equilibria
-    row: dict[str, ArrayLike] = {"growth_without": [mode.growth_per_s for mode in start.modes]}
-    if memory is None or not found or found[0].currents is None:
-        return row
-    return {
-        **row,
-        "growth": [mode.growth_per_s for mode in found[0].modes],
-        "frequency": [mode.frequency_hz for mode in found[0].modes],
-        "shift": found[0].position - start.position,
-        **plate_action(levitation.scene, memory, found[0]),
-        "error": max(memory.table.errors.total, memory.share.error),
-    }
 
 
 SWEEPS = {
@@ -233,60 +204,59 @@ def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
     }
 
 
-@styled
+@drawn
 def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
     """Damping rate of each mode against what is varied; crosses: it grows; bars: error of the plate's table."""
     titles, ylabel = [SWEEPS[sweep][0] for sweep in sweeps], "damping rate (1/s)"
     figure, axes = small_multiples(titles, 3.0, 3, "", ylabel, sharey=True)
     for panel, sweep in zip(axes, sweeps, strict=True):
-        for ending, (_, style, fill) in ENDINGS.items():
+        for ending, (words, style, fill) in ENDINGS.items():
             part = part_of(result, sweep + ending)
+            if not part.sizes["case"]:
+                continue
             varied = part["rotor_frequency"] if sweep == "frequency" else part["value"] * SWEEPS[sweep][2]
             for mode, color in zip(result["mode"].values, PALETTE, strict=False):
-                growth = part["growth"].sel(mode=mode)
-                _damped(panel, varied, growth, part["error"], style, color, fill or color)
-                if not ending:
-                    explain(panel, {str(mode): "-"}, color=color)
+                _damped(panel, varied, part["growth"].sel(mode=mode), part["error"], style, color, fill)
+                explain(panel, {mode_label(mode): "-"}, color=color)
+            explain(panel, {words: style}, mfc=fill, ms=4)
         panel.set_xlabel(SWEEPS[sweep][1])
         if sweep in PLACES:
             plain_log(panel, DISTANCES)
         elif sweep != "frequency":
             panel.set_xscale("log")
-        for words, style, fill in ENDINGS.values():
-            explain(panel, {words: style}, mfc=fill, ms=4)
-        explain(panel, {"growth rate (unstable)": "x"}, ms=4)
-    legend_below(figure)
     return figure
 
 
 def _damped(
-    axes: Axes, x: ArrayLike, growth: xr.DataArray, error: ArrayLike, style: str, color: str, fill: str
+    axes: Axes, x: ArrayLike, growth: xr.DataArray, error: ArrayLike, style: str, color: str, fill: str | None
 ) -> None:
     """Damping rates with their errors, and as crosses the growth rates of what is not damped, on one log axis."""
-    style_of: Any = {"fmt": style, "color": color, "mfc": fill, "ms": 4}
-    axes.errorbar(x, -growth.where(growth < 0), yerr=np.abs(growth) * error, **style_of)
+    axes.errorbar(x, -growth.where(growth < 0), np.abs(growth) * error, fmt=style, color=color, mfc=fill, ms=4)
     axes.plot(x, growth.where(growth >= 0), "x", color=color, ms=5)
     axes.set_yscale("log")
+    if (growth >= 0).any():
+        explain(axes, {"growth rate (unstable)": "x"}, ms=5)
 
 
-@styled
+@drawn
 def rotors_figure(result: xr.Dataset) -> Figure:
     """Damping rate of the least stable mode of every rotor of the article, plate below and beside, face at 18 mm."""
     figure, ((axes,),) = panels(1, 1, (PAGE, 3.4))
-    for sweep, marker, color in zip(ROTORS, "os", PALETTE, strict=False):
+    for sweep, place, marker, color in zip(ROTORS, PLACES, "os", PALETTE, strict=False):
         part = part_of(result, sweep)
-        worst, places = part["growth"].max("mode"), np.arange(part.sizes["case"])
-        _damped(axes, places, worst, part["error"], marker, color, color)
-        explain(axes, {f"plate {sweep.split(', ')[1]}": marker}, color=color, ms=4)
-        rotors = zip(part["configuration"].values, part["value"].values, strict=True)
-        axes.set_xticks(places, [rotor_label(str(name), float(value)) for name, value in rotors], rotation=90)
-    explain(axes, {"growth rate (unstable)": "x"}, ms=5)
+        places = np.arange(part.sizes["case"])
+        _damped(axes, places, part["growth"].max("mode"), part["error"], marker, color, None)
+        explain(axes, {f"plate {place}": marker}, color=color, ms=4)
+        axes.set_xticks(places, [rotor_label(c, v) for c, v in _rotors(part)], rotation=90)
     axes.set(xlabel="rotor; face of the plate at 18 mm", ylabel="damping rate of the\nleast stable mode (1/s)")
-    legend_below(figure)
     return figure
 
 
-@styled
+def _rotors(part: xr.Dataset) -> list[tuple[str, float]]:
+    return list(zip(part["configuration"].values.tolist(), part["value"].values.tolist(), strict=True))
+
+
+@drawn
 def means_figure(result: xr.Dataset) -> Figure:
     """What the plate does on average: it moves the floater, pushes it, brakes it and is warmed."""
     titles = [title for title, _ in MEANS.values()]
@@ -295,12 +265,12 @@ def means_figure(result: xr.Dataset) -> Figure:
         for place, line, color in zip(PLACES, ("-", "--"), PALETTE, strict=False):
             for ending, (words, style, fill) in ENDINGS.items():
                 part = part_of(result, place + ending)
-                values, marks = means(part)[name], style[0] if ending else f"{style[0]}{line}"
-                more: Any = {"ms": 4, "color": color, "mfc": fill or color, "label": f"{place}, {words}"}
-                panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
+                if part.sizes["case"]:
+                    values, marks = means(part)[name], style[0] if ending else f"{style[0]}{line}"
+                    more: Any = {"ms": 4, "color": color, "mfc": fill, "label": f"{place}, {words}"}
+                    panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
         panel.set(ylabel=MEANS[name][1], yscale="linear" if name == "lift" else "log")
         plain_log(panel, DISTANCES)
-    legend_below(figure)
     return figure
 
 
@@ -314,21 +284,19 @@ def damping_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for sweep in (*PLACES, *(place + REAL_PLATE for place in PLACES), "frequency", *ROTORS):
         for one in each_case(part_of(result, sweep)):
-            value, configuration = float(one["value"]), str(one["configuration"].values)
-            where = f"plate {sweep}, face at {1e3 * value:.1f} mm"
+            where = f"plate {sweep}, face at {1e3 * float(one['value']):.1f} mm"
             if sweep in ROTORS:
-                where = f"{rotor_label(configuration, value)}, plate {sweep.split(', ')[1]}"
+                where = f"{rotor_label(one['configuration'].item(), float(one['value']))}, plate {sweep.split(', ')[1]}"
             elif sweep == "frequency":
                 where = f"plate {1e3 * DISTANCE:g} mm below"
-            frequency, before = f"{float(one['rotor_frequency']):.1f}", f"{float(one['growth_without'].max()):+.1g}"
-            worst = float(one["growth"].max("mode"))
-            if np.isnan(worst):
-                rows.append((where, frequency, "no equilibrium", "", before, *[""] * len(MEANS)))
-                continue
-            mode = str(one["mode"].values[int(one["growth"].argmax("mode"))])
-            rate = uncertain(worst, abs(worst) * float(one["error"]))
-            rows.append((where, frequency, mode, rate, before, *(f"{float(v):.3g}" for v in means(one).values())))
-    head = ("where", "rotor (Hz)", "least stable mode", "growth (1/s)", "without plate")
+            cells, worst = ["no equilibrium", "", *[""] * len(MEANS)], float(one["growth"].max("mode"))
+            if np.isfinite(worst):
+                mode = mode_label(one["mode"].values[int(one["growth"].argmax("mode"))])
+                rate = uncertain(worst, abs(worst) * one["error"])
+                cells = [mode, rate, *(f"{float(v):.3g}" for v in means(one).values())]
+            before = f"{float(one['growth_without'].max()):+.1g}"
+            rows.append((where, f"{float(one['rotor_frequency']):.1f}", before, *cells))
+    head = ("where", "rotor (Hz)", "growth without (1/s)", "least stable mode", "growth (1/s)")
     return [*text_table((*head, *(words for _, words in MEANS.values())), rows), sentence(result)]
 
 
@@ -337,12 +305,14 @@ def sentence(result: xr.Dataset) -> str:
     words = []
     for sweep, place in zip(ROTORS, ("below the floater", "standing beside it"), strict=True):
         part = part_of(result, sweep)
-        error, worst = part["error"], part["growth"].max("mode")
-        kept, gone = int((worst < 0).sum()), int(worst.isnull().sum())
-        lost = f", {gone} without an equilibrium" if gone else ""
-        words.append(
-            f"{place} to {range_text(worst, abs(worst) * error)} /s ({kept} of {part.sizes['case']} stable{lost})"
+        worst = part["growth"].max("mode")
+        kept, gone, span = (
+            int((worst < 0).sum()),
+            int(worst.isnull().sum()),
+            range_text(worst, abs(worst) * part["error"]),
         )
+        lost = f", {gone} without an equilibrium" if gone else ""
+        words.append(f"{place} to {span} /s ({kept} of {part.sizes['case']} stable{lost})")
     before = part_of(result, ROTORS[0])["growth_without"].max("mode").values
     return (
         f"The plate (infinite slab of 30 mm aluminium, face {DISTANCE * 1e3:g} mm from the floater's centre) changes "
@@ -354,7 +324,7 @@ def sentence(result: xr.Dataset) -> str:
 PLATE_DAMPING = Study(
     name="plate-damping",
     summary="what a plate does to each mode, against its place, conductivity and thickness",
-    points=damping_points,
+    points=lambda quick: [asdict(case) for case in cases(quick)],
     compute=plate_damping,
     gather=gather_damping,
     figures={
@@ -381,7 +351,6 @@ CURVES = ("50 Hz, ωt = 0", "50 Hz, ωt = 90°", "200 Hz, ωt = 0", "200 Hz, ωt
 FACES = (np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 19.0]))
 """Faces of plate and hole across each axis, mm."""
 REACH = 1500.0  # Distance from the plate to the outer boundary, mm
-GAUSS = 1e-4
 
 
 def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, growth: float = 2.0) -> ConductorMesh:
@@ -401,17 +370,16 @@ def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, gr
         return np.asarray(np.where(inside, np.minimum(cell, skin + near), cell / 2 + near))
 
     lines = [graded_partition([f[0] - REACH, *f, f[-1] + REACH], partial(size, faces=f)) for f in FACES]
-    lower, upper = np.array([f[0] for f in FACES]), np.array([f[-1] for f in FACES])
-    plate = Block("plate", lower, upper)
+    plate = Block("plate", np.array([f[0] for f in FACES]), np.array([f[-1] for f in FACES]))
     hole = Block("air", np.array([18.0, 18.0, 0.0]), np.array([126.0, 126.0, 19.0]))
     return ConductorMesh(hex_mesh(lines, [plate, hole]), {"plate": CONDUCTIVITY})
 
 
 def measured_line() -> tuple[Array, Array]:
     """x (17,) m and measured B_z (17, 4) T."""
-    text = files(__package__).joinpath("team7_line_A1B1.csv").read_text(encoding="utf-8")
-    table = np.array([[float(entry) for entry in row.split(",")] for row in text.splitlines() if row[:1].isdigit()])
-    return table[:, 0] * 1e-3, table[:, 1:] * GAUSS
+    lines = files(__package__).joinpath("team7_line_A1B1.csv").read_text(encoding="utf-8").splitlines()
+    table = np.loadtxt([line for line in lines if line[:1].isdigit()], delimiter=",")
+    return table[:, 0] * 1e-3, table[:, 1:] * 1e-4  # gauss
 
 
 def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3) -> Array:
@@ -436,6 +404,18 @@ def team7(order: int = 3) -> xr.Dataset:
     return compared(x, measured, np.hstack([compute_line(f, x, team7_mesh(f), order) for f in FREQUENCIES]))
 
 
+def team7_study(quick: bool) -> xr.Dataset:
+    """`team7` by elements of second or third order."""
+    return team7(order=2 if quick else 3)
+
+
+LINE: Columns = {
+    "measured": (("x", "curve"), "T", "measured B_z"),
+    "computed": (("x", "curve"), "T", "computed B_z"),
+    "deviation": (("x", "curve"), "1", "deviation over the line's peak"),
+}
+
+
 def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
     """Both by `CURVES`, and their deviation in units of the largest measured |B| of that frequency.
 
@@ -445,47 +425,33 @@ def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
     measured, computed : B_z (17, 4) T
     """
     amplitude = np.hypot(measured[:, 0::2], measured[:, 1::2]).max(axis=0)
-    deviation = (computed - measured) / np.repeat(amplitude, 2)
-    return xr.Dataset(
-        {
-            "measured": variable(("x", "curve"), measured, "T", "measured B_z"),
-            "computed": variable(("x", "curve"), computed, "T", "computed B_z"),
-            "deviation": variable(("x", "curve"), deviation, "1", "deviation over the line's peak"),
-        },
-        {"x": variable(("x",), x, "m", "x"), "curve": list(CURVES)},
-    )
-
-
-def team7_study(quick: bool) -> xr.Dataset:
-    """`team7` by elements of second or third order."""
-    return team7(order=2 if quick else 3)
+    found = (measured, computed, (computed - measured) / np.repeat(amplitude, 2))
+    data = columns(LINE, dict(zip(LINE, found, strict=True)))
+    return xr.Dataset(data, {"x": variable(("x",), x, "m", "x"), "curve": list(CURVES)})
 
 
 def team7_lines(result: xr.Dataset) -> list[str]:
     lines = ["TEAM workshop problem 7, B_z on y = 72, z = 34 mm: deviation in per cent of the line's peak"]
-    for curve in result["curve"].values:
-        size = 100 * np.abs(result["deviation"].sel(curve=curve).values)
-        lines.append(f"  {curve:18} largest {size.max():5.2f}, mean {size.mean():5.2f}")
-    size = 100 * np.abs(result["deviation"].values)
-    lines.append(f"  all {size.size} values         largest {size.max():5.2f}, mean {size.mean():5.2f}")
-    return [*lines, *(_common_phase(result, number) for number in (0, 2))]
+    size = 100 * abs(result["deviation"])
+    every = {str(curve): size.sel(curve=curve) for curve in size["curve"].values}
+    for name, part in {**every, f"all {size.size} values": size}.items():
+        lines.append(f"  {name:22} largest {float(part.max()):5.2f}, mean {float(part.mean()):5.2f}")
+    for k, frequency in enumerate(FREQUENCIES):
+        # what stays once all phases are turned by one angle
+        measured, computed = (
+            result[name].values[:, 2 * k] - 1j * result[name].values[:, 2 * k + 1] for name in ("measured", "computed")
+        )
+        angle = float(np.angle(np.vdot(computed, measured)))
+        left = 100 * (computed * np.exp(1j * angle) - measured) / np.abs(measured).max()
+        rest = np.abs([left.real, left.imag])
+        lines.append(
+            f"  {frequency:g} Hz, all phases turned by {np.degrees(angle):+.2f}°: largest {rest.max():.2f}, "
+            f"mean {rest.mean():.2f}; at 90° largest {rest[1].max():.2f}"
+        )
+    return lines
 
 
-def _common_phase(result: xr.Dataset, number: int) -> str:
-    """What stays at a frequency, whose curves are `number` and the next, once all phases are turned by one angle."""
-    measured, computed = (
-        result[name].values[:, number] - 1j * result[name].values[:, number + 1] for name in ("measured", "computed")
-    )
-    angle = float(np.angle(np.vdot(computed, measured)))
-    left = 100 * (computed * np.exp(1j * angle) - measured) / np.abs(measured).max()
-    size = np.abs([left.real, left.imag])
-    return (
-        f"  {str(result['curve'].values[number]).split(',')[0]}, all phases turned by {np.degrees(angle):+.2f}°: "
-        f"largest {size.max():.2f}, mean {size.mean():.2f}; at 90° largest {size[1].max():.2f}"
-    )
-
-
-@styled
+@drawn
 def team7_figure(result: xr.Dataset) -> Figure:
     """The four curves with what is measured, and their deviation."""
     figure, ((left, right),) = panels(1, 2, (PAGE, 3.2))
@@ -499,7 +465,6 @@ def team7_figure(result: xr.Dataset) -> Figure:
     right.axhspan(-5, 5, color="0.93", zorder=0)
     left.set(xlabel="x (mm)", ylabel="$B_z$ (mT)")
     right.set(xlabel="x (mm)", ylabel="computed less measured (% of the peak)")
-    legend_below(figure, columns=3)
     return figure
 
 

@@ -8,27 +8,37 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...dynamics.continuation.frequencies import (
-    HIGHEST,
-    StableRange,
-    at_frequency,
-    levitating_ranges,
-)
+from ...dynamics.continuation.frequencies import HIGHEST, StableRange, at_frequency, levitating_ranges
 from ...dynamics.continuation.slow_drift import Lasting, drift, lasting_frequencies
-from ...dynamics.equilibria.equilibrium import EquilibriumError, Survey
+from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...dynamics.motion.state import Scales
 from ...geometry.common import Array
 from ...geometry.rotor import Conductor
-from ...geometry.scene.contents import Drag, Scene
+from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box
 from ..cli.console import note
-from ..figures.style import COLORS, NAMES, PALETTE, legend_below, styled
+from ..figures.style import COLORS, NAMES, PALETTE
 from ..levitation import Levitation
-from ..result import Columns, columns
-from ..study import Point, Study, cases_with, each_case, one_case, recorded
-from .article import CONFIGURATIONS, EDGE, FLIGHT, MODELS, QUICK_ROTORS, label_of
-from .drawing import by_rotor, configuration_panels, explain, small_multiples
-from .scenes import article_plate, article_scene, conducting, levitated_rotors, levitation_of, stable_frequencies
+from ..result import Columns
+from ..study import Point, Study, cases_with, each_case, recorded
+from .article import (
+    CONFIGURATIONS,
+    EDGE,
+    FLIGHT,
+    MODELS,
+    QUICK_ROTORS,
+    article_plate,
+    article_scene,
+    equilibrium_at,
+    label_of,
+    levitated_rotors,
+    levitation_of,
+    losses,
+    over_plate,
+    stable_frequencies,
+    within,
+)
+from .drawing import by_rotor, configuration_panels, drawn, explain, small_multiples
 from .tables import text_table
 
 # Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
@@ -42,29 +52,28 @@ MEASURES = {
     "tilt": (2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0),
 }  # Displacements (mm) and tilts (degrees): the article's tested ones and some between
 RTOL, PLATE_RTOL = 1e-4, 1e-2
-MOST = 4  # Intervals of stability that are kept of one rotor
+MOST, TRIED = 4, 6  # Intervals of stability that are kept of one rotor, and frequencies with a plate
 BEYOND = 1.15  # How far above the last stable frequency the plate is tried
-
-
 FACE = -0.045  # Height of the plate's upper face below the rotor's origin, m: no floater that levitates touches it
 METAL = {"insulating": False, "conducting": True}  # The rotor's magnets: whether they have eddy currents
-LASTING = {
-    "low": (("metal",), "Hz", "lowest frequency at which flights last"),
-    "high": (("metal",), "Hz", "highest frequency up to which flights last"),
-    "growth_per_s": (("metal",), "1/s", "largest growth rate of a mode in the flight there"),
-}
-INTERVAL: dict[str, Any] = {
+INTERVAL: Columns = {
     "lowest": (("interval",), "Hz", "lower end of an interval of stability"),
     "highest": (("interval",), "Hz", "upper end of an interval of stability"),
     "distance_lowest": (("interval",), "m", "distance at the lower end"),
     "distance_highest": (("interval",), "m", "distance at the upper end"),
     "leading_highest": (("interval",), "Hz", "frequency of the mode that becomes unstable at the upper end"),
-}
-PLATE = {
+    "low_kind": (("interval",), "", "what is at the lower end"),
+    "high_kind": (("interval",), "", "what is at the upper end"),
     "plate_frequency": (("tried",), "Hz", "frequency at which a plate below is tried"),
     "plate_growth": (("tried",), "1/s", "largest growth rate with a plate below"),
     "plate_distance": (("tried",), "m", "distance with a plate below"),
     "plate_error": (("tried",), "1", "estimated relative error of the plate's table"),
+}
+LASTING: Columns = {
+    "low": (("metal",), "Hz", "lowest frequency at which flights last"),
+    "high": (("metal",), "Hz", "highest frequency up to which flights last"),
+    "growth_per_s": (("metal",), "1/s", "largest growth rate of a mode in the flight there"),
+    "ended_by": (("metal",), "", "what ends flights beyond"),
 }
 
 
@@ -89,59 +98,49 @@ def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
     scene = article_scene(point["configuration"], point["measure"], drag=False)
     levitation = levitation_of(scene, point["model"], rtol, point.get("interaction", "rigid"))
     try:
-        found = levitating_ranges(scene, levitation.interaction, levitation.rates)
+        ranges = levitating_ranges(scene, levitation.interaction, levitation.rates)
     except EquilibriumError as error:
         note(str(error))
-        found = []
-    rows, kinds = np.full((len(INTERVAL), MOST), np.nan), np.full((2, MOST), "", dtype="U12")
-    for k, run in enumerate(found[:MOST]):
+        ranges = []
+    rows, kinds = np.full((5, MOST), np.nan), np.full((2, MOST), "", dtype="U12")
+    for k, run in enumerate(ranges[:MOST]):
         ends = run.low, run.high
         rows[:, k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.high.leading_hz]
         kinds[:, k] = [e.kind for e in ends]
-    plate = _with_plate(levitation, found[0] if found else None, point["with_plate"])
-    values, table, axes = [*rows, *plate.T], INTERVAL | PLATE, {}
-    texts = {"low_kind": ("interval", kinds[0]), "high_kind": ("interval", kinds[1])}
+    plate = np.full((TRIED, 4), np.nan)
+    if ranges and point["with_plate"]:
+        plate[: point["with_plate"]] = _with_plate(levitation, ranges[0], point["with_plate"])
+    table, axes, found = INTERVAL, {}, [*rows, *kinds, *plate.T]
     if "flights" in point:
-        stable = found[0] if found and point["flights"] else None
-        lasting = [_lasting(levitation, stable, metal) if stable else Lasting() for metal in METAL]
-        values += [[getattr(one, name) for one in lasting] for name in LASTING]
-        table, axes = table | LASTING, {"metal": list(METAL)}
-        texts["ended_by"] = "metal", np.array([one.ended_by for one in lasting], "U12")
-    data = columns(table, dict(zip(table, values, strict=True)))
-    return one_case(point, xr.Dataset({**data, **texts}, axes))
+        lasting = [Lasting()] * len(METAL)
+        if ranges and point["flights"]:
+            lasting = [_lasting(levitation, ranges[0], conducts) for conducts in METAL.values()]
+        found += [np.array([getattr(one, name) for one in lasting]) for name in LASTING]
+        table, axes = {**INTERVAL, **LASTING}, {"metal": list(METAL)}
+    return recorded(point, table, found, axes)
 
 
-def _lasting(alone: Levitation, stable: StableRange, metal: str) -> Lasting:
+def _lasting(alone: Levitation, stable: StableRange, conducts: bool) -> Lasting:
     """Where flights of `FLIGHT` last from spin 0, with all effects."""
-    scene = conducting(alone.scene, METAL[metal])
-    scene = replace(scene, drag=replace(Drag.stokes(scene.floater.radius), air=True))
-    whole = Levitation(scene, alone.models)
-    whole.share(alone)
-    middle = stable.near((stable.low.parameter + stable.high.parameter) / 2)
-    return lasting_frequencies(scene, whole.table, whole.rates, middle.state, middle.parameter, FLIGHT)
+    whole = alone.elsewhere(**losses(alone.scene, conducts))
+    middle = stable.near(float(within(stable, 0.5)))
+    return lasting_frequencies(whole.scene, whole.table, whole.rates, middle.state, middle.parameter, FLIGHT)
 
 
-def _with_plate(alone: Levitation, stable: StableRange | None, number: int) -> Array:
+def _with_plate(alone: Levitation, stable: StableRange, number: int) -> Array:
     """Frequency (Hz), growth (1/s), distance (m) and error of the plate's table (number, 4); NaN where it fails."""
-    rows = np.full((6, 4), np.nan)
-    if stable is None or not number:
-        return rows
-    last = min(BEYOND * stable.high.parameter, HIGHEST)
-    for k, frequency in enumerate(np.linspace(1.01 * stable.low.parameter, last, number)):
-        models = replace(alone.models, plate_model="slab", plate_rtol=PLATE_RTOL)
-        there = alone.elsewhere(models, frequency=float(frequency), plate=article_plate(FACE))
-        rows[k, 0] = frequency
+    rows = np.full((number, 4), np.nan)
+    rows[:, 0] = np.linspace(1.01 * stable.low.parameter, min(BEYOND * stable.high.parameter, HIGHEST), number)
+    for row in rows:
+        there = alone.elsewhere(frequency=float(row[0]))
         try:
-            near = at_frequency(alone.scene, alone.rates, stable.near(frequency), float(frequency))
+            near = at_frequency(alone.scene, alone.rates, stable.near(row[0]), float(row[0]))
         except EquilibriumError:
             continue
-        known = [e for e in there.without_plate.equilibria if abs(e.distance - near.distance) < 1e-6]
-        if not known:
-            continue
-        there.adopt(Survey((known[0],), ()))
-        memory, moved = there.plate, there.equilibria
-        if memory is not None and moved and moved[0].currents is not None:
-            rows[k, 1:] = moved[0].growth_per_s, moved[0].distance, max(memory.table.errors.total, memory.share.error)
+        known = equilibrium_at(there, near.distance)
+        found = known and over_plate(there, known, article_plate(FACE), "slab", PLATE_RTOL)
+        if found:
+            row[1:] = found[1].growth_per_s, found[1].distance, found[2]
     return rows
 
 
@@ -163,32 +162,26 @@ MARKS = {
 }
 
 
-@styled
+@drawn
 def map_figure(result: xr.Dataset) -> Figure:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
-    figure, rows = configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)", sharey=True)
+    figure, rows = configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)")
     for axes, configuration, rotors in rows:
         for model in MODELS:
             _region(axes, cases_with(rotors, model=model), COLORS[model])
+            explain(axes, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
         true = cases_with(rotors, model="fem")
         growth, frequency = true["plate_growth"].values, true["plate_frequency"].values
         measure = np.broadcast_to(true["measure"].values[:, None], growth.shape)
         found = (growth < 0, growth >= 0, np.isnan(growth) & np.isfinite(frequency))
-        for here, (marker, color, _) in zip(found, VERDICTS, strict=True):
-            axes.plot(measure[here], frequency[here], marker, color=color, ms=4, mew=0.8)
-        for metal, (marker, _) in MARKS.items() if "high" in true else ():
-            axes.plot(true["measure"], true["high"].sel(metal=metal), marker, color="k", ms=5)
+        for here, (marker, color, words) in zip(found, VERDICTS, strict=True):
+            if here.any():
+                label = f"{words}, face {-1e3 * FACE:g} mm below"
+                axes.plot(measure[here], frequency[here], marker, color=color, ms=4, mew=0.8, label=label)
+        for metal, (marker, words) in MARKS.items() if "high" in true else ():
+            axes.plot(true["measure"], true["high"].sel(metal=metal), marker, color="k", ms=5, label=words)
         axes.set(xlabel=label_of(configuration), ylim=(20, 410))
         axes.margins(x=0.08)
-    first = rows[0][0]
-    for model in MODELS:
-        explain(first, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
-    explain(first, {words: marker for marker, words in MARKERS.values()}, mfc="white", ms=4)
-    for marker, color, words in VERDICTS:
-        explain(first, {f"{words}, face {-1e3 * FACE:g} mm below": marker}, color=color, ms=4)
-    if "high" in result:
-        explain(first, {words: marker for marker, words in MARKS.values()}, color="k", ms=5)
-    legend_below(figure, columns=3)
     return figure
 
 
@@ -201,39 +194,33 @@ def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
         axes.fill_between(wide, low, high, color=color, alpha=0.2, lw=0)
         for values, name in zip(ends, ("low_kind", "high_kind"), strict=True):
             axes.plot(measure, values, color=color, lw=0.8)
-            for kind, (marker, _) in MARKERS.items():
+            for kind, (marker, words) in MARKERS.items():
                 here = part[name].values[:, k] == kind
-                axes.plot(measure[here], values[here], marker, color=color, mfc="white", ms=4)
+                if here.any():
+                    axes.plot(measure[here], values[here], marker, color=color, mfc="white", ms=4)
+                    explain(axes, {words: marker}, mfc="white", ms=4)
 
 
 def map_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for label, rotor in by_rotor(result):
         for one in each_case(rotor):
-            rows.append((f"{label}, {one['model'].item()}", _intervals(one), _verdicts(one), _lasts(one)))
-    flights = f"trajectories last {FLIGHT:g} s"
-    return text_table(("rotor, model", "stable", "growth with the plate (1/s)", flights), rows)
-
-
-def _intervals(one: xr.Dataset) -> str:
-    ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
-    words = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
-    return " and ".join(words) or "never"
-
-
-def _verdicts(one: xr.Dataset) -> str:
-    pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
-    tried = [f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)]
-    return ", ".join(tried)
-
-
-def _lasts(one: xr.Dataset) -> str:
-    if "high" not in one:
-        return ""
-    found = zip(*(one[name].values for name in ("metal", "low", "high", "ended_by")), strict=True)
-    return " and ".join(
-        f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})" for metal, low, high, end in found if end
-    )
+            ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
+            stable = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
+            pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
+            plate = [
+                f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)
+            ]
+            names = ("metal", *LASTING) if "high" in one else ()
+            lasting = [
+                f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})"
+                for metal, low, high, _, end in zip(*(one[name].values for name in names), strict=True)
+                if end
+            ]
+            cells = (" and ".join(stable) or "never", ", ".join(plate), " and ".join(lasting))
+            rows.append((f"{label}, {one['model'].item()}", *cells))
+    head = ("rotor, model", "stable", "growth with the plate (1/s)", f"trajectories last {FLIGHT:g} s")
+    return text_table(head, rows)
 
 
 STABILITY_MAP = Study(
@@ -264,6 +251,9 @@ COLUMNS: Columns = {
     "rotor_frequency": (("step",), "Hz", "frequency of the rotor"),
     "levitated": (("step",), "s", "time until the loss"),
     "growth": (("step",), "1/s", "largest growth rate of a mode in the flight"),
+    "end": (("step",), "", "what ended the flight"),
+    "ended_by": ((), "", "what ends flights beyond"),
+    "variant": ((), "", "what conducts"),
 }
 ENDS = tuple(COLUMNS)[:4]
 
@@ -291,11 +281,9 @@ def spacer(displacement: float) -> Conductor:
 
 def scene_of(point: Point) -> Scene:
     """The rotor of a point in real air, with the currents that its variant has."""
-    bare = article_scene(point["configuration"], point["measure"], permeability=1.0)
-    scene = conducting(replace(bare, drag=replace(bare.drag, air=True)), rotor=point["variant"] != VARIANTS[0])
-    if point["variant"] == VARIANTS[2]:
-        return replace(scene, conductors=(spacer(1e-3 * point["measure"]),))
-    return scene
+    bare, variant = article_scene(point["configuration"], point["measure"], permeability=1.0), point["variant"]
+    blocks = (spacer(1e-3 * point["measure"]),) if variant == VARIANTS[2] else ()
+    return replace(bare, conductors=blocks, **losses(bare, variant != VARIANTS[0]))
 
 
 def upper_limit(point: Point) -> xr.Dataset:
@@ -307,34 +295,28 @@ def upper_limit(point: Point) -> xr.Dataset:
     low, high = stable.low.parameter, stable.high.parameter
     middle = stable.near((low + high) / 2)
     lasts = lasting_frequencies(scene, whole.interaction, whole.rates, middle.state, middle.parameter, FLIGHT)
-    frequencies = np.linspace(low, high, STEPS + 2)[1:-1]
+    grid = np.linspace(low, high, STEPS + 2)[1:-1]
     flights = []
-    for frequency in frequencies:
-        point_there = at_frequency(bare, alone.rates, stable.near(frequency), frequency)
+    for frequency in grid:
         there = replace(scene, frequency=float(frequency))
-        start = Scales.of(there).unpack(point_there.state)
-        flight = drift(there, whole.interaction, 0.0, LONGEST, whole.rates, start)
+        state = at_frequency(bare, alone.rates, stable.near(frequency), frequency).state
+        flight = drift(there, whole.interaction, 0.0, LONGEST, whole.rates, Scales.of(there).unpack(state))
         flights.append((min(flight.levitated_s, LONGEST), flight.growth_per_s.max(), flight.ended_by))
-    times, growth, ends = zip(*flights, strict=True)
-    found = (low, high, lasts.low, lasts.high, frequencies, times, growth)
-    labels: dict[str, Any] = {"variant": ("case", [point["variant"]]), "ended_by": ("case", [lasts.ended_by])}
-    return recorded(point, COLUMNS, found, {}).assign(end=(("case", "step"), [list(ends)]), **labels)
+    found = (low, high, lasts.low, lasts.high, grid, *zip(*flights, strict=True), lasts.ended_by, point["variant"])
+    return recorded(point, COLUMNS, found, {})
 
 
-@styled
+@drawn
 def limit_figure(result: xr.Dataset) -> Figure:
     """Levitation time against frequency of each rotor, one line for each variant."""
     rotors = dict(by_rotor(result))
-    words = "frequency (Hz)", "levitation time (s)"
-    figure, axes = small_multiples(list(rotors), 1.9, 4, *words, sharey=True)
+    figure, axes = small_multiples(list(rotors), 1.9, 4, "frequency (Hz)", "levitation time (s)", sharey=True)
     for panel, rotor in zip(axes, rotors.values(), strict=True):
         for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
-            panel.semilogy(
-                one["rotor_frequency"], one["levitated"], style, ms=3, color=color, label=one["variant"].item()
-            )
+            frequency, time = one["rotor_frequency"], one["levitated"]
+            panel.semilogy(frequency, time, style, ms=3, color=color, label=one["variant"].item())
         panel.axhline(FLIGHT, color="0.6", lw=0.8, zorder=0, label=f"longest of the experiment, {FLIGHT:g} s")
         panel.axhline(LONGEST, color="0.6", lw=0.8, ls=":", zorder=0, label=f"followed no longer, {LONGEST:g} s")
-    legend_below(figure, columns=3)
     return figure
 
 
@@ -342,43 +324,37 @@ def limit_lines(result: xr.Dataset) -> list[str]:
     rows, lines = [], []
     for label, rotor in by_rotor(result):
         for one in each_case(rotor):
-            ends = [f"{float(one[name]):.1f}" for name in ("low", "high", "lasts_from", "lasts_to")]
-            lasts = "none" if np.isnan(one["lasts_to"]) else f"{ends[2]} to {ends[3]} ± 0.5"
-            rows.append((f"{label}, {one['variant'].item()}", f"{ends[0]} to {ends[1]}", lasts, one["ended_by"].item()))
-        lines.append(f"{label}: {_limit_change(rotor)}")
+            low, high, start, end = (f"{float(one[name]):.1f}" for name in ENDS)
+            lasts = "none" if np.isnan(one["lasts_to"]) else f"{start} to {end} ± 0.5"
+            rows.append((f"{label}, {one['variant'].item()}", f"{low} to {high}", lasts, one["ended_by"].item()))
+        # what conduction changes where it changes the most: the end in Hz, and a flight in s
+        first, second = each_case(rotor)[:2]
+        less, lost = max(0.0, float(first["lasts_to"] - second["lasts_to"])), second["end"].values == "instability"
+        if not lost.any():
+            lines.append(f"{label}: the magnets' currents lower the end by {less:.1f} Hz and shorten no trajectory.")
+            continue
+        k = int(np.argmax(np.where(lost, first["levitated"].values / second["levitated"].values, 0.0)))
+        times = [float(f"{float(one['levitated'][k]):.3g}") for one in (first, second)]
+        lines.append(
+            f"{label}: a rotor that does not conduct levitates up to {less:.1f} Hz more; at "
+            f"{float(first['rotor_frequency'][k]):.1f} Hz its floater stays for {times[0]:g} instead of {times[1]:g} s."
+        )
     head = ("rotor", "stable without losses (Hz)", f"trajectories last {FLIGHT:g} s (Hz)", "then")
     return [*text_table(head, rows), *lines]
 
 
-def _limit_change(rotor: xr.Dataset) -> str:
-    """What conduction changes where it changes the most: the end in Hz, and a flight in s."""
-    first, second = each_case(rotor)[:2]
-    less = max(0.0, float(first["lasts_to"] - second["lasts_to"]))
-    ratio = first["levitated"].values / second["levitated"].values
-    lost = second["end"].values == "instability"
-    if not lost.any():
-        return f"the magnets' currents lower the end by {less:.1f} Hz and shorten no trajectory."
-    k = int(np.argmax(np.where(lost, ratio, 0.0)))
-    times = [float(f"{float(one['levitated'][k]):.3g}") for one in (first, second)]
-    return (
-        f"a rotor that does not conduct levitates up to {less:.1f} Hz more; at "
-        f"{float(first['rotor_frequency'][k]):.1f} Hz its floater stays for {times[0]:g} instead of {times[1]:g} s."
-    )
-
-
 def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
     """Ends of lasting flights by rotor and variant as numbers: `limits`."""
-    return {
-        "limits": [
-            {
-                "configuration": str(one["configuration"].values),
-                "value": float(one["measure"]),
-                "variant": str(one["variant"].values),
-                **{f"{name}_hz": None if np.isnan(one[name]) else float(one[name]) for name in ENDS},
-            }
-            for one in each_case(result)
-        ]
-    }
+    rows = [
+        {
+            "configuration": one["configuration"].item(),
+            "value": float(one["measure"]),
+            "variant": one["variant"].item(),
+            **{f"{name}_hz": None if np.isnan(one[name]) else float(one[name]) for name in ENDS},
+        }
+        for one in each_case(result)
+    ]
+    return {"limits": rows}
 
 
 UPPER_LIMIT = Study(

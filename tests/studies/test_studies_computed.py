@@ -18,10 +18,10 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.studies.catalogue import regions
+from spinlev.studies.catalogue.article import article_scene
 from spinlev.studies.catalogue.finite_magnets import dipole_vs_fem
 from spinlev.studies.catalogue.margins import design, designed, sensitivity
 from spinlev.studies.catalogue.regions import stability_map
-from spinlev.studies.catalogue.scenes import article_scene
 
 
 def nearest(scene, model, distance):

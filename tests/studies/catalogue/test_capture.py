@@ -16,7 +16,6 @@ from spinlev.studies.catalogue.capture import (
     SPIN,
     STUDY as CAPTURE,
     WORDS,
-    field_of,
     launches,
     place_of,
     plate_under,
@@ -121,8 +120,8 @@ def test_a_rotor_without_a_stable_frequency_is_said_not_left_out():
 @pytest.mark.slow
 def test_without_the_plates_currents_nothing_is_held(place):
     _, states = launches(place, 200, seed_of("vertical", 14.0, 0.5, 0))
-    braked = launched(place.scene, field_of(place), plate_under(place), states, SETTLED)
-    unbraked = ensemble(place.scene, field_of(place), states, SETTLED)
+    braked = launched(place.scene, place.field, plate_under(place), states, SETTLED)
+    unbraked = ensemble(place.scene, place.field, states, SETTLED)
     held, none = (ended.ended_by == DURATION for ended in (braked, unbraked))
     print(f"\nheld over aluminium {share_text(held)}, over a plate that does not conduct {share_text(none)}")
     assert 0.6 < held.mean() < 0.8

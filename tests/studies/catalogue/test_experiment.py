@@ -14,6 +14,7 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.common import MAGNET_CONDUCTIVITY
 from spinlev.geometry.scene.contents import Drag
 from spinlev.studies.catalogue import experiment, experiment_design as design
+from spinlev.studies.catalogue.article import levitation_of
 from spinlev.studies.catalogue.experiment import (
     SETTINGS,
     STUDY as EXPERIMENT,
@@ -50,7 +51,6 @@ from spinlev.studies.catalogue.experiment_model import (
     simulated,
     targets,
 )
-from spinlev.studies.catalogue.scenes import levitation_of
 from spinlev.studies.cli.options import Workers
 from spinlev.studies.sweep import swept
 

@@ -8,9 +8,9 @@ import pytest
 from spinlev.dynamics.continuation.frequencies import reference_state, stable_range
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.fem.rotor.choice import rotor_table
+from spinlev.studies.catalogue.article import article_scene
 from spinlev.studies.catalogue.entries import CATALOGUE
 from spinlev.studies.catalogue.plates import ROTORS, PlateCase, cases, gather_damping, plate_damping
-from spinlev.studies.catalogue.scenes import article_scene
 
 STUDY = CATALOGUE["plate-damping"]
 WEAK = 2e4

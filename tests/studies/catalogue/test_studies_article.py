@@ -8,7 +8,7 @@ from spinlev.fem.elements.second_opinion import coulomb_field
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Scene
 from spinlev.studies.catalogue import article_formulas as formulas
-from spinlev.studies.catalogue.article import CONFIGURATIONS, FLOATER, WEIGHT, stable_in_flight
+from spinlev.studies.catalogue.article import CONFIGURATIONS, FLOATER, WEIGHT, article_scene, stable_in_flight
 from spinlev.studies.catalogue.article_figures import (
     FIELD_MODELS,
     FORCE_MODELS,
@@ -18,7 +18,6 @@ from spinlev.studies.catalogue.article_figures import (
 )
 from spinlev.studies.catalogue.article_flights import NONE, levitation_distance, trajectories
 from spinlev.studies.catalogue.entries import CATALOGUE
-from spinlev.studies.catalogue.scenes import article_scene
 from spinlev.studies.figures.style import save_figure
 from spinlev.studies.study import by_case
 

@@ -11,7 +11,7 @@ from spinlev.dynamics.continuation.slow_drift import drift, lasting_frequencies
 from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.scene.contents import Drag
 from spinlev.geometry.scene.files import load_scene
-from spinlev.studies.catalogue.scenes import levitation_of
+from spinlev.studies.catalogue.article import levitation_of
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 

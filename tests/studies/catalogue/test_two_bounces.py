@@ -7,7 +7,7 @@ import pytest
 
 import spinlev as sl
 from spinlev.dynamics.flights.trajectory import flight_kind
-from spinlev.studies.catalogue.scenes import article_scene
+from spinlev.studies.catalogue.article import article_scene
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 

@@ -11,6 +11,7 @@ from spinlev.dynamics.continuation.slow_drift import drift
 from spinlev.dynamics.flights.flight import simulate
 from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.scene.contents import AbsoluteStart
+from spinlev.studies.catalogue.article import article_scene, levitation_of
 from spinlev.studies.catalogue.regions import (
     MAGNET_DENSITY,
     STEEL_DENSITY,
@@ -19,7 +20,6 @@ from spinlev.studies.catalogue.regions import (
     scene_of,
     spacer,
 )
-from spinlev.studies.catalogue.scenes import article_scene, levitation_of
 
 
 @pytest.mark.parametrize("displacement", [1e-3, 2e-3, 4e-3])
