@@ -101,7 +101,15 @@ def kicked(scene: Scene, point: BranchPoint, speed: float) -> Scene:
 
 def _hanging(scene: Scene, table: FieldTable, family: Family) -> Array:
     """Scaled state (12,) near the far equilibrium: on the axis, upright, where attraction carries the weight."""
-    scales, upright = Scales.of(scene), np.eye(3)[2:]
+    upright, distance = np.eye(3)[2:], hanging_distance(scene, table) / Scales.of(scene).length
+    return np.asarray(family.balance(scene.frequency).states(-distance * upright, upright)[0])
+
+
+def hanging_distance(scene: Scene, table: FieldTable) -> float:
+    """Farthest distance on the axis, m, at which attraction by an upright moment carries the weight of the floater.
+
+    Of a `scene` with gravity along the axis, in the field of `table`. Raises EquilibriumError where there is none.
+    """
     weight = scene.floater.mass * abs(float(scene.gravity[2]))
 
     def excess(distance: float) -> float:
@@ -115,8 +123,7 @@ def _hanging(scene: Scene, table: FieldTable, family: Family) -> Array:
         raise EquilibriumError(
             f"Nowhere from {1e3 * nearest:.3g} to {1e3 * REACH[1]:.3g} mm does the attraction carry the weight."
         )
-    distance = float(scipy.optimize.brentq(excess, grid[carried[-1]], grid[carried[-1] + 1]))
-    return np.asarray(family.balance(scene.frequency).states(-distance / scales.length * upright, upright)[0])
+    return float(scipy.optimize.brentq(excess, grid[carried[-1]], grid[carried[-1] + 1]))
 
 
 def distance_error(scene: Scene, table: FieldTable, family: Family, point: BranchPoint) -> float:

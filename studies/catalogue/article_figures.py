@@ -78,11 +78,11 @@ def _of(part: xr.Dataset, model: str) -> xr.Dataset:
     return cases_with(part, model=model).sortby("value")
 
 
-def deviations(part: xr.Dataset) -> dict[str, xr.DataArray]:
+def deviations(part: xr.Dataset) -> dict[str, Any]:
     """|B - B_fem| / |B_fem| (case, distance) of each simpler model, and last the finite elements' own error."""
     true = _of(part, "fem")
     size = np.hypot(true["off_axis"], true["on_axis"])
-    found: dict[str, xr.DataArray] = {}
+    found: dict[str, Any] = {}
     for model in FIELD_MODELS[:-1]:
         other = _of(part, model)
         found[model] = np.hypot(other["off_axis"] - true["off_axis"], other["on_axis"] - true["on_axis"]) / size

@@ -314,11 +314,10 @@ def capture_lines(result: xr.Dataset) -> list[str]:
     every = xr.concat([one[["outcome", "left_plate_table"]] for _, one in found], "trial", coords="minimal")
     beyond = every["left_plate_table"] == 1
     if beyond.any():
-        captured = int((beyond & (every["outcome"] == HELD)).sum())
+        captured, count = int((beyond & (every["outcome"] == HELD)).sum()), int(every["left_plate_table"].count())
         lines.append(
-            f"{int(beyond.sum())} of {int(every['left_plate_table'].count())} trajectories, {captured} of them captured, "
-            "were for a while beyond the range of the plate's table, where the field of its currents is a "
-            "continuation of unknown error."
+            f"{int(beyond.sum())} of {count} trajectories, {captured} of them captured, were for a while beyond the "
+            "range of the plate's table, where the field of its currents is a continuation of unknown error."
         )
     settled, stayed = (int(result[name].sum()) for name in ("settled", "stayed"))
     if settled:

@@ -19,8 +19,9 @@ from scipy.stats import qmc
 
 from ...geometry.common import Array
 from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
-from ..result import columns, variable
+from ..result import Columns, columns, variable
 from ..study import Point, Study
+from .drawing import drawn
 from .experiment_design import design_row
 from .experiment_model import (
     EVEN,
@@ -34,7 +35,6 @@ from .experiment_model import (
     Flight,
     Models,
     Surrogate,
-    Unknown,
     corrected,
     courses,
     ended,
@@ -42,22 +42,19 @@ from .experiment_model import (
     fitted,
     log_likelihoods,
     prior_values,
+    quantile,
 )
 from .tables import text_table, uncertain
 
 KEPT = 1000  # Draws of the posterior that are kept
 TOGETHER = 500  # Draws that are evaluated in one call
 DONE = 0.1  # What the evidence that remains may add to its logarithm
-
-
-POSTERIOR: dict[str, Any] = {
+COLUMNS: Columns = {
     "posterior": (("draw", "unknown"), "see unit", "draw of the posterior"),
     "fact_log_likelihood": (("draw", "fact"), "1", "logarithm of the likelihood of a fact"),
     "log_evidence": ((), "1", "logarithm of the evidence by nested sampling"),
     "log_evidence_error": ((), "1", "its standard deviation"),
     "calls": ((), "1", "evaluations of the likelihood"),
-}
-EVIDENCES: dict[str, Any] = {
     "log_evidence_drawn": ((), "1", "logarithm of the evidence by draws of the prior"),
     "log_evidence_drawn_error": ((), "1", "its standard deviation"),
     "log_evidence_single": (("fact",), "1", "logarithm of the evidence of one fact"),
@@ -65,11 +62,15 @@ EVIDENCES: dict[str, Any] = {
     "log_evidence_others": (("fact",), "1", "logarithm of the evidence of all other facts"),
     "fact_shift": (("fact", "unknown"), "1", "mean given one fact, in deviations of the prior"),
     "fact_width": (("fact", "unknown"), "1", "deviation given one fact, in deviations of the prior"),
+    "surrogate_error": (("rotor_kind", "fitted"), "1", "error for rotors left out"),
+    "surrogate_rotors": (("rotor_kind",), "1", "rotors that it is fitted to"),
+    "truth": (("unknown",), "see unit", "unknowns of which the facts were made up"),
+    "says": (("fact",), "", "what is reported"),
 }
 
 
 def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, seed: int) -> dict[str, Any]:
-    """Draws of the posterior and the evidence, by the names of `POSTERIOR`; the same seed gives the same draws.
+    """Draws of the posterior and the evidence, by names of `COLUMNS`; the same seed gives the same draws.
 
     Parameters
     ----------
@@ -91,16 +92,18 @@ def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, 
     sampler.run_nested(dlogz=DONE, print_progress=False)
     found = sampler.results
     weights = np.exp(found.logwt - logsumexp(found.logwt))
-    shares = found.samples[generator.choice(len(weights), KEPT, p=weights / weights.sum())]
-    each = log_likelihoods(models, prior_values(shares), facts)
-    values = np.stack([prior_values(shares)[name] for name in NAMES], axis=1)
-    likelihoods = np.stack([each[name] for name in facts], axis=1)
-    numbers = (values, likelihoods, found.logz[-1], found.logzerr[-1], np.sum(found.ncall))
-    return dict(zip(POSTERIOR, numbers, strict=True))
+    values = prior_values(found.samples[generator.choice(len(weights), KEPT, p=weights / weights.sum())])
+    return {
+        "posterior": np.stack([values[name] for name in NAMES], axis=1),
+        "fact_log_likelihood": np.stack(list(log_likelihoods(models, values, facts).values()), axis=1),
+        "log_evidence": found.logz[-1],
+        "log_evidence_error": found.logzerr[-1],
+        "calls": np.sum(found.ncall),
+    }
 
 
 def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) -> dict[str, Any]:
-    """Evidences by draws of the prior (Sobol's sequence), by the names of `EVIDENCES`.
+    """Evidences by draws of the prior (Sobol's sequence), by names of `COLUMNS`.
 
     Parameters
     ----------
@@ -108,8 +111,7 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
     draws : how many, a power of two
     seed : of the sequence
     """
-    shares = qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws)
-    shares = np.clip(shares, 1e-12, 1 - 1e-12)
+    shares = np.clip(qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws), 1e-12, 1 - 1e-12)
     pieces = np.array_split(shares, max(1, draws // TOGETHER))
     parts = [log_likelihoods(models, prior_values(part), facts) for part in pieces]
     known = np.stack([np.concatenate([part[name] for part in parts]) for name in facts], axis=1)
@@ -120,14 +122,17 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
     every = known.sum(axis=1)
     pair = np.stack([mean(known + one[:, None]) for one in known.T])
     np.fill_diagonal(pair, mean(known))
-    whole = float(mean(every))
-    spread, deviates = np.exp(every - whole), ndtri(shares)
-    weights = np.exp(known - logsumexp(known, axis=0)).T
+    weights, deviates = np.exp(known - logsumexp(known, axis=0)).T, ndtri(shares)
     shift = weights @ deviates
-    width = np.sqrt(np.maximum(weights @ deviates**2 - shift**2, 0.0))
-    error = float(spread.std() / np.sqrt(draws))
-    numbers = (whole, error, mean(known), pair, mean(every[:, None] - known), shift, width)
-    return dict(zip(EVIDENCES, numbers, strict=True))
+    return {
+        "log_evidence_drawn": mean(every),
+        "log_evidence_drawn_error": np.exp(every - mean(every)).std() / np.sqrt(draws),
+        "log_evidence_single": mean(known),
+        "log_evidence_pair": pair,
+        "log_evidence_others": mean(every[:, None] - known),
+        "fact_shift": shift,
+        "fact_width": np.sqrt(np.maximum(weights @ deviates**2 - shift**2, 0.0)),
+    }
 
 
 SYNTHETIC = "made-up facts"
@@ -143,11 +148,9 @@ FLIGHTS: tuple[Flight, ...] = (
 
 def synthetic_facts(models: Models) -> dict[str, Fact]:
     """How each of `FLIGHTS` of the true rotors most probably ends, and the times of falls, by the models themselves."""
-    values = {name: np.array([value]) for name, value in TRUTH.items()}
-    facts = {}
-    for flight in (flight for flight in FLIGHTS if flight[0] in models.surrogates):
-        course = courses(models, values, [flight])[flight]
-        found = ends(models, flight[0], course, values, flight[3])
+    values, facts = {name: np.array([value]) for name, value in TRUTH.items()}, {}
+    for flight, course in courses(models, values, FLIGHTS).items():
+        found = ends(models, flight, course, values)
         way = max(found, key=lambda name: float(found[name][0]))
         lasted = float(course["fall"][0]) if way == "falls" else None
         when = "" if lasted is None else f" after {lasted:.3g} s"
@@ -177,37 +180,29 @@ SETTINGS: Mapping[bool, Point] = {
 }  # fmt: skip
 """Nodes of a rotor, whether there is steel, rotors of designs, degrees of surrogates, live points, walks, draws."""
 SEED = 42
-SURROGATES: dict[str, Any] = {
-    "surrogate_error": (("rotor_kind", "fitted"), "1", "error for rotors left out"),
-    "surrogate_rotors": (("rotor_kind",), "1", "rotors that it is fitted to"),
-    "truth": (("unknown",), "see unit", "unknowns of which the facts were made up"),
-}
 
 
 def experiment_points(quick: bool) -> list[Point]:
     """The rotors of all designs, then the variants; `quick` has closed forms, four facts and two variants."""
-    settings = SETTINGS[quick]
-    rotors = [
-        _rotor(settings, kind, model, number)
-        for kind, model, count in _designs(settings, True)
-        for number in range(int(settings[count]))
-    ]
+    rotors = [point for design in _designs(SETTINGS[quick], True).values() for point in design]
     rotors.sort(key=lambda point: point["number"])  # kinds in turn: processes compile the code of one each
     names = tuple(VARIANTS)[: 2 if quick else None]
     return [*rotors, *({"variant": name, "quick": quick} for name in names)]
 
 
-def _designs(settings: Point, mutual: bool) -> list[tuple[str, str, str]]:
-    """Kind of rotor, model, and which of the settings says how many rotors."""
-    found = [("single", "cuboid", "single"), ("stack", "cuboid", "stack"), ("single", "fem", "better")]
-    found += [("single", "mutual", "better")] if mutual else []
-    return [design for design in found if settings[design[2]]]
-
-
-def _rotor(settings: Point, kind: str, model: str, number: int) -> Point:
-    steel = settings["steel"] and kind == "single"
-    nodes = {"heights": settings["heights"], "spins": settings["spins"], "steel": steel}
-    return {"rotor": kind, "model": model, "number": number, **nodes}
+def _designs(settings: Point, mutual: bool) -> dict[tuple[str, str], list[Point]]:
+    """Rotors of each kind by each model."""
+    counts = {("single", "cuboid"): "single", ("stack", "cuboid"): "stack", ("single", "fem"): "better"}
+    counts |= {("single", "mutual"): "better"} if mutual else {}
+    nodes = {"heights": settings["heights"], "spins": settings["spins"]}
+    return {
+        (kind, model): [
+            {"rotor": kind, "model": model, "number": number, **nodes, "steel": settings["steel"] and kind == "single"}
+            for number in range(settings[count])
+        ]
+        for (kind, model), count in counts.items()
+        if settings[count]
+    }
 
 
 def experiment(point: Point) -> xr.Dataset:
@@ -218,43 +213,34 @@ def experiment(point: Point) -> xr.Dataset:
     Of a variant a dataset over `draw`, `unknown`, `fact`, and `rotor_kind` and `fitted` of the surrogates
     """
     if "rotor" in point:
-        row = design_row(point)
-        return xr.Dataset({"hanging": row["hanging"]}).expand_dims("design")
-    settings, effects = SETTINGS[point["quick"]], VARIANTS[point["variant"]]
+        return xr.Dataset({"hanging": design_row(point)["hanging"]}).expand_dims("design")
+    name, settings, effects = point["variant"], SETTINGS[point["quick"]], VARIANTS[point["variant"]]
     models = Models(surrogates_of(settings, effects), effects)
-    facts = facts_of(point["variant"], point["quick"], models)
+    facts = {fact: FACTS[fact] for fact in (QUICK_FACTS if point["quick"] else FACTS)}
+    if name == SYNTHETIC:
+        facts = synthetic_facts(models)
     found = posterior(models, facts, settings["live"], settings["walks"], SEED)
     found |= evidences(models, facts, settings["draws"], SEED)
-    surrogates, name = models.surrogates.values(), point["variant"]
-    found["surrogate_error"] = [surrogate.errors for surrogate in surrogates]
-    found["surrogate_rotors"] = [surrogate.rotors for surrogate in surrogates]
-    found["truth"] = [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in NAMES]
-    data = columns(POSTERIOR | EVIDENCES | SURROGATES, found)
-    says = ("fact", [fact.says for fact in facts.values()])
+    found |= {
+        "surrogate_error": [surrogate.errors for surrogate in models.surrogates.values()],
+        "surrogate_rotors": [surrogate.rotors for surrogate in models.surrogates.values()],
+        "truth": [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in NAMES],
+        "says": [fact.says for fact in facts.values()],
+    }
     labels = {"fact": list(facts), "other_fact": list(facts), "unknown": list(NAMES)}
     labels |= {"rotor_kind": list(models.surrogates), "fitted": list(FITTED)}
-    return xr.Dataset(data, labels).assign(says=says).expand_dims(variant=[name])
-
-
-def facts_of(variant: str, quick: bool, models: Models) -> Mapping[str, Fact]:
-    """Those that a variant is fitted to."""
-    if variant == SYNTHETIC:
-        return synthetic_facts(models)
-    return {name: FACTS[name] for name in (QUICK_FACTS if quick else FACTS)}
+    return xr.Dataset(columns(COLUMNS, found), labels).expand_dims(variant=[name])
 
 
 def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, Surrogate]:
-    """Fitted to the designs of closed forms, then corrected by finite elements, and by what bodies answer each other.
+    """Fitted to the designs of closed forms, then corrected by finite elements, and by mutual magnetisation.
 
     The stack keeps its closed form: mutual magnetisation moves its fold by 0.1 Hz.
     """
     designs = {
-        (kind, model): xr.concat(
-            [design_row(_rotor(settings, kind, model, number)) for number in range(int(settings[count]))], "rotor",
-            data_vars="all", coords="minimal", compat="override",
-        )
-        for kind, model, count in _designs(settings, "mutual" in effects)
-    }  # fmt: skip
+        name: xr.concat(map(design_row, points), "rotor", data_vars="all", coords="minimal", compat="override")
+        for name, points in _designs(settings, "mutual" in effects).items()
+    }
     found = {
         kind: fitted(kind, design, settings[f"{kind}_degree"])
         for (kind, model), design in designs.items()
@@ -272,12 +258,6 @@ def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, Surrogat
 def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """The variants with their own facts side by side, NaN where one has not a fact; how many rotors were computed."""
     variants = [part for part in parts if "variant" in part.dims]
-    labels: dict[str, Any] = {
-        "prior": (("unknown",), [u.prior for u in UNKNOWNS]),
-        "unit": (("unknown",), [u.unit for u in UNKNOWNS]),
-        "why": (("unknown",), [u.why for u in UNKNOWNS]),
-        "prior_numbers": (("unknown", "number"), [[u.first, u.second] for u in UNKNOWNS]),
-    }
     rotors = variable((), np.array(len(parts) - len(variants)), "1", "rotors of the designs")
     if not variants:
         return xr.Dataset({"design_rotors": rotors})
@@ -285,11 +265,17 @@ def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
         name: text for part in variants for name, text in zip(part["fact"].values, part["says"].values[0], strict=True)
     }
     joined = xr.concat([part.drop_vars("says") for part in variants], "variant", data_vars="all", join="outer")
-    texts = [str(says[name]) for name in joined["fact"].values]
-    return joined.assign(design_rotors=rotors, says=(("fact",), texts), **labels)
+    return joined.assign(
+        design_rotors=rotors,
+        says=("fact", [str(says[name]) for name in joined["fact"].values]),
+        prior=("unknown", [u.prior for u in UNKNOWNS]),
+        unit=("unknown", [u.unit for u in UNKNOWNS]),
+        why=("unknown", [u.why for u in UNKNOWNS]),
+        prior_numbers=(("unknown", "number"), [[u.first, u.second] for u in UNKNOWNS]),
+    )
 
 
-SHOWN = ("displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "spin")  # Unknowns of the corner
+SHOWN = ["displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "spin"]  # Unknowns of the corner
 SHARES = np.array([0.16, 0.5, 0.84])  # Ends of the middle 68 %, and the middle
 LEARNED = 0.7  # Worth a mark: a posterior narrower than this part of the prior, or off its middle by as many deviations
 NAMED, ASKED = 3, 0.25  # How many unknowns are named with a fact, and from which change on
@@ -298,14 +284,13 @@ CONTRADICTS = 1.0  # Logarithm of the ratio of evidences below minus which two f
 
 def quantiles(one: xr.Dataset) -> Array:
     """Ends of the middle 68 % of each unknown, and the middle (unknown, 3)."""
-    draws = one["posterior"].values
-    return np.asarray(np.quantile(draws[np.isfinite(draws).all(axis=1)], SHARES, axis=0).T)
+    return np.asarray(one["posterior"].dropna("draw").quantile(SHARES, "draw").transpose("unknown", "quantile"))
 
 
 def prior_quantiles(result: xr.Dataset) -> Array:
     """The same of the prior."""
     priors = zip(result["prior"].values, result["prior_numbers"].values, strict=True)
-    return np.array([Unknown("", "", "", kind, first, second, "").at(SHARES) for kind, (first, second) in priors])
+    return np.array([quantile(kind, first, second, SHARES) for kind, (first, second) in priors])
 
 
 def facts_weighed(one: xr.Dataset) -> tuple[xr.Dataset, Array]:
@@ -338,38 +323,34 @@ def _labels(result: xr.Dataset) -> dict[str, str]:
 @styled
 def corner_figure(result: xr.Dataset) -> Figure:
     """The posterior of some unknowns, alone and in pairs; grey: the middle 68 % of the prior."""
-    labels, names = _labels(result), result["unknown"].values.tolist()
-    scale = np.where(result["unit"].values == "S/m", 1e-6, 1.0)
-    before, draws = prior_quantiles(result) * scale[:, None], result["posterior"].values[0] * scale
-    draws = draws[np.isfinite(draws).all(axis=1)]
+    some = result.isel(variant=0).sel(unknown=SHOWN)
+    labels = [label.replace(" ", "\n") for label in _labels(some).values()]
+    scale = np.where(some["unit"] == "S/m", 1e-6, 1.0)
+    before, draws = prior_quantiles(some) * scale[:, None], some["posterior"].dropna("draw").values * scale
     limits = np.quantile(draws, (0.003, 0.997), axis=0).T
-    chosen = [names.index(name) for name in SHOWN]
-    figure, axes = panels(len(chosen), len(chosen), (PAGE, PAGE), sharex="col")
-    for row, column in np.ndindex(axes.shape):
-        panel, i, j = axes[row, column], chosen[row], chosen[column]
+    figure, axes = panels(len(SHOWN), len(SHOWN), (PAGE, PAGE), sharex="col")
+    for (i, j), panel in np.ndenumerate(axes):
         panel.set_title("")  # a letter for each of a corner's many panels says nothing
-        if column > row:
+        if j > i:
             panel.set_axis_off()
             continue
         panel.axvspan(before[j, 0], before[j, 2], color="0.92", zorder=0)
         panel.set_xlim(*limits[j])
-        if row == column:
+        if i == j:
             panel.hist(draws[:, j], bins=30, color=PALETTE[0], histtype="stepfilled")
             panel.set_yticks([])
         else:
             panel.axhspan(before[i, 0], before[i, 2], color="0.92", zorder=0)
             panel.plot(draws[:, j], draws[:, i], ".", ms=1, alpha=0.3, color=PALETTE[0], rasterized=True)
             panel.set_ylim(*limits[i])
-            panel.tick_params(labelleft=column == 0)
+            panel.tick_params(labelleft=j == 0)
         panel.locator_params(nbins=2)
-        if row == len(chosen) - 1:
-            panel.set_xlabel(labels[names[j]].replace(" ", "\n"))
-        if row and not column:
-            panel.set_ylabel(labels[names[i]].replace(" ", "\n"))
+        panel.set_xlabel(labels[j] if i == len(SHOWN) - 1 else "")
+        panel.set_ylabel(labels[i] if i and not j else "")
     return figure
 
 
-@styled
+@drawn
 def unknowns_figure(result: xr.Dataset) -> Figure:
     """The middle 68 % of each unknown's posterior in deviations of its prior, for each variant fitted to the facts."""
     before = prior_quantiles(result)
@@ -378,14 +359,12 @@ def unknowns_figure(result: xr.Dataset) -> Figure:
     places = np.arange(len(middle))[::-1]
     panel.axvspan(-1, 1, color="0.92", zorder=0, label="prior")
     fitted_to_facts = [name for name in result["variant"].values.tolist() if name != SYNTHETIC]
-    for n, name in enumerate(fitted_to_facts):
-        found = (quantiles(result.sel(variant=name)) - middle) / half
-        bars = np.abs(found[:, [0, 2]] - found[:, [1]]).T
-        style: Any = {"fmt": "o", "ms": 3, "color": PALETTE[n % len(PALETTE)], "label": name}
-        panel.errorbar(found[:, 1], places - 0.12 * n, xerr=bars, **style)
+    for n, (name, color) in enumerate(zip(fitted_to_facts, PALETTE, strict=False)):
+        low, median, high = ((quantiles(result.sel(variant=name)) - middle) / half).T
+        bars = [median - low, high - median]
+        panel.errorbar(median, places - 0.12 * n, xerr=bars, fmt="o", ms=3, color=color, label=name)
     panel.set_yticks(places, _labels(result).values())
     panel.set_xlabel("middle 68 %, in deviations of the prior")
-    legend_below(figure, panel, columns=3)
     return figure
 
 
@@ -395,21 +374,17 @@ def facts_figure(result: xr.Dataset) -> Figure:
     weighed, gain = facts_weighed(result.isel(variant=0))
     names, places = weighed["fact"].values.tolist(), np.arange(weighed.sizes["fact"])
     figure, ((left, right),) = panels(1, 2, (PAGE, 1.8 + 0.28 * len(names)), sharey=True)
-    marks = {
-        "probability": ("o", "beforehand"),
-        "given_others": ("s", "given all others"),
-        "in_fit": ("^", "in the fit"),
-    }
-    for key, (mark, label) in marks.items():
-        left.plot(weighed[key], places, mark, ms=4, label=label)
+    marks = {"probability": "o beforehand", "given_others": "s given all others", "in_fit": "^ in the fit"}
+    for key, mark in marks.items():
+        left.plot(weighed[key], places, mark[0], ms=4, label=mark[2:])
     left.set(xscale="log", xlim=(3e-3, 1.3), xlabel="probability of the fact")
     left.set_yticks(places, names)
     left.invert_yaxis()
     np.fill_diagonal(gain, np.nan)
-    drawn = right.imshow(gain, cmap="RdBu", vmin=-3, vmax=3, aspect="auto")
+    shades = right.imshow(gain, cmap="RdBu", vmin=-3, vmax=3, aspect="auto")
     right.set_xticks(places, names, rotation=90)
     right.grid(False)
-    figure.colorbar(drawn, ax=right, shrink=0.6, label="logarithm of the gain")
+    figure.colorbar(shades, ax=right, shrink=0.6, label="logarithm of the gain")
     legend_below(figure, left)
     return figure
 
@@ -418,7 +393,27 @@ def experiment_lines(result: xr.Dataset) -> list[str]:
     if "variant" not in result.dims:
         return [f"{int(result['design_rotors'])} rotors of the designs, and no posterior."]
     one = result.isel(variant=0)
-    lines = [*_errors(one), *_posterior(result, one), *_facts(one)]
+    missed = 100 * one["surrogate_error"].sel(fitted=["frequency", "eddy"]).values
+    kinds = zip(one["rotor_kind"].values, one["surrogate_rotors"].values, missed, strict=True)
+    surrogates = [(str(kind), str(int(count)), *(f"{each:.2f} %" for each in own)) for kind, count, own in kinds]
+    unknowns = []
+    known = zip(result["unknown"].values, result["unit"].values, quantiles(one), prior_quantiles(result), strict=True)
+    for name, unit, now, before in known:
+        width = (now[2] - now[0]) / (before[2] - before[0])
+        away = 2 * (now[1] - before[1]) / (before[2] - before[0])
+        learned = width < LEARNED or abs(away) > LEARNED
+        unknowns.append((f"{name} ({unit})", *now, f"{width:.2f}", f"{away:+.1f}", "learned" if learned else ""))
+    evidence, first = [], float(one["log_evidence"])
+    for name in result["variant"].values.tolist():
+        each = result.sel(variant=name)
+        both = [uncertain(each[key], each[f"{key}_error"]) for key in ("log_evidence", "log_evidence_drawn")]
+        less = "" if name == SYNTHETIC else f"{np.exp(first - float(each['log_evidence'])):.3g}"
+        evidence.append((name, *both, less))
+    lines = [
+        *text_table(("surrogate", "rotors", "frequency missed by", "drift missed by"), surrogates),
+        *text_table(("unknown", "16 %", "middle", "84 %", "over prior's width", "deviations off", ""), unknowns),
+        *_facts(one),
+    ]
     if SYNTHETIC in result["variant"]:
         made = result.sel(variant=SYNTHETIC)
         truth, found = made["truth"].values, quantiles(made)
@@ -427,34 +422,15 @@ def experiment_lines(result: xr.Dataset) -> list[str]:
             f"Made-up facts of known rotors: {inside} of {len(truth)} unknowns lie in the middle 68 % of their "
             f"posterior (on average it is {0.68 * len(truth):.0f})."
         )
-    return [*lines, *_evidences(result)]
-
-
-def _errors(one: xr.Dataset) -> list[str]:
-    rows = []
-    for kind in one["rotor_kind"].values:
-        row = one.sel(rotor_kind=kind)
-        missed = [f"{100 * float(row['surrogate_error'].sel(fitted=name)):.2f} %" for name in ("frequency", "eddy")]
-        rows.append((str(kind), str(int(row["surrogate_rotors"])), *missed))
-    return text_table(("surrogate", "rotors", "frequency missed by", "drift missed by"), rows)
-
-
-def _posterior(result: xr.Dataset, one: xr.Dataset) -> list[str]:
-    rows = []
-    known = zip(result["unknown"].values, result["unit"].values, quantiles(one), prior_quantiles(result), strict=True)
-    for name, unit, now, before in known:
-        width = (now[2] - now[0]) / (before[2] - before[0])
-        away = 2 * (now[1] - before[1]) / (before[2] - before[0])
-        learned = width < LEARNED or abs(away) > LEARNED
-        rows.append((f"{name} ({unit})", *now, f"{width:.2f}", f"{away:+.1f}", "learned" if learned else ""))
-    return text_table(("unknown", "16 %", "middle", "84 %", "over prior's width", "deviations off", ""), rows)
+    head = ("variant", "nested sampling", "draws of the prior", "less probable than the first by")
+    return [*lines, *text_table(head, evidence), "Each by the natural logarithm of the evidence."]
 
 
 def _facts(one: xr.Dataset) -> list[str]:
     """What each fact is worth, which unknowns it alone moves or narrows most, and which facts contradict each other."""
     weighed, gain = facts_weighed(one)
-    rows = []
-    for name in weighed["fact"].values:
+    rows, names = [], weighed["fact"].values
+    for name in names:
         fact = weighed.sel(fact=name)
         shift, width = fact["shift"].values, fact["width"].values
         moved = np.maximum(np.abs(shift), 1 - width)
@@ -463,7 +439,6 @@ def _facts(one: xr.Dataset) -> list[str]:
         chances = [f"{float(fact[key]):.2g}" for key in ("probability", "given_others", "in_fit")]
         rows.append((str(name), *chances, asks))
     lines = text_table(("probability of", "beforehand", "given the others", "in the fit", "alone it asks for"), rows)
-    names = weighed["fact"].values
     against = sorted((gain[i, j], names[i], names[j]) for i, j in zip(*np.triu_indices(len(names), 1), strict=True))
     clash = [
         f"Contradict each other: '{a}' and '{b}', less probable together by a factor {np.exp(-value):.3g}."
@@ -474,25 +449,13 @@ def _facts(one: xr.Dataset) -> list[str]:
     return [*lines, *(clash or [none])]
 
 
-def _evidences(result: xr.Dataset) -> list[str]:
-    rows, first = [], float(result["log_evidence"][0])
-    for k, name in enumerate(result["variant"].values.tolist()):
-        one = result.isel(variant=k)
-        both = [uncertain(one[key], one[f"{key}_error"]) for key in ("log_evidence", "log_evidence_drawn")]
-        less = "" if name == SYNTHETIC else f"{np.exp(first - float(one['log_evidence'])):.3g}"
-        rows.append((name, *both, less))
-    head = ("variant", "nested sampling", "draws of the prior", "less probable than the first by")
-    return [*text_table(head, rows), "Each by the natural logarithm of the evidence."]
-
-
 def experiment_numbers(result: xr.Dataset) -> dict[str, Any]:
     """Posterior, facts and evidences as numbers: `unknowns`, `facts`, `evidences`."""
     if "variant" not in result.dims:
         return {"unknowns": [], "facts": [], "evidences": []}
     one = result.isel(variant=0)
-    weighed, _ = facts_weighed(one)
+    chances = facts_weighed(one)[0][["probability", "given_others", "in_fit"]]
     known = zip(result["unknown"].values, result["unit"].values, quantiles(one).tolist(), strict=True)
-    chances = weighed[["probability", "given_others", "in_fit"]]
     keys = {"log_evidence": "log_evidence", "error": "log_evidence_error"}
     keys |= {"by_draws": "log_evidence_drawn", "by_draws_error": "log_evidence_drawn_error"}
     return {

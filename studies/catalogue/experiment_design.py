@@ -6,19 +6,20 @@ The cube's displacement and its tilt do about the same, each by its field on the
 what a displacement does already.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 from scipy.stats import qmc
 
 from ...dynamics.continuation.branch import Family, frequencies
+from ...dynamics.continuation.frequencies import UNIT, hanging_distance
 from ...dynamics.continuation.slow_drift import SlowTorque
-from ...dynamics.equilibria.equilibrium import EquilibriumError, modes, named_modes, tangent_spaces
+from ...dynamics.equilibria.equilibrium import modes, named_modes, tangent_spaces
 from ...dynamics.motion.effect import Interaction
 from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters
@@ -26,7 +27,6 @@ from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.rotor_effects import Dissipation, brake_slope
 from ...dynamics.motion.state import Parameter, Scales
 from ...fem.cache import TableKind
-from ...fem.harmonics.expressions import CompiledField
 from ...fem.rotor_metal import RotorLosses, cached_rotor_losses
 from ...geometry.common import MAGNET_CONDUCTIVITY, Array
 from ...geometry.magnets import Magnet
@@ -34,9 +34,9 @@ from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.scene.contents import Drag, Scene
 from ...geometry.solids import moved
 from ..cli.options import FieldModel
-from ..result import variable
+from ..result import Columns, columns
 from ..study import Point
-from .article import EDGE, FLOATER, REMANENCE, levitation_of
+from .article import EDGE, FLOATER, REMANENCE, levitation_of, losses
 from .regions import spacer
 
 GRAVITY = 9.81
@@ -44,18 +44,13 @@ PER_MILLIMETRE = 5.0  # Tilt, in degrees, that does about what a millimetre of d
 SPACER = spacer(1e-3)  # The block of steel that balances a cube displaced by 1 mm
 
 
-@dataclass(frozen=True)
-class Kind:
-    """One kind of rotor.
+class Kind(NamedTuple):
+    """One kind of rotor."""
 
-    Parameters
-    ----------
-    box : ends of each input, by name: `on_axis` (°, tilt and displacement of the cube together), `displacement` (mm),
-        `stack` (mm, of the second cube), `radius` (of the floater, over the article's), `weight` (gravity over 9.81)
-    near, far : ends of the way from contact to where the attraction alone carries the weight that is looked at, 0 to 1
-    """
-
+    # Ends of each input, by name: `on_axis` (°, tilt and displacement of the cube together), `displacement` (mm),
+    # `stack` (mm, of the second cube), `radius` (of the floater, over the article's), `weight` (gravity over 9.81)
     box: Mapping[str, tuple[float, float]]
+    # ends of the way from contact to where the attraction alone carries the weight that is looked at, 0 to 1
     near: float
     far: float
 
@@ -94,11 +89,9 @@ QUANTITIES = (
 """Of a node: frequency of the rotor, Hz; ds/dt by the floater's currents and by air, 1/s; distance from the axis, m;
 frequency of the bounce, Hz; growth without losses, 1/s; of two motions the frequency, Hz, and growth by each effect."""
 ITERATIONS, CLOSE = 40, 1e-10
-UNIT = 50.0  # Hz over which the equilibrium moves by about a radius of the floater
-REACH = (11.5e-3, 0.15)  # Distances between which the attraction is looked at, m
-Losses = tuple[Dissipation | None, Dissipation | None]
 OFF = [Parameter.LINEAR_DRAG, Parameter.TILT_DRAG, Parameter.SPIN_DRAG, Parameter.TILT_EDDY, Parameter.SPIN_EDDY]
 AIR, EDDY = OFF[:3], OFF[3:]
+FREE = [0, 1, 3, 4, 5, 6]  # Unknowns of an equilibrium at a given height: place, moment, frequency
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,110 +100,80 @@ class Levitating:
 
     scene: Scene  # without losses
     table: Interaction  # the rotor's field, and what else acts
-    # gives those in the magnets and in the steel, None where they are not asked for; called when something
-    # levitates, so that one process compiles while another computes the losses that both need
-    losses: Callable[[], Losses]
+    metal: Sequence[Dissipation | None]  # losses in the magnets and in the steel, None where they are not asked for
 
     @cached_property
     def rates(self) -> Rates:
         """With the floater's currents and real air among the compiled equations, where their strength is zero."""
         return Rates(with_effects(_lossy(self.scene), self.table))
 
-    @cached_property
-    def _field(self) -> CompiledField:
-        """The table's own expressions, good to 1e-11 at these distances, without moments for what is far away."""
-        return CompiledField(self.table.expressions)
-
-    @property
-    def hanging(self) -> float:
-        """Distance on the axis at which the attraction alone carries the weight, m."""
-        weight = self.scene.floater.mass * abs(float(self.scene.gravity[2])) / self.scene.floater.moment
-
-        def excess(distances: ArrayLike) -> Array:
-            return self._field(np.multiply.outer(distances, [0.0, 0.0, -1.0]))[1][:, 2, 2] - weight
-
-        grid = np.geomspace(*REACH, 60)
-        carried = np.flatnonzero(excess(grid)[:-1] > 0)
-        if not len(carried):
-            raise EquilibriumError("The attraction carries the weight at no distance.")
-        ends = grid[carried[-1] : carried[-1] + 2]
-        return float(brentq(lambda distance: excess([distance])[0], *ends))
-
     def nodes(self, heights: Array, spins: Array) -> Array:
         """Quantities (height, spin, quantity) at distances (n,) m along the axis and body spins; NaN where none is."""
         found = np.full((len(heights), len(spins), len(QUANTITIES)), np.nan)
         for j, spin in enumerate(spins):
-            known: Array | None = None
+            family, known = Family(self.rates, frequencies(self.scene, float(spin)), UNIT), None
             for k in range(len(heights) - 1, -1, -1):
-                known = self._solved(float(heights[k]), float(spin), known)
+                known = self._solved(family, float(heights[k]), float(spin), known)
                 if known is not None:
-                    found[k, j] = self._quantities(known, float(spin))
+                    found[k, j] = self._quantities(family, known)
         return found
 
-    def _solved(self, height: float, spin: float, near: Array | None) -> Array | None:
+    def _solved(self, family: Family, height: float, spin: float, near: Array | None) -> Array | None:
         """Unknowns (7,) of the equilibrium at a height: place and frequency are scaled as in `Family`."""
-        family = Family(self.rates, frequencies(self.scene, spin), UNIT)
-        length = self.scene.floater.radius
-        for guess in (self._guess(height, spin, family), near):
+        for guess in (self._guess(height, spin), near):
             if guess is None:
                 continue
             unknowns = guess.copy()
-            unknowns[2] = -height / length
+            unknowns[2] = -height / self.scene.floater.radius
             for _ in range(ITERATIONS):
-                if not unknowns[6] * family.unit > 1.0:
+                if not unknowns[6] * UNIT > 1.0:
                     break
                 value, slope = family.linear(unknowns[None], np.zeros(1, int))
-                free = [0, 1, 3, 4, 5, 6]
-                step = np.linalg.solve(slope[0][:, free], -value[0])
+                step = np.linalg.solve(slope[0][:, FREE], -value[0])
                 step *= min(1.0, 0.3 / np.abs(step).max())
-                unknowns[free] += step
+                unknowns[FREE] += step
                 unknowns[3:6] /= np.linalg.norm(unknowns[3:6])
                 if np.abs(step).max() < CLOSE:
                     return unknowns if unknowns[5] > 0 else None
         return None
 
-    def _guess(self, height: float, spin: float, family: Family) -> Array | None:
+    def _guess(self, height: float, spin: float) -> Array | None:
         """From the axial force at a place on the axis, which gives the moment's angle, and the torque there."""
-        floater, place = self.scene.floater, np.array([0.0, 0.0, -height])
-        (field,), (slope,) = self._field(place[None])
+        floater = self.scene.floater
+        (field,), (slope,) = self.table.evaluate([[0.0, 0.0, -height]])
         size, turn = np.hypot(slope[0, 2], slope[2, 2]), np.arctan2(slope[0, 2], slope[2, 2])
         cosine = floater.mass * abs(float(self.scene.gravity[2])) / (floater.moment * size)
-        if not cosine < 1:
-            return None
-        for angle in (turn + np.arccos(cosine), turn - np.arccos(cosine)):
+        for angle in (turn + np.arccos(cosine), turn - np.arccos(cosine)) if cosine < 1 else ():
             torque = floater.moment * (np.cos(angle) * field[0] - np.sin(angle) * field[2])
             square = torque / (floater.inertia * np.sin(angle) * (spin - np.cos(angle)))
             if abs(angle) < np.pi / 2 and square > 0:
                 moment = np.array([np.sin(angle), 0.0, np.cos(angle)])
-                pull = floater.moment * moment @ slope[:, 0]
-                place[0] = -pull / (floater.mass * square)
-                frequency = np.sqrt(square) / (2 * np.pi)
-                return np.concatenate([place / floater.radius, moment, [frequency / family.unit]])
+                aside = -floater.moment * moment @ slope[:, 0] / (floater.mass * square)
+                place = np.array([aside, 0.0, -height]) / floater.radius
+                return np.concatenate([place, moment, [np.sqrt(square) / (2 * np.pi) / UNIT]])
         return None
 
-    def _quantities(self, unknowns: Array, spin: float) -> Array:
+    def _quantities(self, family: Family, unknowns: Array) -> Array:
         frequency = float(unknowns[6]) * UNIT
         scene = replace(_lossy(self.scene), frequency=frequency)
         scales, whole = Scales.of(scene), parameters(scene, Scales.of(scene))
         still, eddy, air = (_without(whole, off) for off in (OFF, AIR, EDDY))
-        balance = Family(self.rates, frequencies(self.scene, spin), UNIT).balance(frequency)
-        state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
+        state = family.balance(frequency).states(unknowns[None, :3], unknowns[None, 3:6])
         drift = [SlowTorque(self.rates, values, scene.floater.radius, False)(state[0]) for values in (eddy, air)]
         bare = self.rates(state, still)[1][0]
         slopes = [
             self.rates(state, _without(v, [Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]))[1][0] - bare for v in (eddy, air)
         ]
         there = scales.unpack(state[0])
-        brakes = [np.zeros((12, 12)) if loss is None else brake_slope(loss, scene, there) for loss in self.losses()]
+        brakes = [np.zeros((12, 12)) if loss is None else brake_slope(loss, scene, there) for loss in self.metal]
         small = modes(state[0], bare)
         named = {mode.name: mode.frequency_hz for mode in named_modes(small, scales.time)}
         effects = [slopes[0], *brakes, slopes[1]]
         units = np.array([1 / (2 * np.pi), *[1.0] * len(effects)]) / scales.time
         grown = [units * motion for motion in _first_order(state[0], bare, effects)]
-        return np.array([
-            frequency, *drift, scales.length * np.hypot(*state[0, :2]), named.get("bounce", np.nan),
-            small.growth / scales.time, *grown[0], *grown[1],
-        ])  # fmt: skip
+        circle = scales.length * np.hypot(*state[0, :2])
+        own = (frequency, *drift, circle, named.get("bounce", np.nan), small.growth / scales.time)
+        return np.concatenate([own, *grown])
 
 
 def _first_order(state: Array, slope: Array, added: Sequence[Array]) -> tuple[Array, Array]:
@@ -231,8 +194,7 @@ def _first_order(state: Array, slope: Array, added: Sequence[Array]) -> tuple[Ar
 
 def _lossy(scene: Scene) -> Scene:
     """The scene in real air, its floater conducting."""
-    floater = replace(scene.floater, conductivity=MAGNET_CONDUCTIVITY)
-    return replace(scene, floater=floater, drag=replace(Drag.stokes(floater.radius), air=True))
+    return replace(scene, **losses(scene, rotor=False))
 
 
 def _without(values: Array, off: Sequence[int]) -> Array:
@@ -245,14 +207,18 @@ SPINS = (-0.12, 0.6)  # Ends of the body spins
 SEED, LONGEST_DESIGN = 20250701, 256
 CONTACT = 11.35e-3
 """Distance from which parts of the way are counted, m: that on the axis at which floater and cube touch."""
-Nodes = tuple[Array, float]
-"""What is known of the nodes of a rotor, and how far the attraction alone carries the weight, m."""
 NODES = TableKind("experiment", tuple[Array, float], "Nodes of one rotor in the design of an experiment")
+DESIGN: Columns = {
+    "node": (("height", "body_spin", "quantity"), "see quantity", "what is known of a node"),
+    "hanging": ((), "m", "distance at which the attraction carries the weight"),
+    "part": (("height",), "1", "part of the way from contact to there"),
+    "input": (("name",), "see name", "input of the rotor"),
+}
 
 
 @dataclass(frozen=True, eq=False)
 class CarriedLosses:
-    """The losses of magnets that keep their own currents wherever they are: tables of each at home, carried along."""
+    """The losses of magnets that keep their own currents wherever they are: one table, transformed to each."""
 
     table: RotorLosses  # of a cube about the origin, its axes along the frame's
     magnets: tuple[Magnet, ...]  # the cubes as they are
@@ -277,7 +243,7 @@ def design_inputs(kind: str, number: int) -> dict[str, float]:
 
 
 def design_row(point: Point, cached: bool = True) -> xr.Dataset:
-    """One rotor of a design; from the cache whoever fits a surrogate finds the rotors that others computed.
+    """One rotor of a design; whoever fits a surrogate finds the rotors that others computed in the cache.
 
     Returns
     -------
@@ -289,35 +255,28 @@ def design_row(point: Point, cached: bool = True) -> xr.Dataset:
     spins, steps = np.linspace(*SPINS, point["spins"]), np.arange(point["heights"]) + 0.5
     part = kind.near + (kind.far - kind.near) * (1 - np.cos(np.pi * steps / len(steps))) / 2
 
-    def make() -> Nodes:
+    def make() -> tuple[Array, float]:
         model = point["model"]
         scene = scene_of(inputs, 1.0 if model == "cuboid" else 1.05)
         field: FieldModel = "cuboid" if model == "cuboid" else "fem"
         levitation = levitation_of(scene, field, interaction="mutual" if model == "mutual" else "rigid")
-        floater = Levitating(scene, levitation.interaction, lambda: losses_of(scene, point["steel"]))
-        hanging = floater.hanging
-        return floater.nodes(CONTACT + part * (hanging - CONTACT), spins), float(hanging)
+        floater = Levitating(scene, levitation.interaction, losses_of(scene, point["steel"]))
+        hanging = hanging_distance(scene, levitation.interaction)
+        return floater.nodes(CONTACT + part * (hanging - CONTACT), spins), hanging
 
     nodes, hanging = NODES.cached((point,), make, lambda _: None)[0] if cached else make()
-    return xr.Dataset(
-        {
-            "node": variable(("height", "body_spin", "quantity"), nodes, "see quantity", "what is known of a node"),
-            "hanging": variable((), np.array(hanging), "m", "distance at which the attraction carries the weight"),
-            "part": variable(("height",), part, "1", "part of the way from contact to there"),
-            "input": variable(("name",), np.array(list(inputs.values())), "see name", "input of the rotor"),
-        },
-        {"body_spin": spins, "quantity": list(QUANTITIES), "name": list(inputs)},
-    )
+    found = dict(zip(DESIGN, (nodes, hanging, part, list(inputs.values())), strict=True))
+    return xr.Dataset(columns(DESIGN, found), {"body_spin": spins, "quantity": list(QUANTITIES), "name": list(inputs)})
 
 
 def losses_of(scene: Scene, steel: bool) -> tuple[Dissipation, Dissipation | None]:
     """Losses of a scene's magnets and, if asked for, of the block that balances a displaced cube."""
-    magnet, block = _losses_at_home(scene.rotor[0].recoil_permeability, steel)
+    magnet, block = _canonical_losses(scene.rotor[0].recoil_permeability, steel)
     return CarriedLosses(magnet, scene.rotor), block
 
 
 @cache
-def _losses_at_home(permeability: float, steel: bool) -> tuple[RotorLosses, RotorLosses | None]:
+def _canonical_losses(permeability: float, steel: bool) -> tuple[RotorLosses, RotorLosses | None]:
     """Those of a cube about the origin, and of the block above it."""
     cube = replace(horizontal(0.0, EDGE, REMANENCE, permeability)[0], conductivity=MAGNET_CONDUCTIVITY)
     alone = Scene(100.0, (cube,), FLOATER, Drag(0.0, 0.0))

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -24,13 +25,14 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from ...geometry.common import Array
-from .experiment_design import EFFECTS, KINDS, MOTIONS, PER_MILLIMETRE, QUANTITIES, SPINS, Kind
+from .experiment_design import EFFECTS, KINDS, MOTIONS, PER_MILLIMETRE, QUANTITIES, SPINS
 
 NARROW = ("radius", "weight")
 FITTED = (
     *("frequency", "eddy", "air", "circle", "squared bounce", "precession", "meeting", "lateral"),
     *(f"{motion} {name}" for motion in MOTIONS for name in EFFECTS),
 )  # What is fitted, see `targets`
+PLACE = {name: k for k, name in enumerate(FITTED)}
 STRENGTHS = {"single": (4.0, 13.0), "stack": (2.0, 28.0)}  # Ends of what `strength` may be
 WITH_STRENGTH = -0.78  # The frequency goes about as this power of it
 FASTEST = 300.0  # Nodes of faster rotors are left out, Hz: no fact asks for more than 200
@@ -39,29 +41,23 @@ APART = 0.03, 0.004
 """Squared distances of bounce and side motion from precession, over the frequency, from which on growth is its own."""
 
 
-PLACE = {name: k for k, name in enumerate(FITTED)}
-
-
 def strength(name: str, inputs: Array) -> Array:
     """How strong the field on the axis is (n,), as the tilt (°) of a lone cube that levitates at the same frequency.
 
     Inputs (n, input) are those of the kind of rotor of this name.  The field of a second cube falls off as its distance
     grows; fitted to 10, 14 and 20 mm, good to 5 %.
     """
-    names = list(KINDS[name].box)
-    found = inputs[:, names.index("on_axis")]
-    if "stack" in names:
-        found = found + 13.5 * np.exp(-0.112 * (inputs[:, names.index("stack")] - 14.0))
-    return np.asarray(np.clip(found, *STRENGTHS[name]))
+    known = dict(zip(KINDS[name].box, inputs.T, strict=True))
+    second = 13.5 * np.exp(-0.112 * (known["stack"] - 14.0)) if "stack" in known else 0.0
+    return np.asarray(np.clip(known["on_axis"] + second, *STRENGTHS[name]))
 
 
 def coordinates(name: str, inputs: Array) -> Array:
     """Inputs (n, input) between -1 and 1, the field on the axis by the logarithm of its strength."""
-    ends = np.array(list(KINDS[name].box.values()))
-    scaled = (2 * inputs - ends.sum(axis=1)) / (ends[:, 1] - ends[:, 0])
-    low, high = np.log(STRENGTHS[name])
-    scaled[:, list(KINDS[name].box).index("on_axis")] = _scaled(np.log(strength(name, inputs)), (low, high))
-    return np.asarray(scaled)
+    box = KINDS[name].box
+    scaled = _scaled(inputs, np.array(list(box.values())).T)
+    scaled[:, list(box).index("on_axis")] = _scaled(np.log(strength(name, inputs)), np.log(STRENGTHS[name]))
+    return scaled
 
 
 def targets(name: str, design: xr.Dataset) -> Array:
@@ -108,12 +104,10 @@ def targets(name: str, design: xr.Dataset) -> Array:
     return whole
 
 
-def exponents(kind: Kind, degree: int) -> Array:
+def exponents(name: str, degree: int) -> Array:
     """Degrees (term, input + 2) of the terms of a surrogate: in each input, the part of the way and the spin."""
-    names = (*kind.box, "part", "spin")
-    narrow = np.array([name in NARROW for name in names])
-    ranges = [range(2) if few else range(degree + 1) for few in narrow]
-    every = np.array([d for d in product(*ranges) if sum(d) <= degree])
+    narrow = np.array([one in NARROW for one in (*KINDS[name].box, "part", "spin")])
+    every = np.array([d for d in product(*(range(2 if few else degree + 1) for few in narrow)) if sum(d) <= degree])
     few = every[:, narrow].sum(axis=1)
     return np.asarray(every[(few == 0) | ((few == 1) & (every.sum(axis=1) <= max(1, degree - 2)))])
 
@@ -128,20 +122,13 @@ class Surrogate:
     errors: Array  # (fitted,) root mean square of what rotors left out are missed by
     rotors: int  # how many it is fitted to
 
-    @property
-    def kind(self) -> Kind:
-        """The box in which it holds."""
-        return KINDS[self.name]
-
     def along(self, inputs: Array, part: Array) -> Array:
         """Coefficients (spin power, n, k, fitted) of the polynomials in spin alone: inputs (n, input), parts (k,)."""
-        scaled, count = coordinates(self.name, inputs), self._spread.shape[1]
-        powers = legvander(scaled, int(self.terms.max()))
-        picked = np.ones((len(inputs), len(self.terms)))
-        for k in range(inputs.shape[1]):
-            picked = picked * powers[:, k, self.terms[:, k]]
-        reduced = picked @ self._spread.reshape(len(self.terms), -1)
-        along = legvander(_scaled(part, (self.kind.near, self.kind.far)), count - 1)
+        count = self._spread.shape[1]
+        reduced = _products(coordinates(self.name, inputs), self.terms[:, :-2]) @ self._spread.reshape(
+            len(self.terms), -1
+        )
+        along = legvander(_scaled(part, KINDS[self.name][1:]), count - 1)
         found = along @ reduced.reshape(len(inputs), count, -1)
         return np.moveaxis(found.reshape(len(inputs), len(part), -1, len(FITTED)), 2, 0)
 
@@ -162,50 +149,49 @@ def at_spin(along: Array, spin: Array) -> Array:
 
 def fitted(name: str, design: xr.Dataset, degree: int) -> Surrogate:
     """The surrogate of a design, a dataset over `rotor`, `height`, `body_spin` and `quantity`."""
-    return _of(name, design, targets(name, design), exponents(KINDS[name], degree))
+    return _fit(name, design, targets(name, design), exponents(name, degree))
 
 
 def corrected(surrogate: Surrogate, design: xr.Dataset, better: xr.Dataset, degree: int) -> Surrogate:
     """A surrogate with what the nodes of a better model differ by, fitted to the rotors that both designs have."""
-    name, count = surrogate.name, min(design.sizes["rotor"], better.sizes["rotor"])
-    difference = targets(name, better.isel(rotor=slice(count))) - targets(name, design.isel(rotor=slice(count)))
-    more = _of(name, better.isel(rotor=slice(count)), difference, exponents(surrogate.kind, degree))
+    name, both = surrogate.name, slice(min(design.sizes["rotor"], better.sizes["rotor"]))
+    difference = targets(name, better.isel(rotor=both)) - targets(name, design.isel(rotor=both))
+    more = _fit(name, better.isel(rotor=both), difference, exponents(name, degree))
     terms, where = np.unique(np.concatenate([surrogate.terms, more.terms]), axis=0, return_inverse=True)
     weights = np.zeros((len(terms), len(FITTED)))
     np.add.at(weights, where.ravel(), np.concatenate([surrogate.weights, more.weights]))
     return Surrogate(name, terms, weights, np.hypot(surrogate.errors, more.errors), surrogate.rotors)
 
 
-def _of(name: str, design: xr.Dataset, wanted: Array, terms: Array) -> Surrogate:
-    kind, inputs, shape = KINDS[name], design["input"].values, wanted.shape[:-1]
-    columns = np.empty((*shape, terms.shape[1]))
-    columns[..., :-2] = coordinates(name, inputs)[:, None, None, :]
-    columns[..., -2] = _scaled(design["part"].values, (kind.near, kind.far))[:, :, None]
-    columns[..., -1] = _scaled(design["body_spin"].values, SPINS)
-    powers = legvander(columns, int(terms.max()))
-    matrix = np.prod([powers[..., k, terms[:, k]] for k in range(terms.shape[1])], axis=0)
+def _fit(name: str, design: xr.Dataset, wanted: Array, terms: Array) -> Surrogate:
+    kind, inputs = KINDS[name], design["input"].values
+    own = (coordinates(name, inputs)[:, None, None, k] for k in range(inputs.shape[1]))
+    part, spin = _scaled(design["part"].values, kind[1:])[:, :, None], _scaled(design["body_spin"].values, SPINS)
+    matrix = _products(np.stack(np.broadcast_arrays(*own, part, spin), axis=-1), terms)
     weights, errors = np.zeros((len(terms), len(FITTED))), np.zeros(len(FITTED))
     for k in range(len(FITTED)):
         known = np.isfinite(wanted[..., k])
-        if known.any():
-            weights[:, k], errors[k] = _least_squares(matrix[known], wanted[..., k][known], np.nonzero(known)[0])
+        if not known.any():
+            continue
+        rows, values, rotor = matrix[known], wanted[..., k][known], np.nonzero(known)[0]
+        orthogonal, triangle = np.linalg.qr(rows)
+        weights[:, k] = np.linalg.solve(triangle, orthogonal.T @ values)
+        missed = values - rows @ weights[:, k]
+        for left_out in np.unique(rotor):
+            out = rotor == left_out
+            missed[out] = np.linalg.solve(np.eye(out.sum()) - orthogonal[out] @ orthogonal[out].T, missed[out])
+        errors[k] = np.sqrt(np.mean(missed**2))
     return Surrogate(name, terms, weights, errors, len(inputs))
 
 
-def _least_squares(rows: Array, values: Array, rotor: NDArray[np.intp]) -> tuple[Array, float]:
-    """Weights (term,), and the root mean square of what is missed of rotors that are left out."""
-    orthogonal, triangle = np.linalg.qr(rows)
-    weights = np.linalg.solve(triangle, orthogonal.T @ values)
-    missed = values - rows @ weights
-    for k in np.unique(rotor):
-        own = rotor == k
-        share = orthogonal[own] @ orthogonal[own].T
-        missed[own] = np.linalg.solve(np.eye(own.sum()) - share, missed[own])
-    return weights, float(np.sqrt(np.mean(missed**2)))
+def _products(values: Array, terms: Array) -> Array:
+    """Products (..., term) of Legendre polynomials of `values` (..., k), whose degrees are `terms` (term, k)."""
+    powers = legvander(values, int(terms.max()))
+    return np.prod([powers[..., k, terms[:, k]] for k in range(terms.shape[1])], axis=0)
 
 
-def _scaled(values: Array, ends: tuple[float, float]) -> Array:
-    return (2 * values - ends[0] - ends[1]) / (ends[1] - ends[0])
+def _scaled(values: Array, ends: Sequence[float] | Array) -> Array:
+    return np.asarray((2 * values - ends[0] - ends[1]) / (ends[1] - ends[0]))
 
 
 STEPS = 40  # Places on the way to the fold
@@ -240,70 +226,55 @@ def simulated(
     circle : (n,) distance from the axis at release, m
     clock, folds : (n, k) times on the way, s, and e-folds up to them
     """
-    longest = longest[:, None]
-    part = np.linspace(surrogate.kind.near, surrogate.kind.far, STEPS)
+    longest, air = longest[:, None], 1e-3 * strengths[:, 3:]
+    part = np.linspace(*KINDS[surrogate.name][1:], STEPS)
     along = surrogate.along(inputs, part)
-    usual = WITH_STRENGTH * np.log(strength(surrogate.name, inputs))
-    spins = _spins(along[..., PLACE["frequency"]], part, np.log(frequency) - usual)
+    pitch = np.log(frequency) - WITH_STRENGTH * np.log(strength(surrogate.name, inputs))
+    spins = np.full((len(inputs), STEPS), 0.1)  # at which a floater levitates at each part of the way
+    for _ in range(TURNS):
+        excess = at_spin(along[..., PLACE["frequency"]], np.clip(spins, *SPINS)) - pitch[:, None]
+        spins = 1 - np.exp(2 * excess) / (1 - part)
     rest = 1 - np.clip(spins, *SPINS)
-    known = at_spin(along, 1 - rest)
-    eddy = rest * np.exp(known[..., PLACE["eddy"]])
+    known = dict(zip(FITTED, np.moveaxis(at_spin(along, 1 - rest), -1, 0), strict=True))
+    eddy = rest * np.exp(known["eddy"])
     top = np.argmax(spins, axis=1)
     highest = np.take_along_axis(spins, top[:, None], 1)[:, 0]
     # The spin grows with the drift; the way ends where no place has a larger one: at the fold.
     way = np.diff(np.clip(spins, np.minimum(spin, highest)[:, None], None), axis=1)
     way = np.where(np.arange(1, STEPS) <= top[:, None], np.maximum(way, 0.0), 0.0)
-    drift = _middle(strengths[:, :1] * eddy + 1e-3 * strengths[:, 3:] * known[..., PLACE["air"]])
+    drift = _middle(strengths[:, :1] * eddy + air * known["air"])
     time = np.cumsum(way / np.maximum(drift, SLOWEST), axis=1)
     begun = np.concatenate([np.zeros((len(time), 1)), time[:, :-1]], axis=1)
     spent = np.clip(np.minimum(time, longest) - begun, 0.0, None)
     flying = (way > 0) & (begun < longest)
     # What growth of each small motion is fitted over, see `targets`.
-    lateral = np.sqrt(np.maximum(known[..., PLACE["lateral"]], NARROWEST))
-    over = {"precession": eddy, "side": eddy / rest / lateral}
-    growths = [_growth(surrogate, known, over[motion], strengths, motion) for motion in MOTIONS]
-    each = np.stack([np.cumsum(np.maximum(_middle(growth), 0.0) * spent, axis=1) for growth, _ in growths])
-    folds, which = each.max(axis=0), np.argmax(each[:, :, -1], axis=0)
-    doubts = np.stack([np.sum(_middle(doubt) * spent, axis=1) for _, doubt in growths])
-    met = flying & (_middle(np.minimum(known[..., PLACE["meeting"]], known[..., PLACE["lateral"]])) < 0)
-    met |= flying & _two_bounces(known, frequency, np.minimum(spent, longest))
+    lateral = np.sqrt(np.maximum(known["lateral"], NARROWEST))
+    each, doubts = [], []
+    for motion, over in zip(MOTIONS, (eddy, eddy / rest / lateral), strict=True):
+        names = [f"{motion} {name}" for name in EFFECTS]
+        sizes = [*(over * strength[:, None] for strength in strengths.T[:-1]), air]
+        growth = sum(size * known[name] for size, name in zip(sizes, names, strict=True))
+        error = sum((size * surrogate.errors[PLACE[name]]) ** 2 for size, name in zip(sizes, names, strict=True))
+        each.append(np.cumsum(np.maximum(_middle(growth), 0.0) * spent, axis=1))
+        doubts.append(np.sum(_middle(np.sqrt(error)) * spent, axis=1))
+    folds, which = np.max(each, axis=0), np.argmax([one[:, -1] for one in each], axis=0)
+    # Two bounces come to take as long as a precession, and stay so for long enough.
+    twice = 2 * np.sqrt(np.maximum(known["squared bounce"], 0.0))
+    apart = (twice - known["precession"]) * frequency[:, None]
+    lingers = np.minimum(spent, longest) * 2 * WINDOW / np.maximum(np.abs(np.diff(apart, axis=1)), WINDOW) > DWELL
+    met = (apart[:, 1:] * apart[:, :-1] < 0) & lingers
+    met = flying & (met | (_middle(np.minimum(known["meeting"], known["lateral"])) < 0))
     balanced = (np.where(way > 0, drift, np.inf) <= SLOWEST).any(axis=1)
     return {
         "margin": 0.5 * np.log((1 - np.minimum(spin, 0.9)) / np.maximum(1 - highest, 0.05)),
         "fall": np.where(balanced, np.inf, time[:, -1]),
         "growth": folds[:, -1],
-        "doubt": np.take_along_axis(doubts, which[None], 0)[0],
+        "doubt": np.take_along_axis(np.array(doubts), which[None], 0)[0],
         "shaken": np.where(met.any(axis=1), _first(begun, met), np.inf),
-        "circle": np.exp(_first(known[:, :-1, PLACE["circle"]], way > 0)),
+        "circle": np.exp(_first(known["circle"][:, :-1], way > 0)),
         "clock": np.minimum(time, longest),
         "folds": folds,
     }
-
-
-def _lasts(course: Course, needed: Array) -> Array:
-    """Time (n,) s until the fold, or until small motions have grown by `needed` (n,) e-folds or met; or the end."""
-    over = course["folds"] >= needed[:, None]
-    loose = np.where(over.any(axis=1), _first(course["clock"], over), np.inf)
-    return np.asarray(np.minimum(np.minimum(course["fall"], course["shaken"]), loose))
-
-
-def _growth(surrogate: Surrogate, known: Array, over: Array, strengths: Array, motion: str) -> tuple[Array, Array]:
-    """Growth of a small motion, and its error by the surrogate's (n, k), 1/s."""
-    first, air = (PLACE[f"{motion} {name}"] for name in (EFFECTS[0], EFFECTS[-1]))
-    currents, errors = strengths[:, :-1], surrogate.errors[first:air]
-    growth = over * (known[..., first:air] @ currents[..., None])[..., 0]
-    growth += 1e-3 * strengths[:, -1:] * known[..., air]
-    still = (1e-3 * strengths[:, -1:] * surrogate.errors[air]) ** 2
-    return growth, np.sqrt(over**2 * ((currents * errors) ** 2).sum(axis=1)[:, None] + still)
-
-
-def _two_bounces(known: Array, frequency: Array, spent: Array) -> NDArray[np.bool_]:
-    """Where (n, k - 1) two bounces come to take as long as a precession, and stay so for long enough."""
-    bounce = np.sqrt(np.maximum(known[..., PLACE["squared bounce"]], 0.0))
-    apart = (2 * bounce - known[..., PLACE["precession"]]) * frequency[:, None]
-    change = np.abs(np.diff(apart, axis=1))
-    long = spent * 2 * WINDOW / np.maximum(change, WINDOW) > DWELL
-    return np.asarray((apart[:, 1:] * apart[:, :-1] < 0) & long)
 
 
 def _first(values: Array, where: NDArray[np.bool_]) -> Array:
@@ -311,19 +282,12 @@ def _first(values: Array, where: NDArray[np.bool_]) -> Array:
     return np.asarray(np.take_along_axis(values, np.argmax(where, axis=1)[:, None], 1)[:, 0])
 
 
-def _spins(along: Array, part: Array, pitch: Array) -> Array:
-    """Body spin (n, k) at which a floater levitates at each part of the way; `pitch` (n,) as the fitted frequency."""
-    spin = np.full((len(pitch), len(part)), 0.1)
-    for _ in range(TURNS):
-        spin = 1 - np.exp(2 * (at_spin(along, np.clip(spin, *SPINS)) - pitch[:, None])) / (1 - part)
-    return spin
-
-
 def _middle(values: Array) -> Array:
     return (values[:, 1:] + values[:, :-1]) / 2
 
 
 UNFORESEEN = 0.02  # Probability that a flight's end has a reason outside of the model
+WAYS = 4  # In which a flight may end
 LARGE = 3e-3  # Motion with which a floater is lost, m
 SCATTER = 0.7  # Of the logarithm of the residual motion from flight to flight
 TIMES = 0.1  # Of the logarithm of computed times
@@ -337,7 +301,6 @@ Flight = tuple[str, float, float, float]  # Kind of rotor, its δx or δz (mm), 
 Known = Mapping[Flight, Course]
 PARTS = (("floater", "floater"), ("magnets", "rotor"), ("steel", "rotor"), ("air", "air"))
 """Strengths, and the effect that each belongs to."""
-STACK = {"displacement": "stack_displacement", "tilt": "stack_tilt", "stack": "stack"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,15 +313,9 @@ class Models:
     def conditions(self, values: Values, flight: Flight) -> tuple[Array, ...]:
         """One flight of each of the rotors with drawn unknowns, as `simulated` takes them."""
         kind, distance, frequency, longest = flight
-        rotor, known, surrogate = _rotor(values, kind, distance), likeness(values), self.surrogates[kind]
-        displacement = rotor["displacement"] / known["edge"]
-        every = {
-            "displacement": displacement, "on_axis": rotor["tilt"] + PER_MILLIMETRE * displacement,
-            "radius": known["radius"], "weight": known["weight"],
-        }  # fmt: skip
-        if "stack" in rotor:
-            every["stack"] = rotor["stack"] / known["edge"]
-        box = surrogate.kind.box
+        rotor, known, box = _rotor(values, kind, distance), likeness(values), KINDS[kind].box
+        scaled = {name: rotor[name] / known["edge"] for name in ("displacement", "stack") if name in rotor}
+        every = {**known, **scaled, "on_axis": rotor["tilt"] + PER_MILLIMETRE * scaled["displacement"]}
         inputs = np.stack([np.clip(every[name], *box[name]) for name in box], axis=1)
         strengths = np.stack([known[name] * (part in self.effects) for name, part in PARTS], axis=1)
         return inputs, frequency * known["frequency"], values["spin"], strengths, np.full(len(inputs), longest)
@@ -368,24 +325,30 @@ class Models:
         return float(self.surrogates[kind].errors[PLACE[quantity]])
 
 
-def ends(models: Models, kind: str, course: Course, values: Values, longest: float = LONGEST) -> dict[str, Array]:
+def ends(models: Models, flight: Flight, course: Course, values: Values) -> dict[str, Array]:
     """Probabilities (n,) of how flights end: "nothing" (no equilibrium), "falls", "stays", "oscillates".
 
     Parameters
     ----------
-    models, kind : surrogates, and the kind of rotor
-    course : what becomes of the flights
+    models : surrogates
+    flight, course : kind of rotor and longest time; what becomes of the flights
     values : the unknowns (n,)
-    longest : how long they are followed, s
     """
+    kind, _, _, longest = flight
     there = ndtr(course["margin"] / np.hypot(models.error(kind, "frequency"), SOFT))
-    error = np.hypot(TIMES, models.error(kind, "eddy"))
     grown = ndtr((course["growth"] - needed(values)) / np.hypot(SCATTER, course["doubt"]))
-    fall, shaken = (np.log(np.clip(course[name], 1e-3, 1e9)) for name in ("fall", "shaken"))
-    loose = 1 - (1 - grown) * (1 - ndtr((np.log(longest) - shaken) / error))
-    falls = ndtr((np.log(longest) - fall) / error)
-    up = there * (1 - loose)
+    loose = 1 - (1 - grown) * (1 - _before(models, kind, course["shaken"], longest))
+    falls, up = _before(models, kind, course["fall"], longest), there * (1 - loose)
     return {"nothing": 1 - there, "falls": up * falls, "stays": up * (1 - falls), "oscillates": there * loose}
+
+
+def _before(models: Models, kind: str, time: Array, limit: float) -> Array:
+    """Probability (n,) that something computed for `time` (n,) happens before a limit, s."""
+    return np.asarray(ndtr((np.log(limit) - _logarithm(time)) / np.hypot(TIMES, models.error(kind, "eddy"))))
+
+
+def _logarithm(time: Array) -> Array:
+    return np.log(np.clip(time, 1e-3, 1e9))
 
 
 def needed(values: Values) -> Array:
@@ -402,16 +365,20 @@ def _rotor(values: Values, kind: str, distance: float) -> dict[str, Array]:
         along = np.cos(np.radians(values["direction"]))
         return {"displacement": values["displacement"] * along, "tilt": values["tilt"]}
     if distance == 14.0:
-        return {name: values[of] for name, of in STACK.items()}
+        own = {"displacement": "stack_displacement", "tilt": "stack_tilt", "stack": "stack"}
+        return {name: values[of] for name, of in own.items()}
     every = values[f"tilt_{distance:g}"]
     return {"displacement": 0 * every, "tilt": every, "stack": np.full_like(every, distance)}
 
 
 def log_likelihoods(models: Models, values: Values, facts: Mapping[str, Fact]) -> dict[str, Array]:
     """Logarithm of the likelihood (n,) of each of the facts, for unknowns (n,) by name."""
-    flights = dict.fromkeys(flight for fact in facts.values() for flight in fact.flights)
-    known = courses(models, values, tuple(flights))
-    return {name: np.log(fact.likelihood(models, values, known)) for name, fact in facts.items()}
+    known = courses(models, values, tuple(dict.fromkeys(flight for fact in facts.values() for flight in fact.flights)))
+    # now and then a fact has a reason outside of the model
+    return {
+        name: np.log((1 - UNFORESEEN) * fact.likelihood(models, values, known) + UNFORESEEN / WAYS)
+        for name, fact in facts.items()
+    }
 
 
 def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[Flight, Course]:
@@ -430,8 +397,7 @@ def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[F
 Likelihood = Callable[[Models, Values, Known], Array]
 
 
-@dataclass(frozen=True)
-class Fact:
+class Fact(NamedTuple):
     """One reported fact."""
 
     says: str  # what is reported
@@ -442,60 +408,55 @@ class Fact:
 LOW, MIDDLE, HIGH, BEYOND = (("single", 1.0, frequency, LONGEST) for frequency in (115.0, 140.0, 150.0, 165.0))
 ENDLESS = ("stack", 14.0, 60.0, DAY)
 LOWEST = ("stack", 10.0, 50.0, LONGEST)
-NEVER = {distance: ("stack", distance, 200.0, LONGEST) for distance in (18.0, 20.0)}
-
-
-def robust(probability: Array, ways: int = 4) -> Array:
-    """The probability, if now and then a fact has a reason outside of the model."""
-    return (1 - UNFORESEEN) * probability + UNFORESEEN / ways
 
 
 def ended(flight: Flight, way: str, lasted: float | None = None) -> Likelihood:
-    """That a flight ended in one of the ways of `Ends`, and for a fall after which time (s), if it is known."""
+    """That a flight ended in one of the ways of `ends`, and for a fall after which time (s), if it is known."""
 
     def likelihood(models: Models, values: Values, known: Known) -> Array:
-        found = ends(models, flight[0], known[flight], values, flight[3])[way]
+        found = ends(models, flight, known[flight], values)[way]
         if lasted is None:
-            return robust(found)
-        distance = np.log(np.clip(known[flight]["fall"], 1e-3, 1e9) / lasted)
-        return robust(found * np.exp(-0.5 * (distance / TOLD) ** 2))
+            return found
+        return found * np.exp(-0.5 * ((_logarithm(known[flight]["fall"]) - np.log(lasted)) / TOLD) ** 2)
 
     return likelihood
 
 
 def _falls(models: Models, values: Values, known: Known) -> Array:
-    error = np.hypot(TIMES, models.error("single", "eddy"))
-    long_enough = ndtr((np.log(np.clip(known[LOW]["fall"], 1e-3, 1e9)) - np.log(SHORTEST)) / error)
-    return robust(ends(models, "single", known[LOW], values)["falls"] * long_enough)
-
-
-def _lowest(models: Models, values: Values, known: Known) -> Array:
-    return robust(1 - ends(models, "stack", known[LOWEST], values)["nothing"])
+    long_enough = 1 - _before(models, "single", known[LOW]["fall"], SHORTEST)
+    return ends(models, LOW, known[LOW], values)["falls"] * long_enough
 
 
 def _third(models: Models, values: Values, known: Known) -> Array:
     ratio = 115.0 / 50.0 * np.exp(known[LOWEST]["margin"] - known[LOW]["margin"])
-    return robust(np.exp(-0.5 * ((ratio - 3.0) / 0.3) ** 2))
+    return np.asarray(np.exp(-0.5 * ((ratio - 3.0) / 0.3) ** 2))
 
 
 def _circle(models: Models, values: Values, known: Known) -> Array:
     inside = [1e3 * known[flight]["circle"] for flight in (MIDDLE, ENDLESS)]
     each = [ndtr((a - 0.1) / 0.03) * ndtr((0.3 - a) / 0.03) for a in inside]
-    return robust(each[0] * each[1])
+    return np.asarray(each[0] * each[1])
 
 
 def _peak(models: Models, values: Values, known: Known) -> Array:
     """The time falls off faster above 140 Hz than it rises below: 25 Hz above it is shorter than 25 Hz below."""
-    times = [np.log(np.clip(_lasts(known[flight], needed(values)), 1.0, LONGEST)) for flight in (LOW, BEYOND)]
-    return robust(ndtr((times[0] - times[1]) / 0.3))
+    times = []
+    for course in (known[LOW], known[BEYOND]):
+        over = course["folds"] >= needed(values)[:, None]
+        loose = np.where(over.any(axis=1), _first(course["clock"], over), np.inf)
+        lasts = np.minimum(np.minimum(course["fall"], course["shaken"]), loose)
+        times.append(np.log(np.clip(lasts, 1.0, LONGEST)))
+    return np.asarray(ndtr((times[0] - times[1]) / 0.3))
 
 
-def _never(distance: float) -> Likelihood:
+def _never(distance: float) -> Fact:
+    flight = ("stack", distance, 200.0, LONGEST)
+
     def likelihood(models: Models, values: Values, known: Known) -> Array:
-        nothing = ends(models, "stack", known[NEVER[distance]], values)["nothing"]
-        return robust(nothing + (1 - nothing) * NOT_CAUGHT)
+        nothing = ends(models, flight, known[flight], values)["nothing"]
+        return nothing + (1 - nothing) * NOT_CAUGHT
 
-    return likelihood
+    return Fact(f"δz = {distance:g} mm never levitated (up to 200 Hz)", (flight,), likelihood)
 
 
 FACTS = {
@@ -503,7 +464,11 @@ FACTS = {
     "stays at 140 Hz": Fact("δx = 1 mm stays at 140 Hz for 250 s", (MIDDLE,), ended(MIDDLE, "stays")),
     "oscillates at 150 Hz": Fact("δx = 1 mm is lost in oscillations at 150 Hz", (HIGH,), ended(HIGH, "oscillates")),
     "24 h at 60 Hz": Fact("δz = 14 mm flew for 24 hours at 60 Hz", (ENDLESS,), ended(ENDLESS, "stays")),
-    "below 50 Hz": Fact("levitation below 50 Hz (δz = 10 mm)", (LOWEST,), _lowest),
+    "below 50 Hz": Fact(
+        "levitation below 50 Hz (δz = 10 mm)",
+        (LOWEST,),
+        lambda models, values, known: 1 - ends(models, LOWEST, known[LOWEST], values)["nothing"],
+    ),
     "a third": Fact(
         "the lowest frequency is lowered by a factor of 3 (δz = 10 mm against δx = 1 mm)", (LOW, LOWEST), _third
     ),
@@ -511,16 +476,15 @@ FACTS = {
     "side circle": Fact(
         "side circle of 0.1 to 0.3 mm (δx = 1 mm at 140 Hz, δz = 14 mm at 60 Hz)", (MIDDLE, ENDLESS), _circle
     ),
-    "never at 18 mm": Fact("δz = 18 mm never levitated (up to 200 Hz)", (NEVER[18.0],), _never(18.0)),
-    "never at 20 mm": Fact("δz = 20 mm never levitated (up to 200 Hz)", (NEVER[20.0],), _never(20.0)),
+    "never at 18 mm": _never(18.0),
+    "never at 20 mm": _never(20.0),
 }
 QUICK_FACTS = tuple(FACTS)[:4]
 EVEN, NORMAL, POSITIVE = "even", "normal", "positive"
 """Kinds of priors: even between two ends; normal with mean and deviation; logarithm normal, by median and deviation."""
 
 
-@dataclass(frozen=True)
-class Unknown:
+class Unknown(NamedTuple):
     """One number that is not known."""
 
     name: str  # its name in results, its unit, and what figures call it
@@ -531,20 +495,15 @@ class Unknown:
     second: float
     why: str  # where the range comes from
 
-    def at(self, share: Array) -> Array:
-        """The value below which a share (n,) of the prior lies."""
-        if self.prior == EVEN:
-            return np.asarray(self.first + (self.second - self.first) * share)
-        deviates = ndtri(share)
-        if self.prior == NORMAL:
-            return np.asarray(self.first + self.second * deviates)
-        return np.asarray(self.first * np.exp(self.second * deviates))
+
+def quantile(prior: str, first: float, second: float, share: Array) -> Array:
+    """The value below which a share (n,) of a prior lies, see `Unknown`."""
+    if prior == EVEN:
+        return np.asarray(first + (second - first) * share)
+    deviation = second * ndtri(share)
+    return np.asarray(first + deviation if prior == NORMAL else first * np.exp(deviation))
 
 
-COATED = "of the floater's currents: copper and nickel add up to a half"
-STEEL = "its losses over those of the balancing block: amount unknown"
-LEFT = "left of the launch when the plate is down: 1 to 100 µm"
-TEN = "of the stack of 10 mm, displacement and tilt together"
 UNKNOWNS = (
     Unknown("displacement", "mm", "δx", NORMAL, 1.0, 0.3, "1 mm stated; 'sub-millimeter precision is required'"),
     Unknown("tilt", "deg", "tilt of δx", NORMAL, 0.0, 2.0, "printed holder, glue, and magnetisation against the cube"),
@@ -558,11 +517,23 @@ UNKNOWNS = (
     Unknown("edge", "mm", "edge", NORMAL, 10.0, 0.05, "makers: 0.1 mm"),
     Unknown("diameter", "mm", "diameter", NORMAL, 12.7, 0.05, "makers: 0.1 mm"),
     Unknown("magnets", "S/m", "σ magnets", POSITIVE, 6.7e5, 0.15, "makers: 6.2e5 to 9e5"),
-    Unknown("floater", "1", "floater's σ (plating)", POSITIVE, 1.2, 0.15, COATED),
-    Unknown("steel", "1", "steel over block", POSITIVE, 1.0, 1.0, STEEL),
-    Unknown("motion", "um", "residual motion", POSITIVE, 5.0, 1.2, LEFT),
+    Unknown(
+        *("floater", "1", "floater's σ (plating)", POSITIVE, 1.2, 0.15),
+        "of the floater's currents: copper and nickel add up to a half",
+    ),
+    Unknown(
+        *("steel", "1", "steel over block", POSITIVE, 1.0, 1.0),
+        "its losses over those of the balancing block: amount unknown",
+    ),
+    Unknown(
+        *("motion", "um", "residual motion", POSITIVE, 5.0, 1.2),
+        "left of the launch when the plate is down: 1 to 100 µm",
+    ),
     Unknown("spin", "1", "spin at release", NORMAL, 0.02, 0.05, "at release: 0 to 0.05 in settling over the plate"),
-    Unknown("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5, TEN),
+    Unknown(
+        *("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5),
+        "of the stack of 10 mm, displacement and tilt together",
+    ),
     Unknown("tilt_18", "deg", "tilt at 18 mm", NORMAL, 0.0, 2.5, "of that of 18 mm"),
     Unknown("tilt_20", "deg", "tilt at 20 mm", NORMAL, 0.0, 2.5, "of that of 20 mm"),
     Unknown("lean", "deg", "tilt of the shaft", NORMAL, 0.0, 3.0, "of the shaft"),
@@ -570,9 +541,9 @@ UNKNOWNS = (
 NAMES = tuple(unknown.name for unknown in UNKNOWNS)
 
 
-def prior_values(shares: Array, unknowns: Sequence[Unknown] = UNKNOWNS) -> dict[str, Array]:
+def prior_values(shares: Array) -> dict[str, Array]:
     """Values (n,) by name at points (n, unknown) of the unit cube."""
-    return {unknown.name: unknown.at(shares[:, k]) for k, unknown in enumerate(unknowns)}
+    return {u.name: quantile(u.prior, u.first, u.second, share) for u, share in zip(UNKNOWNS, shares.T, strict=True)}
 
 
 def likeness(values: Mapping[str, Array]) -> dict[str, Array]:

@@ -37,6 +37,7 @@ from spinlev.studies.catalogue.experiment_design import (
 from spinlev.studies.catalogue.experiment_model import (
     FACTS,
     FITTED,
+    MIDDLE,
     NAMES,
     UNKNOWNS,
     Models,
@@ -62,8 +63,9 @@ INPUTS = {"on_axis": 7.3, "displacement": 1.0, "radius": 1.0, "weight": 1.0}
 def test_nodes_are_the_equilibria_of_the_branch_and_their_growth_that_of_its_points(metal):
     """Frequencies against the branch followed by arc length; first-order growth against eigenvalues with the losses."""
     scene = scene_of(INPUTS)
-    losses = partial(losses_of, scene, False) if metal else lambda: (None, None)
-    floater = Levitating(scene, levitation_of(scene, "cuboid").interaction, losses)
+    floater = Levitating(
+        scene, levitation_of(scene, "cuboid").interaction, losses_of(scene, False) if metal else (None, None)
+    )
     branch = levitating_branch(scene, floater.table, floater.rates, 200.0)
     point = branch.side("near", np.array([150.0]))[0]
     node = dict(zip(QUANTITIES, floater.nodes(-point.position[2:], np.zeros(1))[0, 0], strict=True))
@@ -122,7 +124,7 @@ def test_the_stated_error_is_that_of_rotors_left_out_one_by_one():
     design = _polynomial_design("single", 14, 2)
     bent = design.assign(node=design["node"] * (1 + 0.01 * np.sin(40 * design["input"].isel(name=1, drop=True))))
     whole, place = fitted("single", bent, 2), FITTED.index("frequency")
-    terms = exponents(KINDS["single"], 2)
+    terms = exponents("single", 2)
     missed = []
     for k in range(14):
         others = fitted("single", bent.isel(rotor=[j for j in range(14) if j != k]), 2)
@@ -175,7 +177,7 @@ def test_ends_of_flights_are_probabilities_that_add_to_one():
     margin, fall, growth = np.array([0.1, 0.1, -0.1]), np.array([20.0, np.inf, 5.0]), np.array([3.0, 9.0, 0.0])
     course = {"margin": margin, "fall": fall, "growth": growth, "doubt": rest, "shaken": np.full(3, np.inf)}
     surrogate = Surrogate("single", np.zeros((1, 6), int), np.zeros((1, len(FITTED))), np.full(len(FITTED), 0.01), 1)
-    found = ends(Models({"single": surrogate}), "single", course, {"motion": np.full(3, 5.0)})
+    found = ends(Models({"single": surrogate}), MIDDLE, course, {"motion": np.full(3, 5.0)})
     np.testing.assert_allclose(sum(found.values()), 1.0, atol=1e-12)
     assert found["falls"][0] > 0.99
     assert found["oscillates"][1] > 0.99
