@@ -31,8 +31,8 @@ def drawn(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
     @wraps(draw)
     def inside(*arguments: Arguments.args, **options: Arguments.kwargs) -> Figure:
         figure = draw(*arguments, **options)
-        names = [name for axes in figure.axes for name in axes.get_legend_handles_labels()[1]]
-        legend_below(figure, columns=LINE // (8 + max(map(len, names), default=0)) or 1)
+        lengths = [len(name) for axes in figure.axes for name in axes.get_legend_handles_labels()[1]] or [0]
+        legend_below(figure, columns=int(LINE // (8 + (max(lengths) + np.mean(lengths)) / 2)))
         return figure
 
     return inside

@@ -187,7 +187,7 @@ def _fit(name: str, design: xr.Dataset, wanted: Array, terms: Array) -> Surrogat
 def _products(values: Array, terms: Array) -> Array:
     """Products (..., term) of Legendre polynomials of `values` (..., k), whose degrees are `terms` (term, k)."""
     powers = legvander(values, int(terms.max()))
-    return np.prod([powers[..., k, terms[:, k]] for k in range(terms.shape[1])], axis=0)
+    return np.asarray(np.prod([powers[..., k, terms[:, k]] for k in range(terms.shape[1])], axis=0))
 
 
 def _scaled(values: Array, ends: Sequence[float] | Array) -> Array:
@@ -315,7 +315,7 @@ class Models:
         kind, distance, frequency, longest = flight
         rotor, known, box = _rotor(values, kind, distance), likeness(values), KINDS[kind].box
         scaled = {name: rotor[name] / known["edge"] for name in ("displacement", "stack") if name in rotor}
-        every = {**known, **scaled, "on_axis": rotor["tilt"] + PER_MILLIMETRE * scaled["displacement"]}
+        every = known | scaled | {"on_axis": rotor["tilt"] + PER_MILLIMETRE * scaled["displacement"]}
         inputs = np.stack([np.clip(every[name], *box[name]) for name in box], axis=1)
         strengths = np.stack([known[name] * (part in self.effects) for name, part in PARTS], axis=1)
         return inputs, frequency * known["frequency"], values["spin"], strengths, np.full(len(inputs), longest)
@@ -417,7 +417,7 @@ def ended(flight: Flight, way: str, lasted: float | None = None) -> Likelihood:
         found = ends(models, flight, known[flight], values)[way]
         if lasted is None:
             return found
-        return found * np.exp(-0.5 * ((_logarithm(known[flight]["fall"]) - np.log(lasted)) / TOLD) ** 2)
+        return np.asarray(found * np.exp(-0.5 * ((_logarithm(known[flight]["fall"]) - np.log(lasted)) / TOLD) ** 2))
 
     return likelihood
 

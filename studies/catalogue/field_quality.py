@@ -25,11 +25,11 @@ from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.shapes import Box, Cylinder, ring, rotation_matrix
 from ..cli.console import progress
-from ..figures.style import PALETTE, legend_below, styled
+from ..figures.style import PALETTE
 from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE
-from .drawing import explain, small_multiples
+from .drawing import drawn, explain, small_multiples
 from .tables import last_crossing, text_table
 
 # Where the point dipole, and models between it and the field of the finite magnets, can be trusted.
@@ -40,6 +40,14 @@ ROTORS = {
     "horizontal, δx = 2 mm": horizontal(0.002, EDGE, REMANENCE, PERMEABILITY),
     "vertical, δz = 14 mm": vertical(0.014, EDGE, REMANENCE, PERMEABILITY),
     "tilt, δθ = 10°": tilt(float(np.radians(10)), EDGE, REMANENCE, PERMEABILITY),
+}
+VALIDITY: Columns = {
+    "field_error": (("rotor", "model", "distance", "offset"), "1", "largest relative error of B over the azimuth"),
+    "gradient_error": (
+        *(("rotor", "model", "distance", "offset"), "1"),
+        "largest relative error of the gradient of B",
+    ),
+    "truth_error": (("rotor", "distance", "offset"), "1", "stated relative error of the truth"),
 }
 AZIMUTHS = np.radians(np.arange(0.0, 360.0, 30.0))
 
@@ -65,20 +73,13 @@ def dipole_validity(quick: bool, rotors: Mapping[str, tuple[Magnet, ...]] = ROTO
         errors.append([worst(np.linalg.norm(b - exact, axis=1) / size) for b, _ in found])
         gradients.append([worst(np.linalg.norm(g - slope, axis=(1, 2)) / steepness) for _, g in found])
         own.append(worst(truth.relative_error(points)[0]))
-    found_in = ("rotor", "model", "distance", "offset")
-    return xr.Dataset(
-        {
-            "field_error": variable(found_in, errors, "1", "largest relative error of B over the azimuth"),
-            "gradient_error": variable(found_in, gradients, "1", "largest relative error of the gradient of B"),
-            "truth_error": variable(("rotor", "distance", "offset"), own, "1", "stated relative error of the truth"),
-        },
-        coords={
-            "rotor": list(rotors),
-            "model": list(models(next(iter(rotors.values())), 1.0)),
-            "distance": variable(("distance",), distance, "m", "distance below the lower magnet's centre"),
-            "offset": variable(("offset",), offset, "m", "distance from the axis"),
-        },
-    )
+    coords = {
+        "rotor": list(rotors),
+        "model": list(models(next(iter(rotors.values())), 1.0)),
+        "distance": variable(("distance",), distance, "m", "distance below the lower magnet's centre"),
+        "offset": variable(("offset",), offset, "m", "distance from the axis"),
+    }
+    return xr.Dataset(columns(VALIDITY, dict(zip(VALIDITY, (errors, gradients, own), strict=True))), coords)
 
 
 def models(magnets: tuple[Magnet, ...], factor: float) -> dict[str, RotorTable]:
@@ -119,7 +120,7 @@ def validity_lines(result: xr.Dataset) -> list[str]:
     return [words, *text_table(("rotor, model", *(f"{100 * level:g} %" for level in LEVELS)), rows)]
 
 
-@styled
+@drawn
 def validity_figure(result: xr.Dataset) -> Figure:
     """Error of each model against the distance, on the axis and at the largest lateral offset, rotor by rotor."""
     names, distance = result["rotor"].values.tolist(), 1e3 * result["distance"].values
@@ -133,7 +134,6 @@ def validity_figure(result: xr.Dataset) -> Figure:
         panel.semilogy(distance, own.max("offset"), color="0.6", lw=2.5, label="error of the finite elements")
     widest = 1e3 * float(result["offset"][-1])
     explain(axes[0], {"on the axis": "-", f"{widest:g} mm off the axis, worst azimuth": ":"})
-    legend_below(figure, columns=3)
     return figure
 
 
@@ -333,7 +333,7 @@ LINES = {
 }
 
 
-@styled
+@drawn
 def hard_case_figure(result: xr.Dataset) -> Figure:
     """True and stated error over the distance, a panel for each case with a field."""
     names = [name for name in result["case"].values if float(result["true_error"].sel(case=name).max()) > 0]
@@ -347,7 +347,6 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
         panel.axhline(RTOL, color="0.2", lw=0.7, label="tolerance asked for")
         small = float(row["true_error"].min()) < 1e-11  # such panels show round-off too
         panel.set(ylim=(3e-17 if small else 1e-10, 1e-4))
-    legend_below(figure)
     return figure
 
 

@@ -20,11 +20,11 @@ from ...fem.rotor.table import FieldTable
 from ...geometry.common import MAGNET_CONDUCTIVITY, Array
 from ...geometry.scene.contents import Drag, Scene
 from ..cli.options import FieldModel
-from ..figures.style import PALETTE, legend_below, styled
+from ..figures.style import PALETTE, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .article import FLOATER, PERMEABILITY, REMANENCE, article_scene, levitation_of, losses
-from .drawing import explain, small_multiples
+from .drawing import drawn, explain, small_multiples
 from .tables import span, text_table
 
 
@@ -229,7 +229,7 @@ REPORTED = {
 ENDS = {"linear fall": ":", "stable": "-", "oscillating loss": "--", "24 hours": "-."}
 
 
-@styled
+@drawn
 def times_figure(result: xr.Dataset) -> Figure:
     """Levitation time of each rotor against frequency, with the bands of what is not known well."""
     figure, rows = _rotors(result, "frequency (Hz)", "levitation time (s)")
@@ -239,7 +239,6 @@ def times_figure(result: xr.Dataset) -> Figure:
             panel.axvline(frequency, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
     first = rows[0][0]
     explain(first, {words: MARKS[name] for name, words in zip(OUTCOMES, MEANINGS, strict=True)}, color=PALETTE[0], ms=4)
-    legend_below(figure, columns=3)
     return figure
 
 

@@ -1,17 +1,17 @@
 """Every way to compute the rotor's field: its error against what it costs."""
 
 import os
+import resource
 import tempfile
 import time
 import timeit
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import heyoka as hy
 import numpy as np
@@ -33,20 +33,20 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings, mesh_magnets
 from ...geometry.rotor import horizontal
 from ..cli.console import note
-from ..figures.style import PALETTE, legend_below, styled
+from ..figures.style import PALETTE
 from ..processes import safe_path
-from ..result import columns, variable
+from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, REMANENCE
-from .drawing import explain, small_multiples
+from .drawing import drawn, explain, small_multiples
 from .tables import text_table
 
 Magnets = tuple[Magnet, ...]
+Build = Callable[[Any, Magnets], tuple[FieldTable, int]]  # Makes a table, and says its number of unknowns
 INNER_SPHERE = 0.0087  # Holds all sources of the article's cube, m
 
 
-@dataclass(frozen=True)
-class Method:
+class Method(NamedTuple):
     """One way to the field."""
 
     family: str  # methods that differ only in one number, joined by a line in the figure
@@ -118,9 +118,7 @@ def methods(quick: bool) -> dict[str, Method]:
     direct, split = ((2, 3), (2, 3)) if quick else (orders, (2, 3, 4, 5, 6, 7))
     rtols = (1e-3, 1e-5) if quick else (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
     dipole, elements = "moments", "direct finite elements"
-    rows: list[
-        tuple[str, str, str, Any, Sequence[float]]
-    ] = [  # how a method is called, its family, what it takes, and for which numbers
+    rows: tuple[tuple[str, str, str, Build, Sequence[float]], ...] = (
         ("exact", "dipole", dipole, _moments, (1,)),
         ("exact", "moments to {}", dipole, _moments, (5, 9, 13, 21)),
         ("exact", "closed form", "closed form", _closed_form, (0,)),
@@ -132,7 +130,7 @@ def methods(quick: bool) -> dict[str, Method]:
         ("permeable", "direct, μr, order {}", elements, _direct, direct),
         ("permeable", "split, order {}", "split finite elements", _split, split),
         ("permeable", "table, rtol {:g}", "table of the ladder", _table, rtols),
-    ]
+    )  # problem, name, family, what makes the table, and for which numbers
     return {
         name.format(number): Method(family, problem, partial(build, number))
         for problem, name, family, build, numbers in rows
@@ -145,8 +143,7 @@ PERMEABILITIES = {"exact": 1.0, "permeable": 1.05}
 TIMED_POINTS = 100_000
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
+class Measured(NamedTuple):
     """One method: field and gradient at the points, and what they cost."""
 
     field: Array  # (d, n, 3) T and (d, n, 3, 3) T/m
@@ -155,14 +152,14 @@ class Measured:
     costs: dict[str, float]  # by name, see `COSTS`
 
 
-COSTS: dict[str, Any] = {
+COSTS: Columns = {
     "unknowns": (("approach",), "1", "degrees of freedom"),
     "seconds": (("approach",), "s", "time from nothing"),
     "cpu_seconds": (("approach",), "s", "processor time from nothing"),
     "memory": (("approach",), "B", "memory that it took"),
     "per_point": (("approach",), "s", "time of B and its gradient per point"),
 }
-ERRORS: dict[str, Any] = {
+ERRORS: Columns = {
     "field_error": (("approach", "distance"), "1", "largest relative error of B"),
     "gradient_error": (("approach", "distance"), "1", "largest relative error of grad B"),
     "stated_error": (("approach", "distance"), "1", "error of B that is stated"),
@@ -192,13 +189,12 @@ def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measure
     method = methods(quick)[name]
     magnets = cube(method.problem)
     compiled(hy.cfunc, [hy.expression("x")], [hy.expression("x")])  # the compiler's own start is nobody's cost
-    memory = _memory("VmRSS")
-    Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here (Linux)
+    memory = _peak_memory()
     began, processor = time.perf_counter(), time.process_time()
     table, unknowns = method.build(magnets)
     field, gradient, stated = _at_points(table)
     seconds, cpu_seconds = time.perf_counter() - began, time.process_time() - processor
-    grown = _memory("VmHWM") - memory
+    grown = _peak_memory() - memory
     many = _many(timed_points)
     table.evaluate(many)
     pace = min(timeit.repeat(lambda: table.evaluate(many), timer=time.process_time, number=1)) / timed_points
@@ -214,10 +210,9 @@ def _at_points(table: FieldTable) -> tuple[Array, Array, Array]:
     return b.reshape(shape), g.reshape(*shape, 3), table.relative_error(every)[0].reshape(shape[:2]).max(axis=1)
 
 
-def _memory(entry: str) -> float:
-    """An entry of the process's status, bytes: VmRSS what it holds, VmHWM the most that it held (Linux)."""
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return 1024.0 * next(float(line.split()[1]) for line in lines if line.startswith(entry))
+def _peak_memory() -> float:
+    """The most that the process has held, bytes (Linux)."""
+    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _many(number: int) -> Array:
@@ -313,7 +308,7 @@ def speed_lines(result: xr.Dataset) -> list[str]:
     ]
 
 
-@styled
+@drawn
 def speed_figure(result: xr.Dataset) -> Figure:
     """Error of B at 20 mm against the time from nothing, for both problems; open: the error that is stated."""
     titles = {"exact": "μr = 1 (closed form known)", "permeable": "μr = 1.05"}
@@ -332,7 +327,6 @@ def speed_figure(result: xr.Dataset) -> Figure:
         panel.axhspan(1e-17, max(own, 1e-16), facecolor="0.9", edgecolor="0.6", label="error of the reference")
         panel.set_ylim(1e-16, None)
     explain(axes[0], {"error that the table states": "o"}, mfc="none", ms=4)
-    legend_below(figure, columns=3)
     return figure
 
 
