@@ -344,7 +344,8 @@ def corner_figure(result: xr.Dataset) -> Figure:
             panel.plot(draws[:, j], draws[:, i], ".", ms=1, alpha=0.3, color=PALETTE[0], rasterized=True)
             panel.set_ylim(*limits[i])
             panel.tick_params(labelleft=j == 0)
-        panel.locator_params(nbins=2, steps=[1, 2, 5, 10])
+        panel.locator_params("x", nbins=2, steps=[1, 2, 5, 10])
+        panel.locator_params("y", nbins=2)
         panel.set_xlabel(labels[j] if i == len(SHOWN) - 1 else "")
         panel.set_ylabel(labels[i] if i and not j else "")
     return figure
