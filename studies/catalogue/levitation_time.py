@@ -1,8 +1,7 @@
 """Levitation time against frequency by the slow drift of the spin, with what is not known of the experiment."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,20 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...dynamics.continuation.branch import Family, follow_branch, frequencies, spins
-from ...dynamics.continuation.frequencies import LONG_STEPS, reference_state
+from ...dynamics.continuation.frequencies import LONG_STEPS, UNIT, reference_state
 from ...dynamics.continuation.slow_drift import E_FOLDS, Drift, drift
 from ...dynamics.equilibria.equilibrium import EquilibriumError
-from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.state import Scales
-from ...fem.rotor.table import FieldTable
-from ...geometry.common import MAGNET_CONDUCTIVITY, Array
+from ...geometry.common import MAGNET_CONDUCTIVITY
 from ...geometry.scene.contents import Drag, Scene
-from ..cli.options import FieldModel
 from ..figures.style import PALETTE, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .article import FLOATER, PERMEABILITY, REMANENCE, article_scene, levitation_of, losses
-from .drawing import drawn, explain, small_multiples
+from .drawing import drawn, small_multiples
 from .tables import span, text_table
 
 
@@ -128,18 +124,58 @@ def time_points(quick: bool) -> list[Point]:
 def levitation_times(point: Point) -> xr.Dataset:
     """Levitation time, start and end of the averaged flights of one rotor with one variant, over `step` of frequency.
 
-    Recoil permeability is 1.05 in the floater and, but in the variants that say so, left out in the rotor.
+    Recoil permeability is 1.05 in the floater and, but in the variants that say so, left out in the rotor. Flights are
+    at those frequencies that the branch of equilibria reaches, from that of point dipoles both ways.
     """
-    case, variant = CASES[point["case"]], VARIANTS[point["variant"]]
-    grid = np.linspace(case.lowest, case.highest, point["steps"])
-    scene = scene_of(case, variant)
-    flights = dict(_flights(scene, *_compiled(scene, point["model"]), variant, grid))
-    rows = [_row(flights.get(f)) for f in grid]
-    found = {name: np.array([row[name] for row in rows])[None, None] for name in COLUMNS}
+    case, variant, model = CASES[point["case"]], VARIANTS[point["variant"]], point["model"]
+    grid, scene = np.linspace(case.lowest, case.highest, point["steps"]), scene_of(case, variant)
+    levitation = levitation_of(scene, model, interaction="rigid" if model != "fem" else "mutual")
+    rates = levitation.rates
+    magnets = tuple(replace(magnet, conductivity=None) for magnet in scene.rotor)
+    still = replace(scene, rotor=magnets, floater=replace(scene.floater, conductivity=None), drag=Drag(0.0, 0.0))
+    at_rest, spun = (Family(rates, frequencies(scene, spin), UNIT) for spin in (0.0, variant.spin))
+    start = follow_branch(at_rest, *reference_state(still), scene.frequency, LONG_STEPS, tolerated=np.inf)[-1].state
+    if variant.spin:
+        start = follow_branch(Family(rates, spins(scene)), start, 0.0, variant.spin)[-1].state
+    found = {name: np.full((len(grid), SAMPLES)[: len(dims) - 2], np.nan) for name, (dims, *_) in COLUMNS.items()}
+    found["levitation_time"][:], found["outcome"][:] = 0.0, NO_EQUILIBRIUM
+    for side in (np.flatnonzero(grid <= scene.frequency)[::-1], np.flatnonzero(grid > scene.frequency)):
+        state, here = start, scene.frequency
+        for k in side:
+            if grid[k] != here:
+                try:
+                    last = follow_branch(spun, state, here, grid[k], tolerated=np.inf)[-1]
+                except EquilibriumError:
+                    break
+                if last.parameter != grid[k] or last.growth_per_s > 1e3:
+                    break
+                state, here = last.state, grid[k]
+            there = replace(scene, frequency=grid[k])
+            release, how = Scales.of(there).unpack(state), (variant.stokes, variant.e_folds)
+            for name, value in _row(drift(there, levitation.table, variant.spin, CAP, rates, release, *how)).items():
+                found[name][k] = value
     frequency = variable(("case", "step"), grid[None], "Hz", "frequency of the rotor")
     coordinates = {"case": [point["case"]], "variant": [point["variant"]], "frequency": frequency}
-    attributes = {"model": point["model"], "cap_s": CAP, "shortest_s": SHORTEST}
-    return xr.Dataset(columns(COLUMNS, found), coordinates, attributes)
+    attributes = {"model": model, "cap_s": CAP, "shortest_s": SHORTEST}
+    data = columns(COLUMNS, {name: values[None, None] for name, values in found.items()})
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def _row(flight: Drift) -> dict[str, Any]:
+    kept, times = flight.ended_by in ("duration", "balance"), np.linspace(0.0, flight.time[-1], SAMPLES)
+    return {
+        "levitation_time": CAP if kept else min(flight.levitated_s, CAP),
+        "outcome": LEVITATES if kept else OUTCOMES.index(flight.ended_by),
+        "distance_start": flight.distance[0],
+        "distance_end": flight.distance[-1],
+        "spin_end": flight.spin[-1],
+        "fall_rate": flight.fall_rate(0.0, 0.9),
+        "fall_ratio": flight.fall_rate(0.6, 0.9) / flight.fall_rate(0.0, 0.3),
+        "balance_spin": flight.balance_spin,
+        "growth": flight.growth_per_s.max(),
+        "flight_time": times,
+        "flight_distance": np.interp(times, flight.time, flight.distance),
+    }
 
 
 def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
@@ -148,62 +184,6 @@ def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     rotors = [[part for part in parts if part["case"].item() == name] for name in names]
     cases = [xr.concat(rows, "variant", data_vars="all", coords="minimal", compat="override") for rows in rotors]
     return xr.concat(cases, "case", data_vars="all", coords="different", compat="equals", join="outer")
-
-
-def _compiled(scene: Scene, model: FieldModel) -> tuple[FieldTable, Rates, Array]:
-    """Table and rates of a scene, and the scaled state of the equilibrium on the branch of the dipoles' stable one."""
-    levitation = levitation_of(scene, model, interaction="rigid" if model != "fem" else "mutual")
-    magnets = tuple(replace(magnet, conductivity=None) for magnet in scene.rotor)
-    still = replace(scene, rotor=magnets, floater=replace(scene.floater, conductivity=None), drag=Drag(0.0, 0.0))
-    state, frequency = reference_state(still)
-    family = Family(levitation.rates, frequencies(scene), 50.0)
-    there = follow_branch(family, state, frequency, scene.frequency, LONG_STEPS, tolerated=np.inf)[-1]
-    return levitation.table, levitation.rates, there.state
-
-
-def _flights(
-    scene: Scene, table: FieldTable, rates: Rates, start: Array, variant: Variant, grid: Array
-) -> Iterator[tuple[float, Drift]]:
-    """Flights at those frequencies that the branch of equilibria reaches, from the scene's own frequency both ways."""
-    begin = follow_branch(Family(rates, spins(scene)), start, 0.0, variant.spin)[-1] if variant.spin else None
-    start = begin.state if begin else start
-    walk = partial(follow_branch, Family(rates, frequencies(scene, variant.spin), 50.0), tolerated=np.inf)
-    for side in (grid[grid <= scene.frequency][::-1], grid[grid > scene.frequency]):
-        state, here = start, scene.frequency
-        for frequency in side:
-            try:
-                last = walk(state, here, frequency)[-1] if frequency != here else None
-            except EquilibriumError:
-                break
-            if last is not None:
-                if last.parameter != frequency or last.growth_per_s > 1e3:
-                    break
-                state, here = last.state, frequency
-            there = replace(scene, frequency=frequency)
-            at_rest = Scales.of(there).unpack(state)
-            yield frequency, drift(there, table, variant.spin, CAP, rates, at_rest, variant.stokes, variant.e_folds)
-
-
-def _row(flight: Drift | None) -> dict[str, Any]:
-    if flight is None:
-        course = {name: np.full(SAMPLES, np.nan) for name in ("flight_time", "flight_distance")}
-        return dict.fromkeys(COLUMNS, np.nan) | {"levitation_time": 0.0, "outcome": NO_EQUILIBRIUM} | course
-    kept = flight.ended_by in ("duration", "balance")
-    whole, late, early = (flight.fall_rate(*part) for part in ((0.0, 0.9), (0.6, 0.9), (0.0, 0.3)))
-    times = np.linspace(0.0, flight.time[-1], SAMPLES)
-    return {
-        "levitation_time": CAP if kept else min(flight.levitated_s, CAP),
-        "outcome": LEVITATES if kept else OUTCOMES.index(flight.ended_by),
-        "distance_start": flight.distance[0],
-        "distance_end": flight.distance[-1],
-        "spin_end": flight.spin[-1],
-        "fall_rate": whole,
-        "fall_ratio": late / early,
-        "balance_spin": flight.balance_spin,
-        "growth": flight.growth_per_s.max(),
-        "flight_time": times,
-        "flight_distance": np.interp(times, flight.time, flight.distance),
-    }
 
 
 MARKS = dict(zip(OUTCOMES, ("v", "o", "X", "^", "|"), strict=True))
@@ -233,12 +213,25 @@ ENDS = {"linear fall": ":", "stable": "-", "oscillating loss": "--", "24 hours":
 def times_figure(result: xr.Dataset) -> Figure:
     """Levitation time of each rotor against frequency, with the bands of what is not known well."""
     figure, rows = _rotors(result, "frequency (Hz)", "levitation time (s)")
+    variants = result["variant"].values.tolist()
     for panel, case, rotor in rows:
-        _times(panel, rotor)
-        for frequency, end in REPORTED.get(case, {}).items():
-            panel.axvline(frequency, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
-    first = rows[0][0]
-    explain(first, {words: MARKS[name] for name, words in zip(OUTCOMES, MEANINGS, strict=True)}, color=PALETTE[0], ms=4)
+        frequency, time = rotor["frequency"].values, rotor["levitation_time"]
+        for (start, label), color in zip(BANDS.items(), ("0.6", *PALETTE[1:]), strict=False):
+            names = ["nominal", *(v for v in variants if v.startswith(start))]
+            if len(names) > 1:
+                band = time.sel(variant=names)
+                low, high = band.min("variant"), band.max("variant")
+                panel.fill_between(frequency, low, high, color=color, alpha=0.28, lw=0, label=label)
+        for name, (dashes, label) in LINES.items():
+            if name in variants:
+                panel.plot(frequency, time.sel(variant=name), dashes, color="0.25", lw=1, label=label)
+        nominal, outcome = (rotor[name].sel(variant="nominal") for name in ("levitation_time", "outcome"))
+        panel.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
+        for number, (mark, words) in enumerate(zip(MARKS.values(), MEANINGS, strict=True)):
+            panel.plot(frequency, nominal.where(outcome == number), mark, color=PALETTE[0], ms=3.5, label=words)
+        for there, end in REPORTED.get(case, {}).items():
+            panel.axvline(there, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
+        panel.set(ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
     return figure
 
 
@@ -266,26 +259,6 @@ def _rotors(result: xr.Dataset, xlabel: str, ylabel: str) -> tuple[Figure, list[
     cases = sorted(result["case"].values.tolist(), key=lambda name: CASES[name][:2])
     figure, axes = small_multiples([case.replace(" deg", "°") for case in cases], 2.2, 3, xlabel, ylabel)
     return figure, [(panel, case, result.sel(case=case)) for panel, case in zip(axes, cases, strict=True)]
-
-
-def _times(axes: Axes, result: xr.Dataset) -> None:
-    frequency, time = result["frequency"].values, result["levitation_time"]
-    variants = result["variant"].values.tolist()
-    for (start, label), color in zip(BANDS.items(), ("0.6", *PALETTE[1:]), strict=False):
-        names = ["nominal", *(v for v in variants if v.startswith(start))]
-        if len(names) > 1:
-            band = time.sel(variant=names).values
-            low, high = np.fmin.reduce(band), np.fmax.reduce(band)
-            axes.fill_between(frequency, low, high, color=color, alpha=0.28, lw=0, label=label)
-    for name, (dashes, label) in LINES.items():
-        if name in variants:
-            axes.plot(frequency, time.sel(variant=name), dashes, color="0.25", lw=1, label=label)
-    nominal, outcome = (result[name].sel(variant="nominal").values for name in ("levitation_time", "outcome"))
-    axes.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
-    for number, name in enumerate(OUTCOMES):
-        here = outcome == number
-        axes.plot(frequency[here], nominal[here], MARKS[name], color=PALETTE[0], ms=3.5)
-    axes.set(ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
 
 
 def time_lines(result: xr.Dataset) -> list[str]:
