@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..dynamics.continuation.branch import BranchPoint
 from ..dynamics.continuation.frequencies import at_frequency, branch_through, levitates, stable_ranges
-from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError
+from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
 from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.state import Scales
 from ..fem.files import write_whole
@@ -106,7 +106,7 @@ def _nearest(equilibria: Sequence[Equilibrium], to: Equilibrium | None) -> Equil
     """The one nearest to another, or, where there is no other, where the floater levitates; None without any."""
     if to is None:
         return most_like_levitation(equilibria)
-    return min(equilibria, key=lambda e: float(np.linalg.norm(e.position - to.position)), default=None)
+    return nearest_of(equilibria, to.position)
 
 
 def _with_branch(one: Compared) -> Compared:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey
+from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey, nearest_of
 from ..dynamics.equilibria.search import free_of_bodies
 from ..dynamics.flights.flight import Checkpoint, most_like_levitation, starting_point
 from ..dynamics.flights.trajectory import FlightStopped, Trajectory
@@ -22,6 +22,7 @@ from ..fem.plate.eddy import plate_reaction
 from ..fem.plate.slab import Slab, edge_error, reaction_tensor
 from ..fem.plate.table import Region
 from ..fem.plate.tables import cached_plate_table
+from ..fem.rotor.models import of_true_moment
 from ..fem.rotor.near_field import NEAR_RTOL, CompleteTable, complete
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..geometry.common import MU_0, Array, InputError
@@ -35,6 +36,7 @@ from .figures.renderer import RenderError, render
 from .figures.run import field_figure, force_figure, trajectory_figure
 from .figures.style import save_figures
 from .levitation import Levitation
+from .plan import sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
 from .words import flight_words, headline, left_out_words, tell_details
 
@@ -241,12 +243,14 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
             model: levitation.without_plate if model == chosen else levitation.survey_in(model)
             for model in dict.fromkeys(("dipole", best, chosen))
         }
+        moments = of_true_moment(scene.rotor, sources(levitation.field(exact)))
+        true_moment = levitation.elsewhere(rotor=moments).survey_in("dipole")
         survey = levitation.survey
     except EquilibriumError as error:
         failure = error
         best = levitation.field(exact).model
-        alone = dict.fromkeys(("dipole", best, chosen), survey)
-    compared = compared_models(alone["dipole"], alone[best], best)
+        alone, true_moment = dict.fromkeys(("dipole", best, chosen), survey), survey
+    compared = compared_models(alone["dipole"], true_moment, alone[best], best)
     result, flight = Result(levitation, survey, comparison=compared, failed=str(failure or "")), None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
@@ -283,21 +287,25 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
     return values, [*lines, f"Results and figures in {out}/"]
 
 
-def compared_models(dipole: Survey, best: Survey, name: str) -> dict[str, Any] | None:
-    """Levitation distances (mm) by the point `dipole` and the `best` model, of this `name`, both without the plate.
+def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:
+    """Levitation distances (mm) by the point dipole, that of the true moment and the best model, without the plate.
 
-    Of the dipole's equilibria the one nearest to where the floater levitates; None where one of both has none.
+    Of the dipoles' equilibria those nearest to where the floater levitates; None where the dipole or the best model, of
+    this `name`, has none.
     """
     true = most_like_levitation(best.equilibria)
-    if true is None or not dipole.equilibria:
+    if true is None:
         return None
-    rough = min(dipole.equilibria, key=lambda e: float(np.linalg.norm(e.position - true.position)))
+    rough, moment = (nearest_of(found.equilibria, true.position) for found in (dipole, true_moment))
+    if rough is None:
+        return None
     distances = [-float(e.position[2]) * 1e3 for e in (rough, true)]
     return {
         "true_model": name,
         "dipole_stability": rough.stability,
         "true_stability": true.stability,
         "dipole_distance_mm": distances[0],
+        "true_moment_distance_mm": None if moment is None else -float(moment.position[2]) * 1e3,
         "true_distance_mm": distances[1],
         "difference_mm": distances[0] - distances[1],
         # The dipole's own position error says how wrong its field is, which is what is measured here.

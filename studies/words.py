@@ -185,7 +185,11 @@ def comparison_words(compared: Mapping[str, Any] | None, plate: bool = False) ->
     if abs(apart) <= max(error, SAME):
         return [f"{said}no difference beyond its error of {max(error, SAME):.0e} mm."]
     more = "more" if apart > 0 else "less"
-    return [f"{said}{bracketed(abs(apart), error, 2)} mm {more} than with {NAMES[compared['true_model']]}."]
+    said += f"{bracketed(abs(apart), error, 2)} mm {more} than with {NAMES[compared['true_model']]}"
+    moment = compared["true_moment_distance_mm"]
+    if moment is None or abs(moment - compared["dipole_distance_mm"]) <= max(error, SAME):
+        return [f"{said}."]
+    return [f"{said}; with the magnets' true moments {moment:.2f} mm."]
 
 
 def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -291,6 +292,11 @@ class Equilibrium:
             ),
         }
         return html_table(f"Equilibrium, {self.stability}", rows)
+
+
+def nearest_of(equilibria: Sequence[Equilibrium], place: Array) -> Equilibrium | None:
+    """The one of the `equilibria` that is nearest to a `place` (3,) m; None without any."""
+    return min(equilibria, key=lambda e: float(np.linalg.norm(e.position - place)), default=None)
 
 
 def resampled(samples: Array, count: int) -> Array:

@@ -134,15 +134,19 @@ def test_what_could_not_be_computed_is_told(levitation):
 )
 def test_a_difference_below_its_error_is_none(apart, error, said):
     compared = {"true_model": "fem", "dipole_distance_mm": 18.83, "difference_mm": apart, "difference_error_mm": error}
-    (line,) = comparison_words(compared | {"dipole_stability": "stable", "true_stability": "stable"})
+    compared |= {"dipole_stability": "stable", "true_stability": "stable", "true_moment_distance_mm": None}
+    (line,) = comparison_words(compared)
     assert line == f"Point-dipole model, same conditions: levitation distance {said}"
+    if "than with" in said:
+        (line,) = comparison_words(compared | {"true_moment_distance_mm": 18.7352})
+        assert line.endswith(" than with finite elements; with the magnets' true moments 18.74 mm.")
 
 
 def test_the_dipole_is_compared_whatever_its_stability():
     """With its equilibrium that is nearest to where finite elements have the floater levitate."""
     near, far = equilibrium(stable=False, growth=0.1), equilibrium(stable=False, growth=0.2)
     far = replace(far, state=State(far.position - [0.0, 0.0, 0.02], np.zeros(3), far.state.moment, np.zeros(3)))
-    found = compared_models(Survey((far, near), ()), Survey((equilibrium(),), ()), "fem")
+    found = compared_models(Survey((far, near), ()), Survey((near,), ()), Survey((equilibrium(),), ()), "fem")
     assert (found["dipole_stability"], found["true_stability"], found["difference_mm"]) == ("unstable", "stable", 0.0)
     (line,) = comparison_words(found)
     assert "levitation distance 17.21 mm (unstable), no difference" in line
