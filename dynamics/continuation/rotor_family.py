@@ -5,7 +5,7 @@ which is where it is at measure zero, and are evaluated with the floater's motio
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,17 +13,17 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.harmonics.expressions import FieldExpressions
+from ...fem.harmonics.solid import turned_entries
 from ...fem.mutual.making import cached_mutual_table
 from ...fem.rotor.choice import cached_rotor_table, rotor_table
-from ...fem.rotor.table import FieldFormula, FieldTable, RotorTable
+from ...fem.rotor.table import RotorTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import Array, InputError
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import rotation_matrix
 from ...geometry.solids import moved
-from ..motion.effect import Added, Effect, Interaction, Motion, Placeable
+from ..motion.effect import Added, DerivedField, Effect, Interaction, Motion, Placeable
 from ..motion.effects import mutual_choice, with_effects
 from ..motion.equations import parameters
 from ..motion.floater_effects import check_floater_metal
@@ -83,18 +83,25 @@ MOVES: dict[str, tuple[Move, ...]] = {
 class MovableField:
     """The sum of fields of which each moves in its own way."""
 
-    parts: tuple[tuple[FieldFormula, Move], ...]  # fields as they are at measure zero, and how each moves
+    parts: tuple[tuple[RotorTable, Move], ...]  # fields as they are at measure zero, and how each moves
+    measures: Array = field(default_factory=lambda: np.zeros(1))  # (1,) or (n,), of points that are asked for
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """B and its gradient as expressions of a position (m, rotor's frame) and of `Parameter.MEASURE`."""
-        measure, found = hy.par[Parameter.MEASURE], []
+    def at(self, measures: Array) -> "MovableField":
+        """The field for points (n, 3) of rotors with `measures` (n,)."""
+        return replace(self, measures=measures)
+
+    def derivatives(self, points: Array, order: int) -> Array:
+        """See `RotorTable`."""
+        found = np.zeros((len(points), order * (order + 2)))
         for source, move in self.parts:
-            field, slope = source.expressions(move.place(position, measure))
-            found.append((move.back(field, measure), move.tensor(slope, measure, -1)))
-        return (
-            [hy.sum([b[i] for b, _ in found]) for i in range(3)],
-            [[hy.sum([g[i][j] for _, g in found]) for j in range(3)] for i in range(3)],
-        )
+            places = np.transpose(move.place(list(points.T), self.measures))
+            part = source.derivatives(places, order)
+            if move.turning:
+                units = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(points)))
+                axes = np.array([move.back(list(unit), self.measures) for unit in units])
+                part = turned_entries(part, axes.transpose(2, 1, 0))
+            found += part
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +110,6 @@ class MovedEffect:
 
     effect: Placeable  # of the part where it is at measure zero
     move: Move  # how the part moves
-    alone: FieldTable  # field of the part at measure zero
     name: str  # in results
 
     def added(self, motion: Motion) -> Added:
@@ -125,11 +131,12 @@ class MovedEffect:
     def count(self) -> int:
         return self.effect.count
 
-    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """See `Placeable`; by the part's own table, for `position`, `moment` and `values` seen from the part."""
+    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+        """See `Placeable`; for `flux`, `position` and `moment` as seen from the part."""
         measure, length = values[:, Parameter.MEASURE], values[:, [Parameter.LENGTH]]
         place = np.transpose(self.move.place(list((position * length).T), measure)) / length
-        return self.effect.numbers(self.alone, place, np.transpose(self.move.into(list(moment.T), measure)), values)
+        flux, moment = (np.transpose(self.move.into(list(vectors.T), measure)) for vectors in (flux, moment))
+        return self.effect.numbers(field, flux, place, moment, values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +245,7 @@ def _mutual_magnetisation(scene: Scene, parts: Sequence[Part], interaction: str,
     if not mutual_choice(replace(scene, rotor=(magnet,)), alone, interaction, rtol)[0]:
         return []
     table, _ = cached_mutual_table((magnet,), scene.floater, lambda _: None)
-    return [MovedEffect(Mutual(table, scene.floater.moment), move, alone, MUTUAL)]
+    return [MovedEffect(Mutual(table, scene.floater.moment), move, MUTUAL)]
 
 
 def _currents(scene: Scene, parts: Sequence[Part]) -> list[Effect]:
@@ -249,10 +256,10 @@ def _currents(scene: Scene, parts: Sequence[Part]) -> list[Effect]:
             f"would not; instead received {len(scene.conductors)}. Take one scene a rotor (spinlev.sweep)."
         )
     found: list[Effect] = []
-    for k, (magnet, move, alone) in enumerate(parts, 1):
+    for k, (magnet, move, _) in enumerate(parts, 1):
         if magnet.conductivity:
             check_metal(pieces_of((magnet,), ()), scene.frequency, scene.floater.radius)
             table, _ = cached_rotor_losses(replace(scene, rotor=(magnet,)), lambda _: None)
             name = ROTOR_CURRENTS if len(parts) == 1 else f"{ROTOR_CURRENTS}, magnet {k}"
-            found.append(MovedEffect(RotorCurrents(table), move, alone, name))
+            found.append(MovedEffect(RotorCurrents(table), move, name))
     return found

@@ -22,7 +22,6 @@ EVERY: Indices = np.arange(5)
 AXIAL = 2
 CONVERGED_STEP = 1e-8  # of Newton's method, in floater radii or rad: squared, it leaves round-off
 DUPLICATE_DISTANCE = 1e-6  # within which two solutions are one
-CLOSE = 1e-6  # steps from which on effects are known well enough from where the step began: to its square
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +40,6 @@ class Balance:
             return self
         spin = self.spin if np.ndim(self.spin) == 0 else np.asarray(self.spin)[rows]
         return replace(self, values=self.values.T[:, rows].T, spin=spin)
-
-    def about(self, position: Array, moment: Array) -> Self:
-        """The balance near positions and moments (n, 3), of as many points, see `Rates.about`."""
-        values = self.rates.about(position, moment, self.values)
-        return self if values is self.values else replace(self, values=values)
 
     def states(self, position: Array, moment: Array) -> Array:
         """States (n, 12) at rest in the rotor's frame at positions and moments (n, 3)."""
@@ -111,11 +105,8 @@ def solve(
     position, moment = position.copy(), moment.copy()
     length = np.full(len(position), np.inf)
     active = np.arange(len(position))
-    known, farthest = balance, np.inf
     for _ in range(iterations):
-        if farthest > CLOSE:
-            known = balance.at(active).about(position[active], moment[active])
-        value, slope = known(position[active], moment[active])
+        value, slope = balance.at(active)(position[active], moment[active])
         step = np.zeros((len(active), 5))
         good = np.isfinite(slope).all(axis=(1, 2))
         value, slope = value[:, free], slope[:, free[:, None], free]
@@ -127,7 +118,7 @@ def solve(
         position[active], moment[active] = moved_pose(position[active], moment[active], step)
         done = ~good | (size < 1e-11)
         length[active] = np.where(good, size, np.inf)
-        active, known, farthest = active[~done], known.at(~done), np.max(size[~done], initial=0.0)
+        active = active[~done]
         if not len(active):
             break
     return position, moment, length

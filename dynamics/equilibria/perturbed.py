@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from ...fem.harmonics.interior import Ball, BallField
 from ...fem.mutual.table import MutualTable
 from ...fem.rotor.table import FieldTable
 from ...fem.rotor_metal import RotorLosses
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..motion.effect import Interaction
+from ..motion.effect import Interaction, interaction_of
 from ..motion.equations import parameters
 from ..motion.floater_effects import FloaterCurrents
 from ..motion.plate import PlateForce, PlateMemory
@@ -23,8 +22,6 @@ from .equilibrium import Equilibrium, left_eigenvectors, tangent_spaces
 
 TILTS = np.array([3, 4])  # of the unknowns of a `Balance`
 MOST_STEPS = 20  # of the quasi-Newton method
-EXACT_SLOPES = 4  # degree of a potential that has all derivatives which the slopes of the floater's currents ask for
-AROUND = 1 / 32  # radius of the ball of that expansion, in radii of the floater
 
 
 def balanced_directions(scene: Scene, balance: Balance, places: Array, start: float, guess: Array) -> Array:
@@ -139,14 +136,11 @@ def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium,
     `included`: whether the motion of the `equilibrium`, in the field `table` of the `scene`, had them.
     """
     fixed = equilibrium.without or equilibrium
-    # In the field's expansion about the place, whose derivatives there are the field's, code is compiled in a tenth of
-    # the time that the table's own expressions take.
-    formula, scales = BallField(len(Parameter), EXACT_SLOPES), Scales.of(scene)
-    numbers, _ = formula.fit(table.evaluate, Ball(fixed.state.position, AROUND * scene.floater.radius))
-    values = np.concatenate([parameters(scene, scales, frozen_spin=True), numbers])
+    scales = Scales.of(scene)
+    values = parameters(scene, scales, frozen_spin=True)
     still = values.copy()
     still[Parameter.TILT_EDDY] = 0.0
-    rates = Rates(Interaction(formula, (FloaterCurrents(),)))
+    rates = Rates(Interaction(interaction_of(table).field, (FloaterCurrents(),)))
     slopes = [rates(scales.pack(fixed.state)[None], each)[1][0] for each in (values, still)]
     return _growth(scene, fixed, slopes[0] - slopes[1], included)
 

@@ -49,9 +49,8 @@ class FixedPoints:
         position, moment = points[:, :3], points[:, 3:]
         if not len(points):
             return cls(points, doubts, np.zeros((0, 5)), np.zeros((0, 5, 5)), np.zeros((0, 12, 12)), curves)
-        near = balance.about(position, moment)
-        _, jacobians = balance.rates(balance.states(position, moment), near.values)
-        return cls(points, doubts, *near(position, moment), jacobians, curves)
+        _, jacobians = balance.rates(balance.states(position, moment), balance.values)
+        return cls(points, doubts, *balance(position, moment), jacobians, curves)
 
 
 # In a folder of their own, of some thousand scenes.

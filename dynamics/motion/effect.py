@@ -49,6 +49,14 @@ class Added:
     power: hy.expression = ZERO  # rate of change of the Jacobi integral by this effect
 
 
+@runtime_checkable
+class DerivedField(Protocol):
+    """A field that knows its derivatives by place."""
+
+    def derivatives(self, points: Array, order: int) -> Array:
+        """See `RotorTable.derivatives`."""
+
+
 class Effect(Protocol):
     """Something that acts on the floater; a new effect is one class with these members."""
 
@@ -71,8 +79,11 @@ class Placeable(Effect, Protocol):
     def placed(self, first: int) -> Placeable:
         """The same with numbers from runtime parameter `first` on; it and its first derivatives hold at one pose."""
 
-    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """(n, count) for scaled positions and moments (n, 3) in a field, and runtime parameters `values` (n, p)."""
+    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+        """(n, count) at scaled positions and moments (n, 3), for runtime parameters `values` (n, p).
+
+        `field` is the rotor's, and `flux` (n, 3) T its B there.
+        """
 
 
 @runtime_checkable

@@ -42,7 +42,7 @@ more nearer by.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import heyoka as hy
@@ -50,12 +50,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...fem.closed_forms.eddy_sphere import skin_number
+from ...fem.harmonics.interior import LocalField
 from ...fem.rotor.floater import FloaterSources, force_and_torque
 from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AIR_VISCOSITY, Floater, Scene
-from .effect import Added, Motion, dissipative
+from .effect import Added, DerivedField, Motion, dissipative
 from .state import Parameter, Vector, cross, dot
 
 REAL_AIR = "air beyond Stokes"
@@ -135,6 +136,7 @@ class FloaterShape:
     floater: Floater  # whose shape it is
     sources: FloaterSources
     name: str = FLOATER_SHAPE
+    fields: tuple[LocalField, ...] = ()  # the field about the dipoles off the centre; none: as the table writes it
 
     @classmethod
     def of(cls, floater: Floater, sources: FloaterSources, field: FieldFormula) -> FloaterShape:
@@ -147,13 +149,31 @@ class FloaterShape:
         dipoles = np.linalg.pinv(powers) @ wanted / (floater.moment or 1.0)
         return cls(field, heights, dipoles - (heights == 0) * bool(floater.moment), floater, sources)
 
+    @property
+    def count(self) -> int:
+        return (len(self.heights) - 1) * LocalField.count
+
+    def placed(self, first: int) -> FloaterShape:
+        """See `Placeable`."""
+        numbers = range(len(self.heights) - 1)
+        return replace(self, fields=tuple(LocalField(first + k * LocalField.count) for k in numbers))
+
+    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+        """See `Placeable`."""
+        found = []
+        for height in self.heights[1:]:
+            places = position * values[:, [Parameter.LENGTH]] + height * moment
+            found += [places, field.derivatives(places, LocalField.ORDER)]
+        return np.concatenate(found, axis=1)
+
     def added(self, motion: Motion) -> Added:
         length, torque, inertia = (hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA))
+        fields: list[FieldFormula] = [self.field, *(self.fields or [self.field] * (len(self.heights) - 1))]
         moment, force, turn = motion.moment, [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
         energy = hy.expression(0.0)
-        for height, dipole in zip(self.heights, self.dipoles, strict=True):
+        for height, dipole, formula in zip(self.heights, self.dipoles, fields, strict=True):
             place = [length * x + float(height) * m for x, m in zip(motion.position, moment, strict=True)]
-            field, gradient = self.field.expressions(place) if height else (motion.field, motion.gradient)
+            field, gradient = formula.expressions(place) if height else (motion.field, motion.gradient)
             strength = float(dipole) * torque
             pull = [strength * inertia * length * dot(moment, [gradient[i][j] for i in range(3)]) for j in range(3)]
             force = [a + b for a, b in zip(force, pull, strict=True)]

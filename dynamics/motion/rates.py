@@ -1,19 +1,24 @@
-"""Rates of the state and their exact derivatives, compiled to machine code for many states in one call."""
+"""Rates of the state and their exact derivatives, compiled to machine code for many states in one call.
+
+What a rotor's field and its effects are about a pose, the runtime parameters tell: the field by its derivatives, which
+a table computes.  So the code depends on which effects there are, and on nothing else of a scene.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from functools import cached_property, partial
-from types import SimpleNamespace
-from typing import Any, cast
+from functools import cached_property
+from typing import Any
 
 import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.compiled_code import RuntimeNumbers, compiled_later, one_thread
-from ...fem.rotor.table import FieldFormula, FieldTable, RotorTable
+from ...fem.compiled_code import compiled_later, one_thread
+from ...fem.harmonics.expressions import CompiledField
+from ...fem.harmonics.interior import LocalField
+from ...fem.rotor.table import FieldFormula
 from ...geometry.common import Array
 from .effect import Effect, Interaction, Placeable, interaction_of
 from .equations import Equations, balances, equations_of_motion
@@ -31,21 +36,24 @@ class Rates:
 
     def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
         whole = interaction_of(table)
-        self._field, self._rough = whole.field, False
+        # A field known by its expressions alone is compiled for itself.
+        self._field: Any = (
+            whole.field if hasattr(whole.field, "derivatives") else CompiledField(whole.field.expressions)
+        )
+        self._rough = False
         self._placed: list[Placeable] = []
         effects: list[Effect] = []
+        self._local = LocalField(len(Parameter))
+        first = self._local.first + self._local.count
         for effect in whole.effects:
             if isinstance(effect, Placeable):
-                self._placed.append(effect.placed(len(Parameter) + sum(known.count for known in self._placed)))
-            effects.append(self._placed[-1] if isinstance(effect, Placeable) else effect)
-        self._numbers = RuntimeNumbers(len(Parameter) + sum(known.count for known in self._placed))
-        formula = whole.field
-        if isinstance(formula, RotorTable):  # its numbers as runtime parameters: rotors of one kind share the code
-            written = partial(formula.expressions, number=self._numbers)
-            formula = cast(FieldFormula, SimpleNamespace(expressions=written))
-        equations = equations_of_motion(Interaction(formula, tuple(effects)))
+                effect = effect.placed(first)
+                self._placed.append(effect)
+                first += effect.count
+            effects.append(effect)
+        self._equations = equations_of_motion(Interaction(self._local, tuple(effects)))
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
-        self._equations, self._level = equations, 1 if optimised else 0
+        self._level = 1 if optimised else 0
 
     def compile(self) -> None:
         """Compile now what is else compiled when it is first called."""
@@ -60,10 +68,10 @@ class Rates:
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12).
 
-        `values` of the parameters: (p,) for all states or (n, p), one row for each, or what `about` gives.
+        `values` of the parameters: (p,) for all states or (n, p), one row for each.
         """
         states = np.asarray(states, float)
-        found = _called(self._function, states.T, self.about(states[:, :3], states[:, 6:9], values)).T
+        found = _called(self._function, states.T, self._about(states[:, :3], states[:, 6:9], values)).T
         return found[:, :12], found[:, 12:].reshape(-1, 12, 12)
 
     def balance(
@@ -76,7 +84,7 @@ class Rates:
         given = np.empty((13, len(position)))
         given[:3], given[3:6], given[12] = position.T, moment.T, spin
         given[6:12] = tangents.reshape(-1, 6).T
-        found = _called(self._balances, given, self.about(position, moment, values))
+        found = _called(self._balances, given, self._about(position, moment, values))
         return found[:5].T, found[5:].T.reshape(-1, 5, 5)
 
     @property
@@ -94,24 +102,19 @@ class Rates:
         found._rough = True
         return found
 
-    def about(self, position: Array, moment: Array, values: Array) -> Array:
-        """`values` with the numbers of effects that have some about scaled positions and moments (n, 3).
-
-        They hold to second order in the way from there: force and torque, and to first order their derivatives.
-        """
-        own = np.array(self._numbers.values)
-        if values.shape[-1] > len(Parameter) or not (self._placed or own.size):
-            return values
-        if values.ndim == 1 and (self._rough or not self._placed):
-            return np.concatenate([values, np.zeros(sum(part.count for part in self._placed)), own])
-        rows = np.broadcast_to(values, (len(position), values.shape[-1]))[:, : len(Parameter)]
-        field, count = cast(FieldTable, self._field), len(rows)
+    def _about(self, position: Array, moment: Array, values: Array) -> Array:
+        """Parameters (p, n) with those of the field and of effects about scaled positions and moments (n, 3)."""
+        count = len(position)
+        rows = np.broadcast_to(values, (count, len(Parameter)))
+        field = self._field.at(rows[:, Parameter.MEASURE]) if hasattr(self._field, "at") else self._field
+        places = position * rows[:, [Parameter.LENGTH]]
+        slopes = field.derivatives(places, LocalField.ORDER)
+        parts = [rows, places, slopes]
         if self._rough:
-            answers = [np.zeros((count, part.count)) for part in self._placed]
+            parts += [np.zeros((count, part.count)) for part in self._placed]
         else:
-            answers = [part.numbers(field, position, moment, rows) for part in self._placed]
-        parts = [rows, *answers, np.broadcast_to(own, (count, own.size))]
-        return np.concatenate([part.T for part in parts]).T  # column by column, as the machine code reads them
+            parts += [part.numbers(field, slopes[:, :3], position, moment, rows) for part in self._placed]
+        return np.ascontiguousarray(np.concatenate([part.T for part in parts]))
 
     @cached_property
     def _function(self) -> Any:
@@ -129,7 +132,6 @@ def _with_jacobian(equations: Equations) -> tuple[list[hy.expression], list[hy.e
 
 
 def _called(function: Any, given: Array, values: Array) -> Array:
-    """Machine code (k, n) at variables (v, n) with the parameters that it has of `values` (p,) or (n, p)."""
-    pars = np.broadcast_to(values[..., : function.nparams], (given.shape[1], function.nparams)).T
+    """Machine code (k, n) at variables (v, n) with the parameters that it has of `values` (p, n)."""
     with one_thread():
-        return np.asarray(function(np.ascontiguousarray(given), pars=np.ascontiguousarray(pars)))
+        return np.asarray(function(np.ascontiguousarray(given), pars=values[: function.nparams]))

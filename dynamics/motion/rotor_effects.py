@@ -31,12 +31,12 @@ from numpy.typing import ArrayLike
 from ...fem.harmonics.interior import Ball, BallField
 from ...fem.mutual.table import MutualTable
 from ...fem.plate.multipoles import weighted
-from ...fem.rotor.table import FieldTable, RangeError
+from ...fem.rotor.table import FieldTable
 from ...fem.rotor_metal import RotorLosses
 from ...geometry.common import MU_0, Array, even_directions
 from ...geometry.magnets import Magnet, polarizability
 from ...geometry.scene.contents import Floater, Scene
-from .effect import Added, Motion, conservative, dissipative
+from .effect import Added, DerivedField, Motion, conservative, dissipative
 from .state import Parameter, Scales, State, Vector, cross, dot, dotted, subtract
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
@@ -162,15 +162,10 @@ class Mutual(_Near):
         strength, share = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.PLATE_SHARE]
         return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
 
-    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """`Placeable` tells of `field`, `position`, `moment` and `values`."""
+    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+        """See `Placeable`."""
         length, strength, share = values[:, WHICH].T[:, :, None]
         place = position * length
-        try:
-            flux = field.evaluate(place)[0]
-        except RangeError:  # some are in a magnet
-            flux, known = np.zeros(place.shape), field.in_range(place)
-            flux[known] = field.evaluate(place[known])[0]
         whole = strength * moment + self.table.polarizability * share * flux
         energy, slope, second = self.table.derivatives(place, whole / share)
         units = np.repeat(np.concatenate([length, np.ones_like(length)], axis=1), 3, axis=1)
@@ -299,8 +294,8 @@ class RotorCurrents(_Near):
         known = dict(zip(ENTRIES, entries, strict=True))
         return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
 
-    def numbers(self, field: FieldTable, position: Array, moment: Array, values: Array) -> Array:
-        """`Placeable` tells of `field`, `position`, `moment` and `values`."""
+    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+        """See `Placeable`."""
         return self._entries(position * values[:, Parameter.LENGTH, None]).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:

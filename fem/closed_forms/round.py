@@ -24,7 +24,8 @@ import numpy as np
 
 from ...geometry.common import Array
 from ...geometry.shapes import Cylinder, Sphere
-from ..harmonics.solid import FOUR_PI
+from ..harmonics.expressions import differentiated, whole_gradient
+from ..harmonics.solid import FOUR_PI, entries
 
 # Nodes of the rule for distances from the mantle of at least so many radii: round-off
 RULES = ((1e-2, 56), (1e-5, 100), (0.0, 220))
@@ -176,6 +177,7 @@ def _segment(half: float, rho: Array, z: Array, radius: float, sine: Array, slop
 
 Expression = Any  # A heyoka expression
 RESOLVED = 0.4  # distance from the surface from which on the segments do, in edges of a cube of the magnet's volume
+TOGETHER = 500  # points at once beside all segments
 MOST = 64  # segments of a mantle; at a quarter of its radius they still do to 1e-6
 DIGITS = np.log(1e11)
 
@@ -206,30 +208,54 @@ def segments_field(
     field : three values, T
     gradient : 3 × 3 values, [i][j] = ∂B_i/∂x_j, T/m; symmetric and traceless
     """
-    fields, slopes = [], []
+    parts = [_straight_segment(position, row) for row in _segments(body, polarization).tolist()]
+    return [hy.sum([part[i] for part in parts]) for i in range(3)], whole_gradient(
+        [hy.sum([part[k] for part in parts]) for k in range(3, 8)]
+    )
+
+
+def segments_derivatives(points: Array, body: Cylinder, polarization: Array, order: int) -> Array:
+    """B and its derivatives up to `order` - 1, by their `entries` (n, k), at points (n, 3) m; see `segments_field`."""
+    rows = _segments(body, polarization).T
+    found = np.empty((len(points), order * (order + 2)))
+    for start in range(0, len(points), TOGETHER):
+        block = points[start : start + TOGETHER]
+        given = np.empty((3 + len(rows), len(block), rows.shape[1]))
+        given[:3], given[3:] = block.T[:, :, None], rows[:, None]
+        values = _segment_kernel(order)(given.reshape(len(given), -1))
+        found[start : start + TOGETHER] = values.reshape(-1, len(block), rows.shape[1]).sum(axis=2).T
+    return found
+
+
+def _segments(body: Cylinder, polarization: Array) -> Array:
+    """Length, radius, cos and sin of the angle, charge and current (n, 6) of segments; J R dφ/4π is their strength."""
+    found = []
     for radius, share in mantles(body):
         count = _count(body, radius)
-        for angle in 2 * np.pi * (np.arange(count) + 0.5) / count:
-            scale = share * radius / (2 * count)
-            field, slope = _straight_segment(
-                position, body.height, radius, float(angle), scale * np.asarray(polarization)
-            )
-            fields.append(field)
-            slopes.append(slope)
-    total = [hy.sum([field[i] for field in fields]) for i in range(3)]
-    xx, xy, xz, yy, yz = (hy.sum([slope[k] for slope in slopes]) for k in range(5))
-    return total, [[xx, xy, xz], [xy, yy, yz], [xz, yz, -xx - yy]]
+        angle = 2 * np.pi * (np.arange(count) + 0.5) / count
+        x, y, z = share * radius / (2 * count) * np.asarray(polarization)
+        cos, sin = np.cos(angle), np.sin(angle)
+        same = (np.full(count, number) for number in (body.height, radius, z))
+        length, radii, current = same
+        found.append(np.column_stack([length, radii, cos, sin, x * cos + y * sin, current]))
+    return np.concatenate(found)
 
 
-def _straight_segment(
-    position: Sequence[Expression], length: float, radius: float, angle: float, strength: Array
-) -> tuple[list[Expression], list[Expression]]:
-    """B, and its slopes xx, xy, xz, yy, yz, of a segment's charge and current; strength (3,) is J R dφ/4π."""
-    x, y, z = position
-    cos, sin = float(np.cos(angle)), float(np.sin(angle))
-    charge, current = float(strength[0] * cos + strength[1] * sin), float(strength[2])
+@cache
+def _segment_kernel(order: int) -> Any:
+    """Compiled field of a segment with its derivatives: (k, n) for places and segments (9, n)."""
+    variables = hy.make_vars(*(f"v_{k}" for k in range(9)))
+    outputs = _straight_segment(variables[:3], variables[3:])
+    known = dict(zip(entries(2), outputs[3:], strict=True))
+    outputs += differentiated(known, variables[:3], order)
+    return hy.cfunc(outputs, variables, fast_math=True)
+
+
+def _straight_segment(position: Sequence[Expression], segment: Sequence[Any]) -> list[Expression]:
+    """B, and its slopes xx, xy, xz, yy, yz, of a segment's charge and current."""
+    (x, y, z), (length, radius, cos, sin, charge, current) = position, segment
     dx, dy = x - radius * cos, y - radius * sin
-    square, above, below = dx * dx + dy * dy, z - length / 2, z + length / 2
+    square, above, below = dx * dx + dy * dy, z - length * 0.5, z + length * 0.5
     a, b = hy.sqrt(square + above * above), hy.sqrt(square + below * below)
     inverse_a, inverse_b, reach = 1.0 / a, 1.0 / b, a + b
     gap = 1.0 / (reach * reach - length * length)
@@ -241,12 +267,13 @@ def _straight_segment(
     cube_a, cube_b = inverse_a * inverse_a * inverse_a, inverse_b * inverse_b * inverse_b
     u, v = cube_b - cube_a, below * cube_b - above * cube_a
     along = cos * dx + sin * dy
-    field = [charge * dx * p + current * cos * q, charge * dy * p + current * sin * q, charge * q - current * along * p]
-    slopes = [
+    return [
+        charge * dx * p + current * cos * q,
+        charge * dy * p + current * sin * q,
+        charge * q - current * along * p,
         charge * (p + dx * dx * steep) + current * cos * dx * u,
         charge * dx * dy * steep + 0.5 * current * (cos * dy + sin * dx) * u,
         charge * dx * u + current * cos * v,
         charge * (p + dy * dy * steep) + current * sin * dy * u,
         charge * dy * u + current * sin * v,
     ]
-    return field, slopes

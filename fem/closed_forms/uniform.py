@@ -16,9 +16,9 @@ Formulas: potential of a uniformly charged segment and rectangle, e.g. O. D. Kel
 Potential Theory (1929), ch. III; for magnets see Z. J. Yang et al., Supercond. Sci. Technol. 3 (1990) 591.
 """
 
-from collections.abc import Sequence
-from functools import cached_property
-from itertools import product
+from collections.abc import Collection, Sequence
+from functools import cache, cached_property
+from itertools import combinations_with_replacement, product
 from typing import Any
 
 import heyoka as hy
@@ -28,10 +28,10 @@ from ...geometry.common import MU_0, Array, InputError
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part, Solid
-from ..harmonics.expansion import turned_expressions, turned_field, uniform_moments
-from ..harmonics.expressions import CompiledField, FieldExpressions, Number
-from ..harmonics.solid import FOUR_PI
-from .round import resolved_distance, round_slope, round_tensor, segments_field
+from ..harmonics.expansion import MultipoleExpansion, turned_expressions, turned_field, uniform_moments
+from ..harmonics.expressions import FieldExpressions, differentiated
+from ..harmonics.solid import FOUR_PI, contracted, entries, tensors, turned_entries
+from .round import resolved_distance, round_slope, round_tensor, segments_derivatives, segments_field
 
 Expression = Any  # A heyoka expression
 SIGNS = (-1, 1)
@@ -100,8 +100,24 @@ class _Corners:
         )
 
 
+Tensor = dict[tuple[int, ...], Expression]
+
+
+def _box_tensors(corners: _Corners, axes: Collection[int]) -> tuple[Tensor, Tensor]:
+    """4π T_ij and 4π ∂T_ij/∂x_k, as far as a polarisation along some `axes` needs them, by ascending indices."""
+    second: Tensor = {(axis, axis): corners.solid_angle(axis) for axis in axes}
+    third: Tensor = {(0, 1, 2): hy.sum([-float(i * j * k) * inverse for (i, j, k), inverse in corners.inverse.items()])}
+    for a, b in ((0, 1), (0, 2), (1, 2)):
+        if a in axes or b in axes:
+            second[a, b], third[a, a, b], third[a, b, b] = corners.edges(a, b)
+    for axis in axes:
+        b, c = (other for other in range(3) if other != axis)
+        third[axis, axis, axis] = -third[_sorted(axis, b, b)] - third[_sorted(axis, c, c)]
+    return second, third
+
+
 def cuboid_field(
-    position: Sequence[Expression], half_edges: Array, polarization: Array, number: Number = float
+    position: Sequence[Expression], half_edges: Array, polarization: Array
 ) -> tuple[list[Expression], list[list[Expression]]]:
     """B and its gradient of a uniformly polarised cuboid, in the cuboid's own axes.
 
@@ -110,7 +126,6 @@ def cuboid_field(
     position : three expressions, m, from the centre along the body axes
     half_edges : (3,) m
     polarization : (3,) T; only its non-zero components cost anything
-    number : how these numbers are written
 
     Returns
     -------
@@ -120,26 +135,42 @@ def cuboid_field(
     Accuracy: round-off of the largest terms. The terms cancel as the distance grows, so that it is 1e-15 of B beside
     the cuboid and grows as (distance/size)²: 1e-12 at a hundred sizes.
     """
-    strength = {axis: number(p / FOUR_PI) for axis, p in enumerate(polarization) if p}
+    strength = {axis: float(p / FOUR_PI) for axis, p in enumerate(polarization) if p}
     zero = hy.expression(0.0)
     if not strength:
         return [zero] * 3, [[zero] * 3 for _ in range(3)]
-    corners = _Corners(position, [number(half) for half in half_edges])
-    second: dict[tuple[int, ...], Expression] = {(axis, axis): corners.solid_angle(axis) for axis in strength}
-    third: dict[tuple[int, ...], Expression] = {
-        (0, 1, 2): hy.sum([-float(i * j * k) * inverse for (i, j, k), inverse in corners.inverse.items()])
-    }
-    for a, b in ((0, 1), (0, 2), (1, 2)):
-        if a in strength or b in strength:
-            second[a, b], third[a, a, b], third[a, b, b] = corners.edges(a, b)
-    for axis in strength:
-        b, c = (other for other in range(3) if other != axis)
-        third[axis, axis, axis] = -third[_sorted(axis, b, b)] - third[_sorted(axis, c, c)]
+    second, third = _box_tensors(_Corners(position, [float(half) for half in half_edges]), strength)
     field = [hy.sum([s * second[_sorted(axis, i)] for axis, s in strength.items()]) for i in range(3)]
     gradient = [
         [hy.sum([s * third[_sorted(axis, i, j)] for axis, s in strength.items()]) for j in range(3)] for i in range(3)
     ]
     return field, gradient
+
+
+ALL = list(combinations_with_replacement(range(3), 2))  # Entries of T, whose trace is -1 inside
+
+
+@cache
+def _box_kernel(order: int) -> Any:
+    """Compiled 4π T of a cuboid and its derivatives, (k, n), for places and half edges (6, n): one for all cuboids."""
+    variables = hy.make_vars("x", "y", "z", "a", "b", "c")
+    second, third = _box_tensors(_Corners(variables[:3], variables[3:]), range(3))
+    known = {each: third[each] for each in entries(3)}
+    outputs = [*(second[each] for each in ALL), *known.values(), *differentiated(known, variables[:3], order + 1)]
+    return hy.cfunc(outputs, variables, fast_math=True)
+
+
+def cuboid_derivatives(points: Array, half_edges: Array, polarization: Array, order: int) -> Array:
+    """B and its derivatives up to `order` - 1, by their `entries` (n, k), at points (n, 3) m; see `cuboid_field`."""
+    given = np.empty((6, len(points)))
+    given[:3], given[3:] = points.T, half_edges[:, None]
+    values, strength = _box_kernel(order)(given), polarization / FOUR_PI
+    spread = np.array([[strength[j] if i == k else strength[i] * (j == k) for k in range(3)] for i, j in ALL])
+    found, start = [values[:6].T @ spread], 6
+    for degree in range(2, order + 1):
+        found.append(values[start : start + 2 * degree + 3].T @ contracted(degree + 1, strength))
+        start += 2 * degree + 3
+    return np.concatenate(found, axis=1)
 
 
 def _difference(a: tuple[Expression, Expression], b: tuple[Expression, Expression]) -> tuple[Expression, Expression]:
@@ -237,53 +268,60 @@ class UniformField:
     def __init__(self, magnet: Magnet) -> None:
         self.magnet = magnet
 
-    def expressions(self, position: Sequence[hy.expression], number: Number = float) -> FieldExpressions:
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """Closed form at a position (three expressions, m), turned from the magnet's axes into the rotor's."""
-        body, axes = self.magnet.body, self.magnet.body.rotation
+        body, axes, polarization = self.magnet.body, self.magnet.body.rotation, self.magnet.polarization
         if isinstance(body, Sphere):
-            return uniform_moments(self.magnet, 1).expressions(position, number)
-        shifted = [position[i] - number(body.center[i]) for i in range(3)]
-        if np.array_equal(axes, np.eye(3)):
-            return self._in_body(shifted, number)
-        return turned_field(axes, self._in_body(turned_expressions(axes.T, shifted, number), number), number)
-
-    def _in_body(self, position: Sequence[hy.expression], number: Number) -> FieldExpressions:
-        """Closed form in the magnet's own axes."""
-        body, polarization = self.magnet.body, self.magnet.polarization
+            return uniform_moments(self.magnet, 1).expressions(position)
+        shifted = [position[i] - float(body.center[i]) for i in range(3)]
+        along = shifted if np.array_equal(axes, np.eye(3)) else turned_expressions(axes.T, shifted)
+        assert isinstance(body, Box | Cylinder)
         if isinstance(body, Box):
-            return cuboid_field(position, body.half_edges, polarization, number)
-        assert isinstance(body, Cylinder)
-        return segments_field(position, body, polarization)
+            found = cuboid_field(along, body.half_edges, polarization)
+        else:
+            found = segments_field(along, body, polarization)
+        return found if along is shifted else turned_field(axes, found)
 
     @cached_property
-    def _near(self) -> CompiledField:
-        # to optimise the code of a round magnet's segments takes a second (cylinder) or three (ring)
-        return CompiledField(self.expressions, seldom=isinstance(self.magnet.body, Cylinder))
+    def _far(self) -> MultipoleExpansion:
+        return uniform_moments(self.magnet, FAR_DEGREE)
 
-    @cached_property
-    def _far(self) -> CompiledField:
-        return CompiledField(uniform_moments(self.magnet, FAR_DEGREE).expressions, seldom=True)
+    def derivatives(self, points: Array, order: int) -> Array:
+        """B (T) outside, μ0 H inside, and its derivatives up to `order` - 1, by their `entries` (n, k), at (n, 3) m.
 
-    def rows(self, columns: Array) -> Array:
-        """B (T) outside, μ0 H inside, and its gradient (T/m), (12, n), at `columns` (3, n) m; 1e-13 at any distance.
+        1e-13 at any distance of cuboids and spheres, outside; of cylinders and rings 1e-10 from `resolved_distance` on.
+        """
+        body, polarization = self.magnet.body, self.magnet.polarization
+        if isinstance(body, Sphere):
+            return self._far.derivatives(points, order)
+        far = squared_distance(points.T, body.center) > (FAR * body.circumradius) ** 2
+        found = np.empty((len(points), order * (order + 2)))
+        if far.any():
+            found[far] = self._far.derivatives(points[far], order)
+        if not far.all():
+            assert isinstance(body, Box | Cylinder)
+            local = body.to_body(points[~far])
+            if isinstance(body, Box):
+                near = cuboid_derivatives(local, body.half_edges, polarization, order)
+            else:
+                near = segments_derivatives(local, body, polarization, order)
+            turned = not np.array_equal(body.rotation, np.eye(3))
+            found[~far] = turned_entries(near, body.rotation) if turned else near
+        return found
+
+    def evaluate(self, points: Array) -> tuple[Array, Array]:
+        """B (n, 3) T outside, μ0 H inside, and its gradient (n, 3, 3) T/m at `points` (n, 3) m; 1e-13 at any distance.
 
         Of cylinders and rings 1e-10, but for places in or beside them.
         """
+        field, gradient = tensors(self.derivatives(points, 2))
         body = self.magnet.body
-        far = squared_distance(columns, body.center) > (FAR * body.circumradius) ** 2
-        close = np.zeros(columns.shape[1], bool)
         if not isinstance(body, Box | Part):  # in a round magnet, or so near that its segments do not do
-            close = body.distance(columns.T) < (0.0 if isinstance(body, Sphere) else resolved_distance(body))
-        found = np.empty((12, columns.shape[1]))
-        for chosen, field in ((~far & ~close, self._near), (far, self._far)):
-            if chosen.any():
-                found[:, chosen] = field.rows(np.ascontiguousarray(columns[:, chosen]))
-        if close.any():
-            assert not isinstance(body, Box | Part)
-            points, polarization = columns[:, close].T, self.magnet.polarization_in_rotor
-            found[:3, close] = (round_tensor(body, points) @ polarization).T
-            found[3:, close] = (round_slope(body, points) @ polarization).reshape(len(points), 9).T
-        return found
+            close = body.distance(points) < (0.0 if isinstance(body, Sphere) else resolved_distance(body))
+            if close.any():
+                field[close] = round_tensor(body, points[close]) @ self.magnet.polarization_in_rotor
+                gradient[close] = round_slope(body, points[close]) @ self.magnet.polarization_in_rotor
+        return field, gradient
 
 
 def squared_distance(columns: Array, center: Array) -> Array:

@@ -12,20 +12,23 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part as SolidPart, Solid
-from .expressions import UPPER, FieldExpressions, Number, harmonic_sums, whole_gradient
+from .expressions import FieldExpressions, harmonic_sums, whole_gradient
 from .interior import Ball, moment
 from .solid import (
     FOUR_PI,
     Coefficients,
+    OuterSums,
     derivative,
+    entries,
     field_sizes,
     field_spectrum,
     irregular_gradient,
     irregular_values,
-    outer_sums,
+    outer_totals,
     real_terms,
     regular_derivative,
     rotated_harmonics,
+    tensors,
     weighted_sums,
 )
 
@@ -132,28 +135,46 @@ class MultipoleExpansion:
         turned = rotated_harmonics(self.coefficients, self.axes.T)
         return turned if turned is self.coefficients else without_noise(turned, TURNED)
 
-    def expressions(self, position: Sequence[hy.expression], number: Number = float) -> FieldExpressions:
-        """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame), numbers by `number`."""
-        place = [position[i] - number(self.center[i]) for i in range(3)]
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame)."""
+        place = [position[i] - float(self.center[i]) for i in range(3)]
         if not np.array_equal(self.axes, np.eye(3)):
             own = MultipoleExpansion(np.zeros(3), self.radius, self.own_coefficients)
-            seen = turned_expressions(self.axes.T, place, number)
-            return turned_field(self.axes, own.expressions(seen, number), number)
-        scaled = [component * number(1.0 / self.radius) for component in place]
-        sums = harmonic_sums(scaled, [real_terms(part) for part in self._derivatives[: 3 + len(UPPER)]], number)
+            return turned_field(self.axes, own.expressions(turned_expressions(self.axes.T, place)))
+        scaled = [component * (1.0 / self.radius) for component in place]
+        parts = self._slopes(2)
+        sums = harmonic_sums(scaled, [real_terms(part) for part in parts])
         return sums[:3], whole_gradient(sums[3:])
 
+    def derivatives(self, points: Array, order: int) -> Array:
+        """B and its derivatives by place up to `order` - 1, by their `entries` (n, order (order + 2)), T, T/m, ...
+
+        At `points` (n, 3) m, wherever they are: where the series diverges they are large, at the centre not finite.
+        """
+        return summed_derivatives([self], points, order)
+
     def evaluate(self, points: Array) -> tuple[Array, Array]:
-        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m, without compilation."""
-        sums = outer_sums(self._derivatives, (points - self.center) / self.radius)
-        return sums[:, :3], sums[:, [[3, 4, 5], [4, 6, 7], [5, 7, 8]]]
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m."""
+        field, gradient = tensors(self.derivatives(points, 2))
+        return field, gradient
+
+    def sums(self, order: int) -> OuterSums:
+        """The sums that `derivatives` are, of places in radii from the centre."""
+        if order not in self._known_sums:
+            self._known_sums[order] = OuterSums.of(self._slopes(order))
+        return self._known_sums[order]
 
     @cached_property
-    def _derivatives(self) -> list[Coefficients]:
-        """Of B_i, and of ∂B_i/∂x_j of `UPPER` and zz; of one size."""
-        fields = [-derivative(self.coefficients, axis) for axis in range(3)]
-        slopes = [derivative(fields[i], j) / self.radius for i, j in (*UPPER, (2, 2))]
-        return [*(np.pad(field, (0, 1)) for field in fields), *slopes]
+    def _known_sums(self) -> dict[int, OuterSums]:
+        return {}
+
+    def _slopes(self, order: int) -> list[Coefficients]:
+        """Coefficients, of one size, of what `derivatives` gives."""
+        found = {(i,): -derivative(self.coefficients, i) for i in range(3)}
+        for degree in range(2, order + 1):
+            for each in entries(degree):
+                found[each] = derivative(found[each[:-1]], each[-1]) / self.radius
+        return [np.pad(part, (0, self.degree + 1 + order - len(part))) for part in found.values()]
 
     def root_mean_square(self, points: Array) -> tuple[Array, Array]:
         """Sizes (n,) of B (T) and of its gradient (T/m), as a mean over the spheres on which the points lie.
@@ -167,17 +188,23 @@ class MultipoleExpansion:
         return np.linalg.norm(parts, axis=1), np.linalg.norm(slopes, axis=1)
 
 
-def turned_expressions(axes: Array, vector: Sequence[hy.expression], number: Number) -> list[hy.expression]:
-    """A `vector` along the columns of `axes`, along the outer ones; `number` writes the factors."""
-    return [hy.sum([number(factor) * part for factor, part in zip(row, vector, strict=True) if factor]) for row in axes]
+def summed_derivatives(expansions: Sequence[MultipoleExpansion], points: Array, order: int) -> Array:
+    """`derivatives` (n, k) of all `expansions` together at `points` (n, 3) m."""
+    places = np.array([(points - one.center) / one.radius for one in expansions])
+    return outer_totals([one.sums(order) for one in expansions], places)
 
 
-def turned_field(axes: Array, field: FieldExpressions, number: Number) -> FieldExpressions:
-    """A `field` and its gradient along the columns of `axes`, along the outer ones; `number` writes the factors."""
+def turned_expressions(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:
+    """A `vector` along the columns of `axes`, along the outer ones."""
+    return [hy.sum([float(f) * part for f, part in zip(row, vector, strict=True) if f]) for row in axes]
+
+
+def turned_field(axes: Array, field: FieldExpressions) -> FieldExpressions:
+    """A `field` and its gradient along the columns of `axes`, along the outer ones."""
     b, slope = field
-    rows = [turned_expressions(axes, row, number) for row in slope]
-    columns = [turned_expressions(axes, [row[j] for row in rows], number) for j in range(3)]
-    return turned_expressions(axes, b, number), [[columns[j][i] for j in range(3)] for i in range(3)]
+    rows = [turned_expressions(axes, row) for row in slope]
+    columns = [turned_expressions(axes, [row[j] for row in rows]) for j in range(3)]
+    return turned_expressions(axes, b), [[columns[j][i] for j in range(3)] for i in range(3)]
 
 
 def moments_of_magnetization(

@@ -9,7 +9,6 @@ every operation costs, so that this saves time as well as compilation.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 from typing import Any
 
 import heyoka as hy
@@ -18,12 +17,11 @@ from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
 from ..compiled_code import compiled
-from .solid import Member, members
+from .solid import Entry, Member, entries, members, tensors
 
 Terms = Mapping[Member, float]  # weights of real harmonics, by `members`
 
 
-Number = Callable[[float], Any]  # what a number of a formula is written as: `float`, or `RuntimeNumbers`
 # B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric
 FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 
@@ -38,14 +36,14 @@ def whole_gradient(entries: Sequence[hy.expression]) -> list[list[hy.expression]
     return [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
 
 
-def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], number: Number) -> list[hy.expression]:
+def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], monic: bool = False) -> list[hy.expression]:
     """Σ weight Re Θ_lm or Im Θ_lm, one expression for each of `sums`.
 
     Parameters
     ----------
     position : three expressions, in the units of the harmonics
     sums : weights of each
-    number : writes the weights
+    monic : harmonics without their factors (-1)^m (2l-1)!!, each with the weight 1
     """
     x, y, z = position
     inverse = 1.0 / (x * x + y * y + z * z)
@@ -60,10 +58,10 @@ def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], numb
     for terms in sums:
         parts: dict[tuple[int, int], list[tuple[Any, hy.expression]]] = {}
         for (l, m, part), weight in terms.items():
-            factor = (-1.0) ** m * weight
-            for j in range(1, l + 1):  # (2l-1)!!
+            factor = 1.0 if monic else (-1.0) ** m * weight
+            for j in range(1, 0 if monic else l + 1):  # (2l-1)!!
                 factor *= 2 * j - 1
-            parts.setdefault((m, part), []).append((number(factor), chains[l, m]))
+            parts.setdefault((m, part), []).append((factor, chains[l, m]))
         products = []
         for (m, part), inner in parts.items():
             first = sectoral[m][part]
@@ -107,53 +105,44 @@ def _zonal(z: hy.expression, square: hy.expression, highest: dict[int, int]) -> 
     return found
 
 
-# Points of a call for which code is good enough that is compiled in a fourth of the time and evaluated in ten times.
-# A call of so many takes four milliseconds more. The call alone decides, so that the same one gives the same bits.
-FEW = 5000
-
-
 class CompiledField:
-    """B and its gradient at points, compiled when it is first asked for: for few points, for many, or both.
+    """B and its derivatives at points from expressions, compiled when they are first asked for.
 
-    The compiler may contract and reorder sums, which makes long expansions twice as fast and moves closed forms by no
-    more than their own round-off, 5e-14 of B. An integrator compiles the same expressions without that.
+    The compiler may contract and reorder sums, which is twice as fast and moves closed forms by no more than their own
+    round-off, 5e-14 of B. An integrator compiles the same expressions without that.
 
     Parameters
     ----------
     build : takes three heyoka expressions (position, m) and returns `FieldExpressions`
-    seldom : at fewer than some 1e5 points in all: as if they were few
     """
 
-    def __init__(self, build: Callable[[Sequence[hy.expression]], FieldExpressions], seldom: bool = False) -> None:
-        variables = hy.make_vars("x", "y", "z")
-        field, gradient = build(variables)
-        symmetric = [gradient[min(i, j)][max(i, j)] for i in range(3) for j in range(3)]
-        self._formula = [*field, *symmetric], variables
-        self._seldom = seldom
-
-    @cached_property
-    def _for_few(self) -> Any:
-        return compiled(hy.cfunc, *self._formula, fast_math=True, opt_level=0, batch_size=1)
-
-    @cached_property
-    def _for_many(self) -> Any:
-        return compiled(hy.cfunc, *self._formula, fast_math=True)
-
-    def rows(self, columns: Array) -> Array:
-        """The three components of B (T) and the nine of its gradient (T/m): (12, n) at `columns` (3, n), m."""
-        function = self._for_few if self._seldom or columns.shape[1] <= FEW else self._for_many
-        return np.asarray(function(columns))
+    def __init__(self, build: Callable[[Sequence[hy.expression]], FieldExpressions]) -> None:
+        self._build, self._known = build, dict[int, Any]()
 
     def __call__(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) in T and ∂B_i/∂x_j (n, 3, 3) in T/m at `points` (n, 3), m."""
-        return field_and_gradient(self.rows(as_columns(points)))
+        field, gradient = tensors(self.derivatives(np.asarray(points, float).reshape(-1, 3), 2))
+        return field, gradient
+
+    def derivatives(self, points: Array, order: int) -> Array:
+        """B and its derivatives up to `order` - 1, by their `entries` (n, order (order + 2)), at `points` (n, 3) m."""
+        if order not in self._known:
+            variables = hy.make_vars("x", "y", "z")
+            field, gradient = self._build(variables)
+            known = {each: gradient[each[0]][each[1]] for each in entries(2)}
+            rest = differentiated(known, variables, order)
+            self._known[order] = compiled(hy.cfunc, [*field, *known.values(), *rest], variables, fast_math=True)
+        return np.asarray(self._known[order](np.ascontiguousarray(points.T))).T
 
 
-def as_columns(points: ArrayLike) -> Array:
-    """Points (n, 3) as contiguous (3, n)."""
-    return np.ascontiguousarray(np.asarray(points, float).reshape(-1, 3).T)
-
-
-def field_and_gradient(rows: Array) -> tuple[Array, Array]:
-    """B (n, 3) and its gradient (n, 3, 3) as views of (12, n)."""
-    return rows[:3].T, np.moveaxis(rows[3:].reshape(3, 3, -1), -1, 0)
+def differentiated(
+    known: Mapping[Entry, hy.expression], variables: Sequence[hy.expression], last: int
+) -> list[hy.expression]:
+    """Derivatives of a harmonic function by their `entries`, from those `known` of one degree up to the `last` one."""
+    found: list[hy.expression] = []
+    for degree in range(len(next(iter(known))) + 1, last + 1):
+        slopes = hy.diff_tensors(list(known.values()), diff_args=list(variables), diff_order=1).jacobian
+        rows = dict(zip(known, np.asarray(slopes).reshape(-1, 3), strict=True))
+        known = {each: rows[each[:-1]][each[-1]] for each in entries(degree)}
+        found += known.values()
+    return found

@@ -14,13 +14,14 @@ B = -∇ Σ c_k R_k, lengths in radii.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar
 
 import heyoka as hy
 import numpy as np
 
 from ...geometry.common import MU_0, Array
 from .expressions import UPPER, FieldExpressions, regular_harmonics, whole_gradient
-from .solid import CHUNK, FOUR_PI, Coefficients, factorials, members, regular_values, weighted_sums
+from .solid import CHUNK, FOUR_PI, Coefficients, entries, entry, factorials, members, regular_values, weighted_sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +177,34 @@ def _real_values(degree: int) -> Array:
     known = regular_values(degree - 1, *sphere(degree)[0].T)
     values = np.array([known[key] for key in zip(l.tolist(), m.tolist(), strict=True)]) / sizes[l, m][:, None]
     return np.asarray(np.where(part[:, None], values.imag, values.real))
+
+
+@dataclass(frozen=True)
+class LocalField:
+    """The field about a place, both told by runtime parameters: B and its first three derivatives are right there."""
+
+    first: int  # number of the first of these parameters: the place (m), then `entries` of the derivatives
+
+    ORDER: ClassVar[int] = 4  # of the potential: eddy currents in a floater ask for a slope of ∂²B
+    count: ClassVar[int] = 3 + ORDER * (ORDER + 2)
+
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m).
+
+        The gradient has what its own second derivatives at the place need, B what its first one needs.
+        """
+        way = [p - hy.par[self.first + i] for i, p in enumerate(position)]
+        names = [each for degree in range(1, self.ORDER + 1) for each in entries(degree)]
+        known = {each: hy.par[self.first + 3 + k] for k, each in enumerate(names)}
+        field = [hy.sum([known[i,], *(entry(known, (i, j)) * s for j, s in enumerate(way))]) for i in range(3)]
+        slopes = []
+        for i, j in UPPER:
+            terms = [known[i, j]]
+            for k, s in enumerate(way):
+                steep = [entry(known, (i, j, k, l)) * t for l, t in enumerate(way)]
+                terms.append(s * hy.sum([entry(known, (i, j, k)), 0.5 * hy.sum(steep)]))
+            slopes.append(hy.sum(terms))
+        return field, whole_gradient(slopes)
 
 
 @dataclass(frozen=True)

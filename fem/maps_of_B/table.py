@@ -242,6 +242,9 @@ class GriddedTable:
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         return self.expansions.expressions(position)
 
+    def derivatives(self, points: Array, order: int) -> Array:
+        return self.expansions.derivatives(points, order)
+
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
 

@@ -101,7 +101,7 @@ class Multipoles:
             keys = sorted({(l + order, abs(m + b)) for l, m, _ in kinds.values() for b in range(-order, order + 1)})
             place = [(p - float(c)) * (1.0 / self.scale) for p, c in zip(position, center, strict=True)]
             single = [{(*key, part): 1.0} for key in keys for part in (0, 1)]
-            sums = harmonic_sums(place, single, lambda _: 1.0)
+            sums = harmonic_sums(place, single, monic=True)
             known = dict(zip(keys, zip(sums[::2], sums[1::2], strict=True), strict=True))
             for number, (l, m, part) in kinds.items():
                 if m == 0:

@@ -15,7 +15,6 @@ from ...geometry.solids import Part, Solid
 from ..closed_forms.moments import carrier
 from ..closed_forms.uniform import UniformField
 from ..elements.ladder import RotorSolution, in_ball, potential_slopes, refinement_of, solve_rotor, strongest
-from ..harmonics.expressions import field_and_gradient
 from .models import Accuracy, fem_table
 from .table import RotorTable
 
@@ -174,12 +173,12 @@ def near_field(
         if on.any():
             places[on] += OFF_FACE * _normals(magnet.body, given[on])
     solved = elements or NearElements(magnets)
-    rows = [UniformField(one).rows(np.ascontiguousarray(places.T)) for one in solved.carriers if one.polarization.any()]
-    closed = sum(rows, np.zeros((12, len(places))))
+    closed = [UniformField(one).evaluate(places) for one in solved.carriers if one.polarization.any()]
     largest = max((float(np.linalg.norm(magnet.polarization)) for magnet in magnets), default=0.0)
     field, slope, error, steep, order = solved.reaction(places, rtol * largest, highest)
-    outer, outer_slope = field_and_gradient(closed)
-    field, slope, owner = field + outer, slope + outer_slope, owners(magnets, places)
+    owner = owners(magnets, places)
+    for outer, outer_slope in closed:
+        field, slope = field + outer, slope + outer_slope
     flux, gradient = field.copy(), slope.copy()
     for k, magnet in enumerate(magnets):
         mine, mu = owner == k, magnet.permeability_in_rotor

@@ -14,9 +14,9 @@ from ...geometry.magnets import Magnet
 from ...geometry.solids import moved
 from ..cache import TableKind
 from ..closed_forms.uniform import UniformField, squared_distance
-from ..harmonics.expansion import MultipoleExpansion, without_noise
-from ..harmonics.expressions import CompiledField, FieldExpressions, Number, as_columns, field_and_gradient
-from ..harmonics.solid import rotated_harmonics
+from ..harmonics.expansion import MultipoleExpansion, summed_derivatives, without_noise
+from ..harmonics.expressions import FieldExpressions
+from ..harmonics.solid import rotated_harmonics, tensors
 
 DEEP = 0.1  # of the radius of a doubt's sources: its terms are told no nearer to its centre
 BLUR = 0.5  # share of the root mean square of a doubt that is added to its field
@@ -77,10 +77,9 @@ class RotorTable:
     doubts: Mapping[str, tuple[MultipoleExpansion, ...]] = field(default_factory=dict)
     provenance: Mapping[str, str | float] = field(default_factory=dict)
 
-    def expressions(self, position: Sequence[hy.expression], number: Number = float) -> FieldExpressions:
-        """B and its gradient as heyoka expressions of a position (m, rotor's frame), its numbers as `number` writes."""
-        parts = [part.expressions(position, number) for part in self._closed_forms]
-        parts += [part.expressions(position, number) for part in self.expansions]
+    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+        parts = [part.expressions(position) for part in (*self._closed_forms, *self.expansions)]
         return (
             [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],
@@ -106,9 +105,15 @@ class RotorTable:
     def _closed_forms(self) -> tuple[UniformField, ...]:
         return tuple(UniformField(magnet) for magnet in self.uniform)
 
-    @cached_property
-    def _series(self) -> CompiledField:
-        return CompiledField(replace(self, uniform=()).expressions)
+    def derivatives(self, points: Array, order: int) -> Array:
+        """B and its derivatives up to `order` - 1, T, T/m, ..., by their `entries` (n, k), at `points` (n, 3) m.
+
+        Wherever they are: in a magnet, or where an expansion diverges, it is what the formulas say, if a number at all.
+        """
+        with np.errstate(all="ignore"):
+            parts = [part.derivatives(points, order) for part in self._closed_forms]
+            parts += [summed_derivatives(self.expansions, points, order)] if self.expansions else []
+        return sum(parts, np.zeros((len(points), order * (order + 2))))
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
@@ -117,20 +122,21 @@ class RotorTable:
         ------
         RangeError : a point lies in a magnet or where an expansion does not converge
         """
-        columns, outside = as_columns(points), self.in_range(points)
+        points = np.asarray(points, float).reshape(-1, 3)
+        outside = self.in_range(points)
         if not outside.all():
-            where = ", ".join(f"{c * 1e3:.6g}" for c in columns[:, int(np.argmin(outside))])
+            where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmin(outside))])
             nearest = max((expansion.nearest for expansion in self.expansions), default=0.0)
             beyond = f" and farther than {nearest * 1e3:.4g} mm from their centres" if nearest else ""
             raise RangeError(
                 f"Input points must lie outside the magnets{beyond}; instead received a point at ({where}) mm."
             )
-        rows = np.zeros((12, columns.shape[1]))
-        for form in self._closed_forms:  # apart from the series: far away and near surfaces they have other forms
-            rows += form.rows(columns)
-        if self.expansions:
-            rows += self._series.rows(columns)
-        return field_and_gradient(rows)
+        field, gradient = tensors(replace(self, uniform=()).derivatives(points, 2))
+        for part in self._closed_forms:
+            b, g = part.evaluate(points)
+            field += b
+            gradient += g
+        return field, gradient
 
     @property
     def moment(self) -> Array:
@@ -211,7 +217,7 @@ class RotorTable:
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""
-        columns = as_columns(points)
+        columns = np.ascontiguousarray(np.reshape(np.asarray(points, float), (-1, 3)).T)
         outside = np.ones(columns.shape[1], bool)
         for magnet in self.magnets:
             near = squared_distance(columns, magnet.body.center) < magnet.body.circumradius**2

@@ -41,7 +41,7 @@ def states(number):
 def test_a_moved_effect_is_that_of_the_moved_rotor(make, measure, move):
     """Rates and derivatives, as expressions and about a pose, of currents and answers: the same to round-off."""
     cube, there = (tuple(replace(m, conductivity=6.7e5) for m in make(x, *SHAPE)) for x in (0.0, measure))
-    scene, alone = scene_of(there), rotor_table(cube, "dipole")
+    scene = scene_of(there)
     kinds = {
         "currents": lambda rotor: RotorCurrents(ball_losses(pieces_of(rotor, ()), degree=2)),
         "answers": lambda rotor: Mutual(cached_mutual_table(rotor, PERMEABLE, print)[0], PERMEABLE.moment),
@@ -50,7 +50,7 @@ def test_a_moved_effect_is_that_of_the_moved_rotor(make, measure, move):
     values = parameters(scene, Scales.of(scene))
     values[Parameter.MEASURE] = measure
     for name, effect in kinds.items():
-        moved = MovedEffect(effect(cube), move, alone, name)
+        moved = MovedEffect(effect(cube), move, name)
         ours = Rates(Interaction(field, (moved,)))(states(4), values)
         theirs = Rates(Interaction(field, (effect(there),)))(states(4), values)
         bare = Rates(field)(states(4), values)
@@ -67,9 +67,7 @@ def test_its_power_is_that_of_the_moved_rotor():
     cube, there = (tuple(replace(m, conductivity=6.7e5) for m in make(x, *SHAPE)) for x in (0.0, measure))
     scene, found = scene_of(there), []
     for effect in (
-        MovedEffect(
-            RotorCurrents(ball_losses(pieces_of(cube, ()), degree=2)), move, rotor_table(cube, "dipole"), "moved"
-        ),
+        MovedEffect(RotorCurrents(ball_losses(pieces_of(cube, ()), degree=2)), move, "moved"),
         RotorCurrents(ball_losses(pieces_of(there, ()), degree=2)),
     ):
         equations = equations_of_motion(Interaction(rotor_table(there, "dipole"), (effect,)))
