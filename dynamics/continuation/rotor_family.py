@@ -7,7 +7,7 @@ which is where it is at measure zero, and are evaluated with the floater's motio
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import heyoka as hy
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ...fem.harmonics.solid import turned_entries
 from ...fem.mutual.making import cached_mutual_table
 from ...fem.rotor.choice import cached_rotor_table, rotor_table
-from ...fem.rotor.table import RotorTable
+from ...fem.rotor.table import FieldFormula, RotorTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import Array, InputError
 from ...geometry.magnets import Magnet
@@ -172,7 +172,7 @@ class RotorFamily:
         # Currents in the rotor's magnets are among the effects already.
         bare = tuple(replace(magnet, conductivity=None) for magnet in self.scene.rotor)
         scene = replace(self.scene, rotor=bare)
-        return Rates(with_effects(scene, Interaction(self.field, self.effects)), optimised=True)
+        return Rates(with_effects(scene, Interaction(cast(FieldFormula, self.field), self.effects)), optimised=True)
 
 
 def rotor_family(

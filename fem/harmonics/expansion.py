@@ -17,6 +17,7 @@ from .interior import Ball, moment
 from .solid import (
     FOUR_PI,
     Coefficients,
+    Entry,
     OuterSums,
     derivative,
     entries,
@@ -170,7 +171,7 @@ class MultipoleExpansion:
 
     def _slopes(self, order: int) -> list[Coefficients]:
         """Coefficients, of one size, of what `derivatives` gives."""
-        found = {(i,): -derivative(self.coefficients, i) for i in range(3)}
+        found: dict[Entry, Coefficients] = {(i,): -derivative(self.coefficients, i) for i in range(3)}
         for degree in range(2, order + 1):
             for each in entries(degree):
                 found[each] = derivative(found[each[:-1]], each[-1]) / self.radius

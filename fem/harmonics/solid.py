@@ -155,8 +155,8 @@ def _totals(sums: Sequence[OuterSums], places: Array) -> Array:
     ends = [count * sum(one.degree >= l for one in sums) for l in range(sums[0].degree + 1)]
     zonal, power = _zonal(ends, z, 1 / square), np.empty((len(ends), len(points)), complex)
     power[0], across = 1 / np.sqrt(square), x + 1j * y
-    for m, end in enumerate(ends[1:], 1):
-        np.multiply(power[m - 1, :end], -np.sqrt(1 - 0.5 / m) * across[:end], out=power[m, :end])
+    for order, end in enumerate(ends[1:], 1):
+        np.multiply(power[order - 1, :end], -np.sqrt(1 - 0.5 / order) * across[:end], out=power[order, :end])
     total = np.zeros((count, sums[0].weights[0].shape[1]))
     for k, one in enumerate(sums):
         (l, m, u, v), (even, odd), here = one.orders, one.weights, slice(k * count, (k + 1) * count)
@@ -228,9 +228,16 @@ def _spread(degree: int) -> Array:
     return np.array([entry(unit, tuple(indices)) for indices in np.ndindex((3,) * degree)]).T
 
 
+@cache
+def _kept(degree: int) -> NDArray[np.intp]:
+    """Places of `entries` in a flat tensor."""
+    return np.ravel_multi_index(np.array(entries(degree)).T.tolist(), (3,) * degree)
+
+
 def tensors(values: Array) -> list[Array]:
     """Derivatives (n, 3), (n, 3, 3), ... of harmonic functions, from their `entries` of degrees 1, 2, ... (n, k)."""
-    found, start = [], 0
+    found: list[Array] = []
+    start = 0
     while start < values.shape[1]:
         degree = len(found) + 1
         part = values[:, start : start + 2 * degree + 1] @ _spread(degree)
@@ -241,8 +248,8 @@ def tensors(values: Array) -> list[Array]:
 
 def contracted(degree: int, vector: Array) -> Array:
     """Matrix (2 degree + 1, 2 degree - 1) from `entries` of one degree to those of its tensor times a vector (3,)."""
-    whole = _spread(degree).reshape(-1, *(3,) * degree) @ vector
-    return np.array([whole[:, *each] for each in entries(degree - 1)]).T
+    whole = _spread(degree).reshape(-1, 3 ** (degree - 1), 3) @ vector
+    return np.asarray(whole[:, _kept(degree - 1)])
 
 
 def turned_entries(values: Array, axes: Array) -> Array:
@@ -251,8 +258,8 @@ def turned_entries(values: Array, axes: Array) -> Array:
     for degree, tensor in enumerate(tensors(values), 1):
         for _ in range(degree):  # each turns the first index and makes it the last
             tensor = np.einsum("nij,nj...->n...i", axes, tensor)
-        found += [tensor[:, *each] for each in entries(degree)]
-    return np.array(found).T
+        found.append(tensor.reshape(-1, 3**degree)[:, _kept(degree)])
+    return np.concatenate(found, axis=1)
 
 
 def members(degree: int) -> list[Member]:

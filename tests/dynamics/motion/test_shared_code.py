@@ -15,13 +15,13 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Floater, Scene
-from spinlev.geometry.shapes import Ring
+from spinlev.geometry.shapes import Cylinder
 
 ROTORS = [
     horizontal(2e-3, 10e-3, 1.305, 1.05),
     vertical(14e-3, 10e-3, 1.305, 1.05),
     tilt(np.radians(10.0), 10e-3, 1.305, 1.05),
-    (Magnet(Ring(6e-3, 3e-3, 5e-3), (1.2, 0.0, 0.3)),),
+    (Magnet(Cylinder(6e-3, 5e-3, inner_radius=3e-3), (1.2, 0.0, 0.3)),),
 ]
 
 

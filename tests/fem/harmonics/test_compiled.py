@@ -9,7 +9,7 @@ from spinlev.fem.harmonics.expansion import MultipoleExpansion, summed_derivativ
 from spinlev.fem.harmonics.expressions import CompiledField
 from spinlev.fem.harmonics.solid import BLOCK, entries, rotated_harmonics, tensors
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.shapes import Box, Cylinder, Ring, Sphere, rotation_matrix
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, rotation_matrix
 
 WAY = np.random.default_rng(3).normal(size=(100, 3))
 POINTS = np.linspace(0.015, 0.04, 100)[:, None] * WAY / np.linalg.norm(WAY, axis=1)[:, None]
@@ -19,7 +19,7 @@ BODIES = [
     Box((0.01, 0.01, 0.01)),
     Box((0.01, 0.012, 0.007), (1e-3, 2e-3, 0.0), TURN),
     Cylinder(5e-3, 8e-3, (0.0, 0.0, 1e-3), TURN),
-    Ring(6e-3, 3e-3, 5e-3),
+    Cylinder(6e-3, 5e-3, inner_radius=3e-3),
     Sphere(5e-3, (1e-3, 0.0, 0.0)),
 ]
 
