@@ -273,8 +273,8 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
         errors.append([_largest(row.field, b, 1), _largest(row.gradient, g, 2), row.stated, own])
         costs.append(list(row.costs.values()))
     found = (*np.array(errors).swapaxes(0, 1), *np.array(costs, float).T)
-    table = {**ERRORS, **COSTS}
-    data = columns(table, dict(zip(table, found, strict=True)))
+    both = {**ERRORS, **COSTS}
+    data = columns(both, dict(zip(both, found, strict=True)))
     coords = {
         "approach": list(catalogue),
         "family": ("approach", [method.family for method in catalogue.values()]),
