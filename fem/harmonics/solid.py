@@ -231,7 +231,7 @@ def _spread(degree: int) -> Array:
 @cache
 def _kept(degree: int) -> NDArray[np.intp]:
     """Places of `entries` in a flat tensor."""
-    return np.ravel_multi_index(np.array(entries(degree)).T.tolist(), (3,) * degree)
+    return np.asarray(np.ravel_multi_index(np.array(entries(degree)).T.tolist(), (3,) * degree))
 
 
 def tensors(values: Array) -> list[Array]:

@@ -25,11 +25,11 @@ from spinlev.geometry import rotor
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.files import parse_scene
 
-SHAPE = {"body": 10e-3, "remanence": 1.305, "recoil_permeability": 1.0}
+SHAPE = 10e-3, 1.305, 1.0
 SCENES = {
-    "horizontal": Scene(110.0, rotor.horizontal(2e-3, **SHAPE), FLOATER, Drag(0.0, 0.0)),
-    "vertical": Scene(80.0, rotor.vertical(14e-3, **SHAPE), FLOATER, Drag(0.0, 0.0)),
-    "tilt": Scene(130.0, rotor.tilt(np.radians(10.0), **SHAPE), FLOATER, Drag(0.0, 0.0)),
+    "horizontal": Scene(110.0, rotor.horizontal(2e-3, *SHAPE), FLOATER, Drag(0.0, 0.0)),
+    "vertical": Scene(80.0, rotor.vertical(14e-3, *SHAPE), FLOATER, Drag(0.0, 0.0)),
+    "tilt": Scene(130.0, rotor.tilt(np.radians(10.0), *SHAPE), FLOATER, Drag(0.0, 0.0)),
 }
 EIGHTH_ORDER = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
 
@@ -179,7 +179,7 @@ def test_starts_thinned_on_the_way_find_what_all_find(name, free, monkeypatch):
 
 @pytest.mark.parametrize(("name", "frequency", "spin", "distance"), PUBLISHED)
 def test_published_distances_of_the_family(name, frequency, spin, distance):
-    magnets = rotor.horizontal(1.7e-3, **SHAPE) if name == "horizontal" else rotor.vertical(14e-3, **SHAPE)
+    magnets = rotor.horizontal(1.7e-3, *SHAPE) if name == "horizontal" else rotor.vertical(14e-3, *SHAPE)
     scene = replace(SCENES[name], frequency=frequency, rotor=magnets)
     stable = [e for e in find_equilibria(scene, table_of(scene, "dipole"), spin) if e.stable]
     if distance is None:
