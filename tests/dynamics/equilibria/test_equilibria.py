@@ -128,11 +128,11 @@ def test_no_equilibrium_lies_off_the_curves(monkeypatch):
     for _ in range(90):
         edge, displacement, angle, spin = generator.uniform([6e-3, 0.0, 0.01, -0.6], [9.4e-3, 4e-3, 1.0, 0.6])
         kind = generator.integers(3)
-        shape = SHAPE | {"body": edge, "remanence": generator.uniform(0.6, 1.4)}
+        shape = edge, generator.uniform(0.6, 1.4), 1.0
         magnets = (
-            rotor.horizontal(displacement, **shape),
-            rotor.vertical(edge + displacement, **shape),
-            rotor.tilt(angle, **shape),
+            rotor.horizontal(displacement, *shape),
+            rotor.vertical(edge + displacement, *shape),
+            rotor.tilt(angle, *shape),
         )[kind]
         frequency = float(np.exp(generator.uniform(np.log(20.0), np.log(400.0))))
         scene = Scene(frequency, magnets, replace(FLOATER, radius=generator.uniform(2e-3, 8e-3)), Drag(0.0, 0.0))
