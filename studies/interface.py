@@ -123,7 +123,7 @@ def compare(
     >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
     >>> found = sl.compare(sl.scene(frequency_hz=130.0, rotor=cube, floater=ball), [120.0, 130.0])
     >>> (1e3 * found.distance.sel(model=["dipole", "cuboid"])).round(2).values.tolist()
-    [18.84, 19.11]
+    [18.83, 19.1]
     """
     grid = None if frequencies is None else np.array(checked_values({"frequencies": frequencies})["frequencies"])
     if grid is not None and grid.min() <= 0:
