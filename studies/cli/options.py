@@ -313,7 +313,21 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
         names = line[0].replace("**asked", ", ".join(Asked.__annotations__))
         return "\n".join(SHARED[name] for name in names.split(", "))
 
-    called.__doc__ = re.sub(rf"(?m)^(?:(?:{'|'.join(SHARED)}|\*\*asked)(?:, |$))+$", entries, doc)
+    own = [parameter for parameter in signature.parameters.values() if parameter.kind != parameter.VAR_KEYWORD]
+    if len(own) < len(signature.parameters):  # `**asked`, one by one
+        hints = {name: getattr(hint, "__forward_arg__", hint) for name, hint in Asked.__annotations__.items()}
+        only = inspect.Parameter.KEYWORD_ONLY
+        own += [inspect.Parameter(name, only, default=getattr(Models, name), annotation=hints[name]) for name in hints]
+    called.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
+    places = [parameter.name for parameter in own]
+
+    def in_order(section: re.Match[str]) -> str:
+        each = re.findall(r"(?m)^\w.*(?:\n    .*)*", section[2])
+        ordered = sorted(each, key=lambda entry: places.index(re.split(r"\W", entry)[0]))
+        return "\n".join([section[1].rstrip(), *ordered, ""])
+
+    whole = re.sub(rf"(?m)^(?:(?:{'|'.join(SHARED)}|\*\*asked)(?:, |$))+$", entries, doc)
+    called.__doc__ = re.sub(r"(Parameters\n-+\n)((?:.+(?:\n|$))+)", in_order, whole, count=1)
     return called
 
 
