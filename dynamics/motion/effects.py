@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...fem.mutual.making import without_response
+from ...fem.mutual.making import most_points, without_response
 from ...fem.rotor.floater import floater_sources
 from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
@@ -14,6 +14,7 @@ from .floater_effects import FLOATER_SHAPE, FloaterCurrents, FloaterShape, RealA
 from .rotor_effects import ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
+MOST_POINTS = 1000  # In a magnet, up to which mutual magnetisation is chosen: a floater of 3 mm below a cube of 10 mm
 NEAR = 2.0  # Distance from the rotor, in floater radii, at which induced forces are compared with `rtol`
 
 
@@ -55,7 +56,11 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
     part = rough_part(scene, table)
     if part < rtol:
         return False, f"about {part:.0e} of the force near the rotor, less than --rtol asks for"
-    return True, f"about {part:.1%} of the force near the rotor"
+    said = f"about {part:.1%} of the force near the rotor"
+    if (points := most_points(magnets, floater.radius)) > MOST_POINTS:
+        why = f"so small a floater needs {points} points in a magnet, which takes minutes"
+        return False, f"{said}; {why}; --interaction mutual includes it"
+    return True, said
 
 
 def rough_part(scene: Scene, table: FieldTable) -> float:

@@ -294,14 +294,37 @@ def trimmed_expansions(
     ]
     if not parts:
         return list(expansions), [_with(e, [], 0) for e in expansions]
-    fields = np.concatenate([_fields(e, [p for p in parts if p[0] == k], points) for k, e in enumerate(expansions)])
-    fields /= allowed[:, None]
+    degrees, own = (
+        np.array([l for _, l, _, _ in parts]),
+        [[p for p in parts if p[0] == k] for k in range(len(expansions))],
+    )
+    sizes, total, of_dipoles = np.empty(len(parts)), *np.zeros((2, len(points), 3))
+    start = 0
+    for expansion, mine in zip(expansions, own, strict=True):
+        fields, end = _fields(expansion, mine, points) / allowed[:, None], start + len(mine)
+        sizes[start:end] = np.linalg.norm(fields, axis=2).max(axis=1)
+        total += fields.sum(axis=0)
+        of_dipoles += fields[degrees[start:end] == 1].sum(axis=0)
+        start = end
     dipoles = [part for part in parts if part[1] == 1]
-    if _largest(fields.sum(axis=0)) <= 1:
+    if _largest(total) <= 1:
         dipoles = []
-    order = [i for i in np.argsort(-np.linalg.norm(fields, axis=2).max(axis=1)) if parts[i] not in dipoles]
+    else:
+        total -= of_dipoles
+    order = np.argsort(-sizes)
+    order = order[degrees[order] > 1] if dipoles else order
+    # Of parts that are less than allowed all together no field is kept: of ten thousands they take gigabytes.
+    order = order[np.cumsum(sizes[order][::-1])[::-1] > 1]
+    place = np.full(len(parts), -1)
+    place[order] = np.arange(len(order))
+    fields, start = np.empty((len(order), len(points), 3)), 0
+    for expansion, mine in zip(expansions, own, strict=True):
+        here = place[start : start + len(mine)]
+        chosen = [part for part, at in zip(mine, here, strict=True) if at >= 0]
+        fields[here[here >= 0]] = _fields(expansion, chosen, points) / allowed[:, None]
+        start += len(mine)
     # the fewest of the largest that will do: enough without a fit, and by halving with one
-    factors = _fewest(fields[order])
+    factors = _fewest(fields, total)
     kept = [(k, l, m, c * f) for (k, l, m, c), f in zip((parts[i] for i in order), factors, strict=False)]
     kept += dipoles
     missing = [(k, l, m, -c) for k, l, m, c in kept] + parts
@@ -311,9 +334,8 @@ def trimmed_expansions(
     )
 
 
-def _fewest(fields: Array) -> Array:
-    """Factors of the first few of the fields (k, n, 3), with which they make the sum of all to 1 at every point."""
-    total = fields.sum(axis=0)
+def _fewest(fields: Array, total: Array) -> Array:
+    """Factors of the first few of the fields (k, n, 3), with which they make the total (n, 3) to 1 at every point."""
     too_few, enough, left_out = 0, 0, total.copy()
     while enough < len(fields) and _largest(left_out) > 1:
         left_out -= fields[enough]

@@ -27,7 +27,7 @@ from ..closed_forms.uniform import remanent_field
 from ..harmonics.expansion import MultipoleExpansion
 from ..harmonics.expressions import FieldExpressions
 from ..harmonics.solid import Coefficients, derivative, field_sizes, field_spectrum, outer_sums
-from ..rotor.table import RangeError, RotorTable, error_below
+from ..rotor.table import RangeError, RotorTable, error_below, keeps_shape
 from .columns import METERS, TESLAS, UNITS, FieldMap, FieldMapError
 from .fit import FLOOR, MARGIN, HarmonicBasis, HarmonicFit, fit_harmonics
 from .read import read_field_map
@@ -245,12 +245,12 @@ class GriddedTable:
     def derivatives(self, points: Array, order: int) -> Array:
         return self.expansions.derivatives(points, order)
 
-    def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
-        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
+    @keeps_shape
+    def evaluate(self, points: Array) -> tuple[Array, Array]:
+        """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m in the rotor's frame.
 
         Raises RangeError: a point lies where the map does not determine the field.
         """
-        points = np.asarray(points, float).reshape(-1, 3)
         known = self.in_range(points)
         if not known.all():
             where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmin(known))])
@@ -264,9 +264,9 @@ class GriddedTable:
             text += f" and in the map's box from {millimetres(self.region[0])} to {millimetres(self.region[1])}"
         return text
 
-    def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Estimated relative errors (n,) of B and of its gradient (Frobenius norm), meant as upper bounds."""
-        points = np.asarray(points, float).reshape(-1, 3)
+    @keeps_shape
+    def relative_error(self, points: Array) -> tuple[Array, Array]:
+        """Estimated relative errors (...,) of B and of its gradient (Frobenius norm), meant as upper bounds."""
         b, g = self.evaluate(points)
         neglected_b, neglected_g = self.expansions.relative_error(points)
         spread_b, spread_g = self._spread(points)
@@ -276,9 +276,9 @@ class GriddedTable:
             FLOOR + neglected_g + COVERAGE * spread_g / (np.linalg.norm(g, axis=(1, 2)) + tiny),
         )
 
-    def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the points (n, 3) m lie outside the sources' spheres and where the map tells the field: (n,)."""
-        points = np.asarray(points, float).reshape(-1, 3)
+    @keeps_shape
+    def in_range(self, points: Array) -> NDArray[np.bool_]:
+        """Which of the points (..., 3) m lie outside the sources' spheres and where the map tells the field."""
         known: NDArray[np.bool_] = np.all((self.region[0] <= points) & (points <= self.region[1]), axis=1)
         for expansion in self.expansions.expansions:
             known &= np.linalg.norm(points - expansion.center, axis=1) > expansion.radius

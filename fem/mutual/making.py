@@ -146,7 +146,7 @@ def mutual_table(
                 f"instead one is {reason}"
             )
         box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
-        counts = point_counts(box, (1 + NEAREST) * floater.radius)
+        counts = _counts(magnet, floater.radius)
         n = int(np.prod(counts))
         zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
         axis = magnet.polarization / size if size else np.zeros(3)
@@ -172,6 +172,16 @@ def mutual_table(
     gaps, errors = mutual_errors(table, rotor, fine, floater, watch)
     made: dict[str, str | float] = {"order": order, "seconds": time.perf_counter() - started}
     return replace(table, gaps=gaps, errors=errors, provenance=made)
+
+
+def _counts(magnet: Magnet, radius: float) -> tuple[int, int, int]:
+    """Points along the edges of a `magnet` at which it responds to a floater of this `radius`, m."""
+    return point_counts(response_box(magnet.body), (1 + NEAREST) * radius)
+
+
+def most_points(magnets: Sequence[Magnet], radius: float) -> int:
+    """Largest number of points in one of the `magnets` of a table for a floater of this `radius`, m."""
+    return max(int(np.prod(_counts(magnet, radius))) for magnet in magnets)
 
 
 def without_response(magnet: Magnet) -> str:

@@ -16,7 +16,7 @@ from ..closed_forms.moments import carrier
 from ..closed_forms.uniform import UniformField
 from ..elements.ladder import RotorSolution, in_ball, potential_slopes, refinement_of, solve_rotor, strongest
 from .models import Accuracy, fem_table
-from .table import RotorTable
+from .table import RotorTable, keeps_shape
 
 LOWEST = 3  # order of the elements at first
 # At the edges; one more with every order up to here, as a step between equal layers does not tell what they leave
@@ -255,23 +255,23 @@ class CompleteTable(RotorTable):
             owner = owners(self.magnets, places)
         return NearField(flux, field, gradient, error, steep, owner, order)
 
-    def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
-        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame, in magnets, too.
+    @keeps_shape
+    def evaluate(self, places: Array) -> tuple[Array, Array]:
+        """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m in the rotor's frame, in magnets, too.
 
         Raises
         ------
         InputError : a point lies on an edge of a magnet
         """
-        places = np.asarray(points, float).reshape(-1, 3)
         if self._all_reached(places):
             refuse_edges(self.magnets, places)
             return super().evaluate(places)
         found = self.fields(places)
         return found.flux_density, found.gradient
 
-    def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Estimated errors (n,) of B (T) and of its gradient (T/m)."""
-        places = np.asarray(points, float).reshape(-1, 3)
+    @keeps_shape
+    def absolute_error(self, places: Array) -> tuple[Array, Array]:
+        """Estimated errors (...,) of B (T) and of its gradient (T/m)."""
         if self._all_reached(places):
             return super().absolute_error(places)
         found = self.fields(places)

@@ -1,9 +1,9 @@
 """The rotor's field as a table: where `fem` ends and `dynamics` begins."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Protocol
+from functools import cached_property, wraps
+from typing import Any, Protocol, TypeVar, cast
 
 import heyoka as hy
 import numpy as np
@@ -24,8 +24,30 @@ ROUND_OFF = 1e-13  # of a field and its gradient, relative
 KNOWN = "truncation"  # what is cut off an expansion is known exactly
 
 
+Found = TypeVar("Found", Array, tuple[Array, Array], NDArray[np.bool_])
+
+
 class RangeError(InputError):
     """A field was asked for where the table does not know it."""
+
+
+def keeps_shape(method: Callable[[Any, Array], Found]) -> Callable[[Any, ArrayLike], Found]:
+    """A method of points (n, 3) that takes points of any shape (..., 3) and gives what it finds in that shape.
+
+    Raises InputError for points of another shape.
+    """
+
+    @wraps(method)
+    def at(table: Any, points: ArrayLike) -> Found:
+        places = np.asarray(points, float)
+        if places.shape[-1:] != (3,):
+            raise InputError(f"Input points must have the shape (..., 3); instead received {places.shape}.")
+        found = method(table, places.reshape(-1, 3))
+        parts = found if isinstance(found, tuple) else (found,)
+        shaped = tuple(part.reshape(places.shape[:-1] + part.shape[1:]) for part in parts)
+        return cast(Found, shaped if isinstance(found, tuple) else shaped[0])
+
+    return at
 
 
 class FieldFormula(Protocol):
@@ -47,13 +69,13 @@ class FieldTable(FieldFormula, Protocol):
         """Name of the model."""
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
-        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame."""
+        """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m in the rotor's frame."""
 
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Estimated relative errors (n,) of B and of its gradient."""
+        """Estimated relative errors (...,) of B and of its gradient."""
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the points (n, 3) m lie where the table knows the field: (n,)."""
+        """Which of the points (..., 3) m lie where the table knows the field: (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +138,14 @@ class RotorTable:
             parts += [summed_derivatives(self.expansions, points, order)] if self.expansions else []
         return sum(parts, np.zeros((len(points), order * (order + 2))))
 
-    def evaluate(self, points: ArrayLike) -> tuple[Array, Array]:
-        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m in the rotor's frame.
+    @keeps_shape
+    def evaluate(self, points: Array) -> tuple[Array, Array]:
+        """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m in the rotor's frame.
 
         Raises
         ------
         RangeError : a point lies in a magnet or where an expansion does not converge
         """
-        points = np.asarray(points, float).reshape(-1, 3)
         outside = self.in_range(points)
         if not outside.all():
             where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmin(outside))])
@@ -145,22 +167,22 @@ class RotorTable:
         parts = [magnet.moment for magnet in self.uniform] + [expansion.moment for expansion in self.expansions]
         return np.asarray(np.sum(parts, axis=0))
 
-    def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Estimated relative errors (n,) of B and of its gradient (Frobenius norm)."""
-        points = np.asarray(points, float).reshape(-1, 3)
+    @keeps_shape
+    def relative_error(self, points: Array) -> tuple[Array, Array]:
+        """Estimated relative errors (...,) of B and of its gradient (Frobenius norm)."""
         b, g = self.evaluate(points)
         error_b, error_g = self.absolute_error(points)
         size_b, size_g = np.linalg.norm(b, axis=1), np.linalg.norm(g, axis=(1, 2))
         tiny = np.finfo(float).tiny
         return error_b / (size_b + tiny) + ROUND_OFF, error_g / (size_g + tiny) + ROUND_OFF
 
-    def absolute_error(self, points: ArrayLike) -> tuple[Array, Array]:
-        """Estimated errors (n,) of B (T) and of its gradient (T/m).
+    @keeps_shape
+    def absolute_error(self, points: Array) -> tuple[Array, Array]:
+        """Estimated errors (...,) of B (T) and of its gradient (T/m).
 
         The size of each doubt's field there and, but for `KNOWN` ones, a share of its root mean square on spheres about
         the expansions' centres, because the doubt's own zeros are not those of the error.
         """
-        points = np.asarray(points, float).reshape(-1, 3)
         error_b, error_g = np.zeros(len(points)), np.zeros(len(points))
         for cause, doubts in self.doubts.items():
             blur = 0.0 if cause == KNOWN else BLUR
@@ -216,8 +238,9 @@ class RotorTable:
             doubts={cause: there(parts) for cause, parts in self.doubts.items()},
         )
 
-    def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the points (n, 3) m lie outside the magnets and where the expansions converge: (n,)."""
+    @keeps_shape
+    def in_range(self, points: Array) -> NDArray[np.bool_]:
+        """Which of the points (..., 3) m lie outside the magnets and where the expansions converge."""
         columns = np.ascontiguousarray(np.reshape(np.asarray(points, float), (-1, 3)).T)
         outside = np.ones(columns.shape[1], bool)
         for magnet in self.magnets:

@@ -7,6 +7,8 @@ from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.plate.choice import rotor_nearby
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import Accuracy, points_around, shortened_table, typical_field
+from spinlev.fem.rotor.near_field import complete
+from spinlev.geometry.common import InputError
 from spinlev.geometry.rotor import horizontal
 
 ROTOR = horizontal(2e-3, 10e-3, 1.305, 1.0)
@@ -46,3 +48,18 @@ def test_a_flight_takes_the_table_for_its_place():
     assert coefficients(far) < coefficients(near) <= coefficients(whole)
     points = points_around(ROTOR, CONTACT)
     assert np.all(near.absolute_error(points)[0] <= 1.5 * RTOL * typical_field(ROTOR, points))
+
+
+def test_what_a_table_finds_has_the_shape_of_its_points():
+
+    points = np.random.default_rng(1).uniform(-1, 1, (3, 2, 3)) * 4e-3 - [0, 0, 0.02]
+    for table in (rotor_table(ROTOR, "dipole"), complete(rotor_table(ROTOR, "cuboid"))):
+        field, gradient = table.evaluate(points)
+        assert (field.shape, gradient.shape) == ((3, 2, 3), (3, 2, 3, 3))
+        assert [part.shape for part in table.relative_error(points)] == [(3, 2), (3, 2)]
+        assert table.in_range(points).all()
+        one, slope = table.evaluate(points[1, 1])
+        np.testing.assert_allclose(one, field[1, 1], rtol=1e-12)
+        np.testing.assert_allclose(slope, gradient[1, 1], rtol=1e-12, atol=1e-12)
+    with pytest.raises(InputError, match=r"shape \(..., 3\); instead received \(2,\)"):
+        table.evaluate([0.0, 1.0])
