@@ -314,13 +314,17 @@ class UniformField:
 
         Of cylinders and rings 1e-10, but for places in or beside them.
         """
-        field, gradient = tensors(self.derivatives(points, 2))
-        body = self.magnet.body
-        if not isinstance(body, Box | Part):  # in a round magnet, or so near that its segments do not do
-            close = body.distance(points) < (0.0 if isinstance(body, Sphere) else resolved_distance(body))
-            if close.any():
-                field[close] = round_tensor(body, points[close]) @ self.magnet.polarization_in_rotor
-                gradient[close] = round_slope(body, points[close]) @ self.magnet.polarization_in_rotor
+        body, polarization = self.magnet.body, self.magnet.polarization_in_rotor
+        if isinstance(body, Box | Part):
+            field, gradient = tensors(self.derivatives(points, 2))
+            return field, gradient
+        # in a round magnet, or so near that its segments do not do
+        close = body.distance(points) < (0.0 if isinstance(body, Sphere) else resolved_distance(body))
+        field, gradient = np.empty((len(points), 3)), np.empty((len(points), 3, 3))
+        field[~close], gradient[~close] = tensors(self.derivatives(points[~close], 2))
+        if close.any():
+            field[close] = round_tensor(body, points[close]) @ polarization
+            gradient[close] = round_slope(body, points[close]) @ polarization
         return field, gradient
 
 

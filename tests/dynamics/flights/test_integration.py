@@ -144,9 +144,9 @@ def test_start_inside_the_plate_is_refused():
 
 
 def test_without_a_stable_equilibrium_the_way_out_is_named():
-    with pytest.raises(EquilibriumError, match=r"At 90 Hz .* About [\d.]+ Hz has one") as refused:
+    with pytest.raises(EquilibriumError, match="possible at about") as refused:
         simulate(replace(SCENE, frequency=90.0), DIPOLE, 1.0)
-    named = float(re.search(r"About ([\d.]+) Hz", str(refused.value))[1])
+    named = float(re.search(r"at about ([\d.]+) Hz", str(refused.value))[1])
     found = {f: find_equilibria(replace(SCENE, frequency=f), DIPOLE) for f in (named, 90.0 + 0.1 * (named - 90.0))}
     assert [any(e.stable for e in known) for known in found.values()] == [True, False]  # so it is not far inside
     with pytest.raises(StartError, match="duration must be positive"):

@@ -40,7 +40,7 @@ def test_any_pose_agrees_with_quadrature_over_the_faces(size, turn, polarization
         return
     point = magnet.box.center + (magnet.box.circumradius + distance) * way / np.linalg.norm(way)
     expected = coulomb_field(magnet, point[None])[0]
-    found = table((magnet,)).evaluate(point)[0][0]
+    found = table((magnet,)).evaluate(point)[0]
     assert np.linalg.norm(found - expected) <= 1e-12 * np.linalg.norm(expected)
 
 
@@ -79,7 +79,7 @@ def test_far_away_it_is_the_dipole():
         n, m = point / distance, magnet.polarization * 1e-6
         dipole = (3 * n * (n @ m) - m) / (4 * np.pi * distance**3)
         # A cube has no octupole: the next part is (5 mm/r)^4 smaller, 1e-8 at 0.5 m; round-off is 1e-12 there.
-        assert table((magnet,)).evaluate(point)[0][0] == pytest.approx(dipole, rel=3e-8)
+        assert table((magnet,)).evaluate(point)[0] == pytest.approx(dipole, rel=3e-8)
 
 
 def test_symmetry_turning_magnet_and_point_turns_the_field():

@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from places import OVER_PLATE, SCENES
 import spinlev as sl
 from spinlev.fem.rotor.choice import MODELS
 from spinlev.fem.rotor.models import dipole_table
-from spinlev.studies.cli.options import Models
+from spinlev.studies.cli.options import NAMES, Models
 from spinlev.studies.figures.renderer import unavailable
 from spinlev.studies.run import main_job
 
@@ -43,7 +42,7 @@ def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path, poin
 def test_a_field_model_of_one_s_own_is_run_and_drawn(tmp_path, monkeypatch):
     """The recipe of docs/own-field-model.md: a function in `MODELS`, and its name in `FieldModel`."""
     monkeypatch.setitem(MODELS, "own", lambda magnets, accuracy: replace(dipole_table(magnets, accuracy), model="own"))
-    monkeypatch.setattr("spinlev.studies.cli.options.FieldModel", Literal["dipole", "own"])
+    monkeypatch.setitem(NAMES, "model", ("dipole", "own"))
     scene = sl.parse_scene(GOOD.replace("recoil_permeability = 1.05", "recoil_permeability = 1.0"))
     values, lines = main_job(scene, Models("own", "none"), 0.0, 0.01, tmp_path)
     assert values["model"] == "own"
