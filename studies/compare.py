@@ -88,7 +88,7 @@ def compared(scene: Scene, asked: Models, spin: float = 0.0) -> list[Compared]:
     ]
     both = finest.elsewhere(replace(alone, interaction="mutual"))
     try:
-        assert both.interaction
+        both.interaction  # noqa: B018  # refused here where it cannot be computed
         made.append((MUTUAL.format(best), both))
     except InputError as error:
         note(f"Left out: mutual magnetisation. {error}")
@@ -281,14 +281,15 @@ def compare_figure(result: xr.Dataset) -> Figure:
 def compare_job(scene: Scene, asked: Models, spin: float, frequencies: Array | None, out: Path) -> Job:
     """Every model's answers about a `scene`; writes compare.nc, compare.json and the figure to `out`."""
     rows = compared(scene, asked, spin)
+    best = rows[-1]
     result = compared_dataset(rows, frequencies)
     values = {
         "models": [row.row() for row in rows],
         "frequency_hz": scene.frequency,
-        "plate_model": result.attrs["plate_model"],
-        "error_estimate": float(rows[-1].found.position_error / rows[-1].found.distance) if rows[-1].found else None,
-        "model": rows[-1].name,
-        "tables_from_cache": rows[-1].levitation.from_cache,
+        **best.levitation.labels,  # of the last
+        # of the field where the floater levitates
+        "error_estimate": float(best.levitation.table.relative_error(best.found.position)[0]) if best.found else None,
+        "tables_from_cache": best.levitation.from_cache,
     }
     if frequencies is not None:
         branches = 1e3 * result["branch_distance"].values

@@ -37,6 +37,8 @@ def test_the_table_has_what_each_model_answers_alone(spinlev, tmp_path):
         # the branch passes through the scene's own equilibrium, found without continuation
         assert answer["distances_mm"][name][1] == pytest.approx(rows[name]["distance_mm"], abs=1e-6)
     assert answer["frequencies_hz"] == [100.0, 110.0, 120.0]
+    assert (answer["model"], answer["interaction"], answer["plate_model"]) == ("fem", "mutual", "none")
+    assert 0 < answer["error_estimate"] < 1e-3
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         f"compare.{kind}" for kind in ("nc", "json", "png", "pdf")
     }
