@@ -121,6 +121,8 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
         mean = gaussian_filter1d(values, 2 * len(time) / len(parts))
         rows = [(time[p].mean(), values[p].min(), mean[p].mean(), values[p].max()) for p in parts]
         middle, low, middling, high = np.array(rows).T
+        if len(parts) == PARTS:  # next to an end the mean would be of half a motion
+            middling[:4] = middling[-4:] = np.nan
         panel.fill_between(middle, low, high, color=PALETTE[5], alpha=0.6, lw=0, label="smallest to largest")
         panel.plot(middle, middling, color=PALETTE[0], lw=1.0, label="mean")
         panel.axvspan(time[near][0], time[near][-1], color=PALETTE[4], alpha=0.4, lw=0, label="shown in (b) and (d)")
