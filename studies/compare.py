@@ -283,7 +283,7 @@ def compare_job(scene: Scene, asked: Models, spin: float, frequencies: Array | N
     rows = compared(scene, asked, spin)
     best = rows[-1]
     result = compared_dataset(rows, frequencies)
-    values = {
+    values: dict[str, Any] = {
         "models": [row.row() for row in rows],
         "frequency_hz": scene.frequency,
         **best.levitation.labels,  # of the last

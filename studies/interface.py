@@ -38,6 +38,7 @@ from .cli.options import (
 from .compare import compared, compared_dataset
 from .demagnetising import working_point_dataset
 from .exchange import PLANES, field_map as plane_map
+from .figures.run import scene_figure
 from .levitation import Levitation
 from .plan import SceneLike, given_scene
 from .processes import mapped
@@ -523,13 +524,14 @@ def _computed(study: Study, points: Sequence[Point], engine: Workers, out: Path)
     return result
 
 
-def draw(result: xr.Dataset) -> Mapping[str, Figure]:
-    """The figures of a result; a notebook shows them.
+def draw(result: xr.Dataset | SceneLike) -> Mapping[str, Figure]:
+    """The figures of a result, or of a scene before anything is computed; a notebook shows them.
 
     Parameters
     ----------
-    result : xarray.Dataset
-        Of `equilibria`, `stability`, `simulate`, `sweep`, `run_study`, or read from a file.
+    result : xarray.Dataset, Scene, str or Path
+        Of `equilibria`, `stability`, `simulate`, `compare`, `sweep`, `run_study`, or read from a file; or a scene, or
+        the path of its file.
 
     Returns
     -------
@@ -539,6 +541,6 @@ def draw(result: xr.Dataset) -> Mapping[str, Figure]:
     Raises
     ------
     InputError
-        The result has no figure.
+        The result has no figure, or the scene cannot be used.
     """
-    return figures_of(result)
+    return figures_of(result) if isinstance(result, xr.Dataset) else {"scene": scene_figure(given_scene(result))}

@@ -8,9 +8,13 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import ConvexHull
 
 from ...geometry.common import Array
+from ...geometry.scene.contents import AbsoluteStart, Scene
+from ...geometry.solids import Solid
 from .style import COLORS, COLUMN, DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
+from .view import near_plate, triangles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,6 +39,41 @@ QUANTITIES = {
     "flight": ("levitated", "height_spread"),
     "field": ("across", "along", "B_error"),
 }  # Quantities drawn for each question, those of the motion in the laboratory
+
+
+@styled
+def scene_figure(scene: Scene) -> Figure:
+    """A scene to scale, from the side and from above, as it stands at t = 0; nothing is computed for it."""
+    from matplotlib.patches import Polygon
+
+    figure, ((side, top),) = panels(1, 2, (PAGE, 3.4))
+    lowest = min(float(magnet.box.corners[:, 2].min()) for magnet in scene.rotor)
+    name, moment = "floater (where it levitates is not computed)", np.eye(3)[2]
+    where = np.array([0.0, 0.0, lowest - 2 * scene.floater.radius])
+    if isinstance(start := scene.start, AbsoluteStart):
+        name, where, moment = "floater, at its start", start.position, start.moment
+    bodies: list[tuple[Solid, str, str]] = [(scene.floater.placed(where, moment), PALETTE[1], name)]
+    bodies += [(magnet.body, PALETTE[0], "magnet") for magnet in scene.rotor]
+    bodies += [(part.body, "0.5", "conductor of the rotor") for part in scene.conductors]
+    reach = max(float(np.abs(1e3 * triangles(body)[0]).max()) for body, _, _ in bodies)
+    if scene.plate:
+        bodies.insert(0, (near_plate(scene.plate.box, 2e-3 * reach), "0.7", "plate, or the part that is near"))
+    for panel, (across, up) in ((side, (0, 2)), (top, (0, 1))):
+        for body, color, name in bodies:
+            corners = 1e3 * triangles(body)[0][:, [across, up]]
+            outline = corners[ConvexHull(corners).vertices]
+            panel.add_patch(Polygon(outline, facecolor=color, alpha=0.4, edgecolor=color, label=name))
+        for magnet in scene.rotor:
+            size = np.linalg.norm(magnet.polarization) or 1.0
+            length = 0.4e3 * magnet.body.volume ** (1 / 3)
+            begin, arrow = 1e3 * magnet.body.center, length * magnet.polarization_in_rotor / size
+            ends = (begin + arrow)[[across, up]], (begin - arrow)[[across, up]]
+            panel.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": PALETTE[0]})
+        panel.set(aspect="equal", xlabel="x (mm)", ylabel=f"{'xyz'[up]} (mm)")
+        panel.autoscale_view()
+    side.axvline(0.0, color="0.3", lw=0.8, ls="-.", label="axis of rotation")
+    legend_below(figure, side, columns=3)
+    return figure
 
 
 @styled

@@ -277,3 +277,15 @@ def test_magnitudes_that_no_magnet_has_are_told(caplog):
     far = {"size_mm": [0.012, 10, 10], "center_mm": [0, 0, 2e4], "polarization_T": [1.3, 0, 0]}
     sl.scene(frequency_hz=130.0, rotor=sl.magnets(far), floater=ball)
     assert "a size of 0.012 mm, a magnet 20 m from the rotor's origin" in caplog.text
+
+
+def test_a_scene_is_drawn_before_anything_is_computed(tmp_path):
+    figure = sl.draw(SCENES / "vertical-24h.toml")["scene"]
+    side, top = figure.axes
+    assert [panel.get_ylabel() for panel in (side, top)] == ["z (mm)", "y (mm)"]
+    names = [patch.get_label() for patch in side.patches]
+    assert names.count("magnet") == 2
+    corners = [patch.get_xy() for patch in side.patches if patch.get_label() == "magnet"]
+    assert sorted(float(outline[:, 1].min()) for outline in corners) == pytest.approx([-5.0, 9.0])  # as in the file
+    with pytest.raises(sl.InputError, match="must be a Scene or the path"):
+        sl.draw(3)
