@@ -10,7 +10,7 @@ from second_opinions.plate_tables import reaction_gradient
 
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.search import find_equilibria, with_plate
-from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, starting_point
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, TOLERANCE, Flight, initial_state, integrate, starting_point
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
@@ -66,7 +66,8 @@ def test_what_a_steady_turn_loses_is_that_of_the_frequency_domain():
 
 
 @pytest.mark.slow
-def test_ledger_of_ten_seconds():
+@pytest.mark.parametrize("tolerance", [TOLERANCE, PLATE_TOLERANCE])
+def test_energy_is_balanced_for_ten_seconds(tolerance):
     """Work = change of energy + loss in the plate, by drag and in the floater, after a kick: 1e-8 asked."""
     scene = replace(SCENE, floater=replace(FLOATER, conductivity=6.7e5))
     table = rotor_table(MAGNETS, "dipole")
@@ -74,7 +75,7 @@ def test_ledger_of_ten_seconds():
     fixed = starting_point(find_equilibria(scene, table, rates=rates))
     found = with_plate(scene, table, Survey((fixed,), ()), memory, rates).equilibria[0]
     kicked = replace(found.start, velocity=found.start.velocity + np.array([0.03, 0.02, 0.05]))
-    flight = Flight(scene, table, 10.0, memory=memory)
+    flight = Flight(scene, table, 10.0, tolerance, memory=memory)
     motion = integrate(flight, kicked, 10.0, currents=found.currents[0])
     print(f"\n10 s over a slab, {len(memory.table.rates)} states: ledger {motion.energy_error:.1e}")
     assert motion.ended_by == "duration"
