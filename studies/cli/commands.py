@@ -246,6 +246,7 @@ def plate(
 
 def study(
     name: str | None = None,
+    scene: Path | None = None,
     *,
     list: Flag = False,
     quick: Flag = False,
@@ -267,6 +268,8 @@ def study(
     ----------
     name
         Name of the study; with --vary a scene file.
+    scene
+        None: studies are of the article's scenes; for your own there are `compare` and --vary.
     list
         Show the catalogue.
     quick
@@ -280,6 +283,12 @@ def study(
     duration_s
         Duration of the trajectories asked for, s.
     """
+    if scene is not None:
+        raise InputError(
+            f"Input scene must be left out, as studies are of the article's scenes; instead received {scene}. For a "
+            f"scene of your own: spinlev compare {scene} (dipole against finite elements), or "
+            f"spinlev study {scene} --vary KEY=FIRST:LAST:STEP."
+        )
     if vary:
         if name is None:
             raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")
@@ -297,8 +306,8 @@ def study(
         summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
         return Answer({"studies": summaries}, [f"{k:22} {v}" for k, v in summaries.items()], output.json)
     if name not in CATALOGUE:
-        scene = " A scene needs --vary." if name and name.endswith(".toml") else ""
-        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.{scene}")
+        more = " A scene needs --vary." if name and name.endswith(".toml") else ""
+        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.{more}")
     from ..catalogue.runner import study_job
 
     return Answer(*study_job(name, quick, engine.checked(), output.folder), output.json)
