@@ -77,6 +77,7 @@ class Worker:
         self._waiting[key] = call, receive
         if not self.busy:
             self._task = asyncio.get_running_loop().create_task(self._work())
+            self._task.add_done_callback(_stopped)
 
     def stop(self) -> None:
         """End the process, whatever it is doing, and forget all questions."""
@@ -141,6 +142,13 @@ class Worker:
                 loop.remove_reader(connection.fileno())
         found: tuple[Any, str] = connection.recv()
         return found
+
+
+def _stopped(task: asyncio.Task[None]) -> None:
+    """A signal that stops the program may come while a task runs, whose fault it is not: nothing is told of it then."""
+    error = None if task.cancelled() else task.exception()
+    if error is not None and not isinstance(error, KeyboardInterrupt):
+        raise error
 
 
 def _end(process: ForkServerProcess) -> None:

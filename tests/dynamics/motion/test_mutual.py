@@ -85,10 +85,10 @@ def test_rough_rates_leave_out_all_answers_but_the_uniform_one(mutual, start):
     assert np.abs(rough[0] - rates(state, values)[0]).max() > 1e-4
 
 
-def test_a_tiny_floater_is_compared_where_the_table_reaches():
+def test_a_small_floater_is_compared_where_the_table_reaches():
     """Two of its radii below a large magnet a table of finite elements does not know the field."""
     cube = horizontal(0.0, 10e-3, 1.2, 1.05)
-    table, reach = rotor_table(cube, "cuboid"), 5e-3 + 2.9e-3
+    table, reach = rotor_table(cube, "cuboid"), 5e-3 + 4e-3
 
     class Far:
         model = "fem"
@@ -100,10 +100,14 @@ def test_a_tiny_floater_is_compared_where_the_table_reaches():
             assert self.in_range(points).all()
             return table.evaluate(points)
 
-    tiny = replace(SCENE, rotor=cube, floater=replace(PERMEABLE, radius=0.5e-3))
-    included, why = mutual_choice(tiny, Far(), "auto", 1e-6)
+    small = replace(SCENE, rotor=cube, floater=replace(PERMEABLE, radius=1.5e-3))
+    included, why = mutual_choice(small, Far(), "auto", 1e-6)
     assert included
     assert "of the force near the rotor" in why
+    tiny = replace(small, floater=replace(PERMEABLE, radius=0.5e-3))
+    included, why = mutual_choice(tiny, Far(), "auto", 1e-6)
+    assert not included
+    assert "so small a floater needs 4096 points in a magnet" in why
 
 
 @pytest.mark.parametrize("formula", [SMALL, LARGE])

@@ -122,7 +122,7 @@ def test_the_side_mode_balances_the_lateral_force():
     table = rotor_table(scene.rotor, "dipole")
     (state,) = [e.state for e in find_equilibria(scene, table) if e.stable]
     _, gradient = table.evaluate(state.position)
-    force = FLOATER.moment * state.moment @ gradient[0, :, 0]
+    force = FLOATER.moment * state.moment @ gradient[:, 0]
     expected = -force / (FLOATER.mass * scene.angular_velocity**2)
     assert float(found["radius"]) == pytest.approx(expected, rel=1e-3)  # drag turns the circle a little
     radius = np.hypot(found["flight_x"], found["flight_y"])
