@@ -14,6 +14,7 @@ from .floater_effects import FLOATER_SHAPE, FloaterCurrents, FloaterShape, RealA
 from .rotor_effects import ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
+LARGEST = 5000  # Points in a magnet with which mutual magnetisation is computed at all: minutes
 MOST_POINTS = 1000  # In a magnet, up to which mutual magnetisation is chosen: a floater of 3 mm below a cube of 10 mm
 NEAR = 2.0  # Distance from the rotor, in floater radii, at which induced forces are compared with `rtol`
 
@@ -46,18 +47,26 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
             )
     if floater.recoil_permeability == 1 and all(magnet.contrast == 0 for magnet in magnets):
         return False, NOTHING_ANSWERS
+    points = 0 if reasons else most_points(magnets, floater.radius)
     if asked == "mutual":
+        if points > LARGEST:
+            raise InputError(
+                "Input --interaction must be rigid or auto for a floater so small beside its magnets; instead received "
+                f"mutual, for which a magnet would respond at {points} points ({LARGEST} at most)."
+            )
         return True, "as asked"
     if table.model != "fem":
         return False, f"the field model {table.model} has no permeability"
     if reasons:
         why = reasons[min(reasons)].split(".")[0]
         return False, f"what is induced in magnet {min(reasons)} is not known: it is {why}"
+    if points > LARGEST:
+        return False, f"so small a floater would need {points} points in a magnet"
     part = rough_part(scene, table)
     if part < rtol:
         return False, f"about {part:.0e} of the force near the rotor, less than --rtol asks for"
     said = f"about {part:.1%} of the force near the rotor"
-    if (points := most_points(magnets, floater.radius)) > MOST_POINTS:
+    if points > MOST_POINTS:
         why = f"so small a floater needs {points} points in a magnet, which takes minutes"
         return False, f"{said}; {why}; --interaction mutual includes it"
     return True, said

@@ -20,6 +20,7 @@ from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
+from spinlev.geometry.common import InputError
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
@@ -108,6 +109,8 @@ def test_a_small_floater_is_compared_where_the_table_reaches():
     included, why = mutual_choice(tiny, Far(), "auto", 1e-6)
     assert not included
     assert "so small a floater needs 4096 points in a magnet" in why
+    with pytest.raises(InputError, match="for a floater so small beside its magnets"):
+        mutual_choice(replace(tiny, floater=replace(PERMEABLE, radius=1e-6)), Far(), "mutual", 1e-6)
 
 
 @pytest.mark.parametrize("formula", [SMALL, LARGE])
