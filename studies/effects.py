@@ -14,6 +14,7 @@ from ..dynamics.motion.floater_effects import (
     REAL_AIR,
     SLOW_ENOUGH,
     reynolds,
+    scene_effects,
     slow_error,
     swinging,
 )
@@ -56,7 +57,9 @@ class ListedEffect:
 def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) -> list[ListedEffect]:
     """All effects that are known, with what they do to the first of the equilibria."""
     first = next(iter(equilibria), None)
-    return [part(levitation, first) for part in (_mutual, _rotor_currents, _floater_currents, _air)]
+    found = [part(levitation, first) for part in (_mutual, _rotor_currents, _floater_currents, _air)]
+    others = {effect.name for effect in scene_effects(levitation.scene)} - {effect.name for effect in found}
+    return [*found, *(ListedEffect(name, True, None, None, "given in the scene") for name in sorted(others))]
 
 
 def effects_summary(levitation: Levitation, effects: Sequence[ListedEffect]) -> dict[str, Any]:

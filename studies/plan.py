@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..dynamics.motion.floater_effects import scene_effects
 from ..dynamics.motion.plate import PlateMemory
 from ..fem.maps_of_B.table import GriddedTable, map_table
 from ..fem.mutual.making import mutual_key
@@ -165,7 +166,7 @@ def equations_key(scene: Scene, models: Models) -> str:
     return " ".join(
         (
             field_key(scene, models.model, models.rtol),
-            f"{bool(floater.conductivity)} {scene.drag.air} {models.interaction}",
+            f"{scene_effects(scene)} {models.interaction}",
             "" if models.interaction == "rigid" else mutual_key(scene.rotor, floater),
             losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
             shape,

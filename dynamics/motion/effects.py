@@ -8,9 +8,9 @@ from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
-from .effect import Effect, Interaction, interaction_of
+from .effect import Interaction, interaction_of
 from .equations import FORCE_ALONE
-from .floater_effects import FLOATER_SHAPE, FloaterCurrents, FloaterShape, RealAir, check_floater_metal
+from .floater_effects import FLOATER_SHAPE, FloaterShape, check_floater_metal, scene_effects
 from .rotor_effects import ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
 
 NOTHING_ANSWERS = "neither rotor nor floater is permeable"
@@ -96,12 +96,10 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     """
     whole = interaction_of(table)
     check_floater_metal(scene)
-    effects: list[Effect] = [FloaterCurrents()] if scene.floater.conductivity else []
+    effects = scene_effects(scene)
     if scene.floater.body is not None and FLOATER_SHAPE not in {effect.name for effect in whole.effects}:
         scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
         effects.append(FloaterShape.of(scene.floater, floater_sources(scene.floater), whole.field))
-    if scene.drag.air:
-        effects.append(RealAir())
     pieces = pieces_of(scene.rotor, scene.conductors)
     if pieces:
         scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)

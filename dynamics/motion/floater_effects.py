@@ -56,7 +56,7 @@ from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AIR_VISCOSITY, Floater, Scene
-from .effect import Added, DerivedField, Motion, dissipative
+from .effect import Added, DerivedField, Effect, Motion, dissipative
 from .state import Parameter, Vector, cross, dot
 
 REAL_AIR = "air beyond Stokes"
@@ -94,6 +94,11 @@ class RealAir:
     """What air does beyond the Stokes drag that the runtime parameters hold."""
 
     name: str = REAL_AIR
+
+    @classmethod
+    def of(cls, scene: Scene) -> RealAir | None:
+        """See `OF_SCENE`."""
+        return cls() if scene.drag.air else None
 
     def added(self, motion: Motion) -> Added:
         length, time, spin, moment = hy.par[Parameter.LENGTH], hy.par[Parameter.TIME], motion.spin, motion.moment
@@ -257,6 +262,11 @@ class FloaterCurrents:
 
     name: str = FLOATER_CURRENTS
 
+    @classmethod
+    def of(cls, scene: Scene) -> FloaterCurrents | None:
+        """See `OF_SCENE`."""
+        return cls() if scene.floater.conductivity else None
+
     def added(self, motion: Motion) -> Added:
         length, inertia = hy.par[Parameter.LENGTH], hy.par[Parameter.INERTIA]
         tilt, along = hy.par[Parameter.TILT_EDDY], hy.par[Parameter.SPIN_EDDY]
@@ -364,3 +374,14 @@ def _commutator(turn: Vector, matrix: Matrix) -> Matrix:
 
 def _contracted(a: Matrix, b: Matrix) -> hy.expression:
     return hy.sum([a[i][j] * b[i][j] for i in range(3) for j in range(3)])
+
+
+# The effects that a scene alone decides: `of(scene)` is one, or None where the scene is without it. Searches, flights,
+# lists of effects and the keys of shared equations take from here what there is. Scenes that differ in frequency alone
+# share their equations: what depends on it an effect takes from the runtime parameters.
+OF_SCENE = FloaterCurrents, RealAir
+
+
+def scene_effects(scene: Scene) -> list[Effect]:
+    """The effects of `OF_SCENE` that a scene has."""
+    return [effect for kind in OF_SCENE if (effect := kind.of(scene))]

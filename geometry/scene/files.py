@@ -29,7 +29,7 @@ MOST_OF_MAP = 1_000_000_000  # Bytes of a map of the field
 # A dotted key of so many parts: reading it takes time and memory that grow with their square.
 LONGEST_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*\.[ \t]*){20}""")
 # The unit at a key's end, and its size where it is not that of the objects of a scene.
-UNIT = re.compile(r"_(mm_s|mm|kA_m|hz|s|T|S_m|kg_m3|N_s_m|N_m_s)$")
+UNIT = re.compile(r"_(mm_s|mm|kA_m|hz|s|T|S_m|kg_m3|N_s_m|N_m_s|m_s2)$")
 IN_SI = {"_mm_s": 1e-3, "_mm": 1e-3, "_kA_m": 1e3, "_hz": 2 * np.pi}
 DECIMAL_COMMA = re.compile(r"(?m)^[^#\n\[]*=\s*[-+]?\d+,\s*\d")
 DEEPEST = 10  # Tables and lists in each other; a scene has five
@@ -185,6 +185,7 @@ def scene(
     gravity_m_s2: Sequence[float] = (0.0, 0.0, -9.81),
     drag: Mapping[str, Any] | None = None,
     start: Mapping[str, Any] | None = None,
+    **more: Any,
 ) -> Scene:
     """A scene from the tables of a scene file; the object itself is in SI units.
 
@@ -203,6 +204,8 @@ def scene(
     start : dict, optional
         "offset_mm" from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz"; left
         out, 0.1 mm above the stable equilibrium.
+    **more : float or list
+        Further keys that stand in no table of a scene file.
 
     Returns
     -------
@@ -222,7 +225,7 @@ def scene(
     >>> sl.scene(frequency_hz=130.0, rotor=cube, floater=ball).frequency
     130.0
     """
-    keys = {"frequency_hz": frequency_hz, "gravity_m_s2": gravity_m_s2, "rotor": rotor, "floater": floater}
+    keys = {"frequency_hz": frequency_hz, "gravity_m_s2": gravity_m_s2, "rotor": rotor, "floater": floater, **more}
     keys |= {name: table for name, table in (("plate", plate), ("drag", drag), ("start", start)) if table is not None}
     return _warned(assemble(_plain(keys), "scene"))
 
@@ -384,15 +387,15 @@ def _all_rounded(values: Array) -> list[float]:
     return [_rounded(value) if abs(value) > scale else 0.0 for value in values]
 
 
-# What of a scene each key or table of its file decides, and how that is written from the object.
+# What of a scene each key or table of its file decides, and how that is written from the object. Any other key decides
+# the attribute of its name without the unit.
 FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
+    key: ((UNIT.sub("", key),), lambda scene, key=key: _said(schema.SceneTable, scene).get(key))
+    for key in schema.SceneTable.model_fields
+} | {
     "frequency_hz": (("frequency",), lambda scene: float(scene.frequency)),
-    "gravity_m_s2": (("gravity",), lambda scene: scene.gravity.tolist()),
     "rotor": (("rotor", "conductors", "field_map", "map_reading"), _rotor),
-    "floater": (
-        ("floater",),
-        lambda scene: _said(schema.FloaterTable, scene.floater) | shape_keys(scene.floater.solid),
-    ),
+    "floater": (("floater",), _floater),
     "plate": (("plate",), _plate),
     "drag": (("drag", "floater"), _drag),
     "start": (("start",), _start),
