@@ -52,7 +52,7 @@ def test_field_unknowns(benchmark, order):
 def test_plate_unknowns(benchmark, order):
     """Assembly and solution of the eddy currents by elements of rising order."""
     body = np.array([[0.003, 0.002, 0.035]])
-    mesh = plate_mesh(PLATE.box.size, PLATE.conductivity, body, 100.0, MeshRule())
+    mesh = plate_mesh(PLATE.body, PLATE.conductivity, body, 100.0, MeshRule())
     found = benchmark.pedantic(solve_eddy, (mesh, order, 100.0, unit_dipoles(body)), rounds=1)
     benchmark.extra_info["size"] = found.coupling_unknowns
 

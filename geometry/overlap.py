@@ -119,8 +119,8 @@ def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:
     return radius - float(body.distance(center))
 
 
-def deepest_overlap_in_a_turn(rotating: Solid, fixed: Box) -> float:
-    """Largest penetration depth of a body that turns about z into a fixed box, m; negative if always apart."""
+def deepest_overlap_in_a_turn(rotating: Solid, fixed: Solid) -> float:
+    """Largest penetration depth of a body that turns about z into a fixed one, m; negative if always apart."""
     origin = np.zeros(3)
     clear = float(fixed.distance(origin)) - rotating.farthest(origin)
     if clear > 0:  # it never leaves a sphere that does not reach the fixed one

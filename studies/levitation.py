@@ -479,7 +479,7 @@ class Levitation:
         if plate is None or self.plate is not None or self.models.plate_model != "auto" or self._nearest is not None:
             return False
         way = _seen(plate, flown)
-        self._nearest = way[int(np.argmin(plate.box.distance(way)))]
+        self._nearest = way[int(np.argmin(plate.body.distance(way)))]
         if plate_plan(self.scene, self.models, self._nearest).model == "none":
             return False
         note("The floater comes so near to the plate that its currents count; it begins anew with them.")

@@ -188,7 +188,7 @@ def check_way(scene: Scene, place: Array) -> None:
 
 def check_room(scene: Scene, place: Array) -> None:
     """A plate that leaves a floater at `place` (3,) m no room is a wrong scene: InputError."""
-    depth = sphere_overlap(place, scene.floater.inner_radius, scene.plate.box) if scene.plate else 0.0
+    depth = sphere_overlap(place, scene.floater.inner_radius, scene.plate.body) if scene.plate else 0.0
     if scene.plate and depth > TOUCHING:
         center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
         raise InputError(

@@ -119,7 +119,7 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
         raise InputError("Input scene must have a [plate]; instead received none.")
     if not (np.isfinite(frequency) and frequency >= 0):
         raise InputError(f"Input --frequency-hz must be finite and not negative; instead received {frequency}.")
-    distance, farthest = float(plate.box.distance(place)), FARTHEST * float(plate.box.size.max())
+    distance, farthest = float(plate.body.distance(place)), FARTHEST * float(plate.box.size.max())
     if not NEAREST <= distance <= farthest:
         where = ", ".join(f"{c * 1e3:.6g}" for c in place)
         raise InputError(
@@ -156,7 +156,7 @@ def response(
         return model, found.tensors[0], float(found.error_estimate[0]), []
     if model == "reduced":
         note("Reduced plate model ...")
-        reach = NEARBY * float(plate.box.distance(place))
+        reach = NEARBY * float(plate.body.distance(place))
         frequencies = LOWEST, max(HIGHEST, frequency)
         table, cached = cached_plate_table(plate, Region(body - reach, body + reach), frequencies, rtol, note)
         tensor = turn @ table.reaction_tensor(body, frequency)[0] @ turn.T

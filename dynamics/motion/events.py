@@ -31,7 +31,7 @@ def flight_events(scene: Scene, position: Vector) -> Events:
     metres = [length * p for p in position]
     gaps = [_excess(body, metres) for body in scene.turning_bodies]
     if scene.plate is not None:
-        gaps.append(_excess(scene.plate.box, raised(position)))
+        gaps.append(_excess(scene.plate.body, raised(position)))
     within = (scene.floater.inner_radius / scene.floater.radius) ** 2  # its own contact is found at the samples
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
     return [*((gap / (length * length) - within, CONTACT) for gap in gaps), (reach, LOST)]
@@ -73,7 +73,7 @@ def clearance(scene: Scene, time: Array, position: Array, moment: Array | None =
     if scene.plate is not None:
         seen = turned_about_z(position, scene.angular_velocity * time)
         seen[:, 2] += plate_depth(scene.plate, time)
-        gaps.append(scene.plate.box.distance(seen))
+        gaps.append(scene.plate.body.distance(seen))
     found = np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
     if scene.floater.body is not None and moment is not None:
         for k in np.flatnonzero(found < 0):
@@ -88,7 +88,7 @@ def _own_gap(scene: Scene, time: float, position: Array, moment: Array) -> float
     if scene.plate is not None:
         turn = scene.angular_velocity * time
         seen = turned_about_z(position, turn) + plate_depth(scene.plate, np.array([time])) * [0.0, 0.0, 1.0]
-        gaps.append(-body_overlap(scene.plate.box, floater.placed(seen, turned_about_z(moment, turn))))
+        gaps.append(-body_overlap(scene.plate.body, floater.placed(seen, turned_about_z(moment, turn))))
     return min(gaps)
 
 

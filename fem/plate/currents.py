@@ -520,6 +520,6 @@ def cached_currents(
 
     The same `plate`, `boxes`, `frequencies`, `rtol`, `rule` and `others`; `report` gets messages, `watch` progress.
     """
-    inputs = plate.box.size, plate.conductivity, tuple(boxes), frequencies, rtol, rule, others
+    inputs = plate.body.shape_numbers, plate.conductivity, tuple(boxes), frequencies, rtol, rule, others
     make = partial(solve_currents, plate, boxes, frequencies, rtol, rule, others, watch)
     return CURRENTS.cached(inputs, make, report)[0]

@@ -336,7 +336,7 @@ class Ladder:
         growing: bool = False,
         watch: Watch = unwatched,
     ) -> None:
-        self.mesh = plate_mesh(plate.box.size, plate.conductivity, places, frequency, rule)
+        self.mesh = plate_mesh(plate.body, plate.conductivity, places, frequency, rule)
         cells = int(self.mesh.mesh.ne)
         orders = [p for p in range(3, HIGHEST_ORDER + 1) if cells * (3 * p * (p + 2) + 2 * p + 1) <= MOST_UNKNOWNS]
         if not orders:
@@ -438,7 +438,7 @@ def plate_reaction(
 
     Parameters
     ----------
-    plate : its box may have any pose; it is solved in its own frame
+    plate : its body may have any pose; it is solved in its own frame
     positions : laboratory frame, outside the plate
     rtol : estimated relative error asked of every own tensor
     rule : first mesh

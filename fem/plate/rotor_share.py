@@ -126,7 +126,7 @@ def _nearest(place: Array, plate: Plate) -> float:
     angles = np.linspace(0.0, 2 * np.pi, 73)
     radius, height = np.hypot(place[0], place[1]), np.full(len(angles), place[2])
     circle = np.stack([radius * np.cos(angles), radius * np.sin(angles), height], axis=1)
-    return min(float(plate.box.distance(circle - depth * DOWN).min()) for depth in np.linspace(0.0, plate.way, 25))
+    return min(float(plate.body.distance(circle - depth * DOWN).min()) for depth in np.linspace(0.0, plate.way, 25))
 
 
 def turning_rotor(plate: Plate, rotor: RotorTable) -> OtherSources:

@@ -253,7 +253,10 @@ def edge_error(plate: Plate, place: Array) -> float:
     lower, upper = np.arcsinh((-half - centre) / depth), np.arcsinh((half - centre) / depth)
     u = (lower + upper)[:, None] / 2 + (upper - lower)[:, None] / 2 * nodes
     (x, y), (wx, wy) = np.sinh(u), np.cosh(u) * weights * (upper - lower)[:, None] / 2
-    inside = float(wx @ (1 + x[:, None] ** 2 + y**2) ** -2 @ wy)
+    along = np.meshgrid(*(centre[:, None] + depth * np.sinh(u)), indexing="ij")
+    places = np.insert(np.stack(along, axis=-1), normal, 0.0, axis=-1)
+    filled = plate.body.distance(plate.box.center + places @ plate.box.rotation.T) < 0  # all of a cuboid
+    inside = float(wx @ (filled * (1 + x[:, None] ** 2 + y**2) ** -2) @ wy)
     return min(1.0, EDGES * (1 - inside / np.pi))
 
 
@@ -268,7 +271,7 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
     for seen, shift in ((body[:1], LOW), *([(body, frequency)] if frequency else [])):
         with_edges, endless = (
             solve_shifted(
-                EddySpace(plate_mesh(plate.box.size, plate.conductivity, seen, shift, RULE, without), ORDER),
+                EddySpace(plate_mesh(plate.body, plate.conductivity, seen, shift, RULE, without), ORDER),
                 2 * np.pi * shift,
                 unit_dipoles(seen),
             ).couplings[:3]
@@ -283,5 +286,5 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
 def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Callable[[str], None]) -> float:
     """`measured_edge_error` of `plate`, places and frequency rounded to 0.1 mm and 1 Hz; cached, told to `report`."""
     places, frequency = np.round(places, 4), float(round(frequency))
-    inputs = plate.box.size, plate.conductivity, frequency, plate.box.to_body(places)
+    inputs = plate.body.shape_numbers, plate.conductivity, frequency, plate.box.to_body(places)
     return EDGE_ERROR.cached(inputs, lambda: measured_edge_error(plate, places, frequency), report)[0]

@@ -110,7 +110,7 @@ def slab_and_rotor_table(
     """
     far = rotor_reach(plate, rotor, slab_frame(plate, region))
     size = np.where(np.arange(3) == np.argmin(plate.box.size), plate.box.size, ENDLESS)
-    endless = replace(plate, box=replace(plate.box, size=size))
+    endless = replace(plate, body=replace(plate.box, size=size))
     reduced = from_slab(plate, region, frequencies, rtol, turning_rotor(endless, rotor), far)
     conductor = "this plate, taken as an infinite slab, and this place of the floater"
     return _with_share(reduced, endless, rotor, rtol, conductor, unwatched)
@@ -158,7 +158,7 @@ def cached_plate_table(
 
     `report` gets messages.
     """
-    inputs = plate.box.size, plate.conductivity, region, frequencies, rtol
+    inputs = plate.body.shape_numbers, plate.conductivity, region, frequencies, rtol
     return PLATE.cached(inputs, lambda: plate_table(plate, region, frequencies, rtol), report)
 
 
@@ -166,4 +166,4 @@ def deciding(
     plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float], rtol: float
 ) -> tuple[Any, ...]:
     """What decides `plate_and_rotor_table` (`region`, `frequencies`, `rtol`); of a lowering its way alone."""
-    return plate.box, plate.conductivity, plate.way, rotor.uniform, rotor.expansions, region, frequencies, rtol
+    return plate.body, plate.conductivity, plate.way, rotor.uniform, rotor.expansions, region, frequencies, rtol

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..common import MU_0, Array, frozen_array
+from ..shapes import Box
+from ..solids import Solid
 
 MILLIMETRE = 1e-3  # Length unit of all meshes, m
 PLANES = ("x0", "y0", "z0")  # Boundary names of the mirror planes
@@ -144,29 +146,31 @@ def skin_depth(conductivity: float, frequency: float) -> float:
 
 
 def plate_mesh(
-    size: ArrayLike,
+    body: Solid,
     conductivity: float,
     positions: ArrayLike,
     frequency: float,
     rule: MeshRule | None = None,
     endless: bool = False,
 ) -> ConductorMesh:
-    """Mesh for a plate with edges `size` (3,) m and dipoles at `positions` (n, 3) m in the plate's own frame.
+    """Mesh for a plate and dipoles at `positions` (n, 3) m, along the plate's axes from its middle, wherever that is.
 
     Parameters
     ----------
+    body : the plate; a shape other than a cuboid needs a mesh of its own here
     conductivity, frequency : S/m and Hz, of which the skin depth follows
     rule : how fine the mesh is
     endless : on the same cells, the plate reaches to the end of the air along its two longer edges
 
     Raises
     ------
-    ValueError : a size is not positive, or a position is not outside the plate
+    ValueError : the plate is no cuboid, a size is not positive, or a position is not outside the plate
     """
-    rule = rule or MeshRule()
-    half = np.asarray(size, float) / 2
+    rule, half = rule or MeshRule(), body.half_edges
+    if not isinstance(body, Box):
+        raise ValueError(f"Input body must be a cuboid; instead received a {body.kind}, {body.described_size}.")
     if not np.all(half > 0):
-        raise ValueError(f"Input size_m must be positive; instead received {np.asarray(size).tolist()}.")
+        raise ValueError(f"Input size_m must be positive; instead received {body.size.tolist()}.")
     places = np.abs(np.asarray(positions, float).reshape(-1, 3))
     inside = np.all(places <= half, axis=1)
     if inside.any():

@@ -139,11 +139,19 @@ class Lowering:
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """A conducting plate, fixed in the laboratory but for its lowering."""
+    """A conducting plate, fixed in the laboratory but for its lowering.
 
-    box: Box
+    Its thin side, faces and middle are those of the box about its body, whose middle planes are to mirror it.
+    """
+
+    body: Solid
     conductivity: float
     lowering: Lowering | None = None
+
+    @property
+    def box(self) -> Box:
+        """The box about its body, along the body axes."""
+        return self.body.box
 
     @property
     def way(self) -> float:
@@ -151,7 +159,7 @@ class Plate:
         return self.lowering.distance if self.lowering else 0.0
 
     def __repr__(self) -> str:
-        text = f"Plate {millimetres(self.box.size)} at {millimetres(self.box.center)}, {self.conductivity:.3g} S/m"
+        text = f"Plate {self.body.described_size} at {millimetres(self.body.center)}, {self.conductivity:.3g} S/m"
         down = self.lowering
         if down is None:
             return text

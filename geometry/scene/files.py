@@ -345,7 +345,7 @@ def _plate(scene: Scene) -> dict[str, Any] | None:
     if (plate := scene.plate) is None:
         return None
     down = {"lowering": _said(schema.LoweringTable, plate.lowering)} if plate.lowering else {}
-    return {**shape_keys(plate.box), **pose_keys(plate.box), **_said(schema.PlateTable, plate), **down}
+    return {**shape_keys(plate.body), **pose_keys(plate.body), **_said(schema.PlateTable, plate), **down}
 
 
 def _drag(scene: Scene) -> dict[str, Any] | None:

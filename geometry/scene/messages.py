@@ -133,7 +133,7 @@ def overlap_faults(scene: Scene) -> list[str]:
     ]
     for name, body in bodies if scene.plate else ():
         assert scene.plate is not None
-        depth = deepest_overlap_in_a_turn(body, scene.plate.box)
+        depth = deepest_overlap_in_a_turn(body, scene.plate.body)
         if depth > TOUCHING:
             faults.append(
                 f"Input plate must stay clear of the turning rotor; instead it overlaps {name} by "
@@ -142,7 +142,7 @@ def overlap_faults(scene: Scene) -> list[str]:
     if isinstance(start := scene.start, AbsoluteStart):
         floater = scene.floater.placed(start.position, start.moment / np.linalg.norm(start.moment))
         obstacles = [(f"rotor {name}", body) for name, body in bodies]
-        obstacles += [("the plate", scene.plate.box)] if scene.plate else []
+        obstacles += [("the plate", scene.plate.body)] if scene.plate else []
         place = ", ".join(f"{c * 1e3:g}" for c in start.position)
         faults += [
             f"Input start.position_mm must leave the floater clear of all bodies; instead received [{place}], where it "

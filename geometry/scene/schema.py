@@ -236,7 +236,7 @@ class PlateTable(Table):
     def plate(self) -> Plate:
         down = self.lowering
         lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-        return Plate(solid_of(self).box, self.conductivity_S_m, lowering)
+        return Plate(solid_of(self), self.conductivity_S_m, lowering)
 
 
 class DragTable(Table):

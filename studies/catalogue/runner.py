@@ -17,6 +17,7 @@ from ...fem.files import write_whole
 from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import check_files, parse_scene
+from ...geometry.solids import moved
 from ..cli.console import note, progress
 from ..cli.options import NAMES, Models, Workers, combinations
 from ..compare import compare_figure
@@ -175,7 +176,7 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     view = last_view(scene, table, time, motion)
     if scene.plate is not None:
         note("Currents in the plate ...")
-        places = current_places(near_plate(scene.plate.box, SEEN), view.position)
+        places = current_places(near_plate(scene.plate.body, SEEN), view.position)
         floater = replace(State(*(vector[-1] for vector in motion.vectors)), position=view.position)
         density = plate_currents(scene, scene.plate, sources(table), floater, places)
         view = replace(view, currents=Currents(places, density))
@@ -195,7 +196,6 @@ def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
     scene = parse_scene(str(result.attrs["scene"]), source)
     if (plate := scene.plate) is not None and plate.lowering is not None:
         down = np.array([0.0, 0.0, float(plate.lowering.depth(result["time"].values[-1]))])
-        box = replace(plate.box, center=plate.box.center - down)
-        scene = replace(scene, plate=replace(plate, box=box, lowering=None))
+        scene = replace(scene, plate=replace(plate, body=moved(plate.body, plate.body.center - down), lowering=None))
     laboratory = State(*(result[name].values for name in ("position", "velocity", "moment", "spin")))
     return scene, laboratory.to_rotor(scene.angular_velocity * result["time"].values)

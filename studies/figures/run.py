@@ -57,7 +57,7 @@ def scene_figure(scene: Scene) -> Figure:
     bodies += [(part.body, "0.5", "conductor of the rotor") for part in scene.conductors]
     reach = max(float(np.abs(1e3 * triangles(body)[0]).max()) for body, _, _ in bodies)
     if scene.plate:
-        bodies.insert(0, (near_plate(scene.plate.box, 2e-3 * reach), "0.7", "plate, or the part that is near"))
+        bodies.insert(0, (near_plate(scene.plate.body, 2e-3 * reach), "0.7", "plate, or the part that is near"))
     for panel, (across, up) in ((side, (0, 2)), (top, (0, 1))):
         for body, color, name in bodies:
             corners = 1e3 * triangles(body)[0][:, [across, up]]

@@ -42,7 +42,7 @@ def scene_picture(view: View) -> bytes:
     rotor = _rotor_corners(scene)
     names = {"floater": beside, f"rotor, {scene.frequency:g} Hz": [rotor[:, 0].max() + 3.0, 0.0, rotor[:, 2].max()]}
     if scene.plate is not None:
-        near = near_plate(scene.plate.box, SEEN)
+        near = near_plate(scene.plate.body, SEEN)
         corners = 1e3 * near.corners
         whole = np.allclose(near.size, scene.plate.box.size)
         names["plate" if whole else "part of the plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
@@ -145,7 +145,7 @@ def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = Non
     """Draw the part of the plate near the rotor, with its currents where they are given: the longest arrow is 12 mm."""
     if scene.plate is None:
         return
-    _add_body(plotter, near_plate(scene.plate.box, SEEN), METAL, opacity=0.2)
+    _add_body(plotter, near_plate(scene.plate.body, SEEN), METAL, opacity=0.2)
     if currents is not None:
         cloud = pv.PolyData(1e3 * currents.points)
         cloud["J"], cloud[CURRENT] = 1e-6 * currents.density, 1e-6 * np.linalg.norm(currents.density, axis=1)

@@ -99,7 +99,7 @@ class Sample:
         return sample_picture()
 
 
-def current_places(box: Box, floater: Array) -> Array:
+def current_places(box: Solid, floater: Array) -> Array:
     """Places (n, 3) m just under that face of a plate which the floater (3,) m is before."""
     axes = [np.linspace(-0.48, 0.48, max(3, int(size * 1e3 / 5))) * size for size in box.size]
     normal = int(np.argmin(box.size))
@@ -151,8 +151,10 @@ def arrow(center: Array, direction: Array, half: float) -> Surface:
     return revolved(half * profile, center, direction)
 
 
-def near_plate(plate: Box, reach: float) -> Box:
+def near_plate(plate: Solid, reach: float) -> Solid:
     """The part of a plate that is shown: along its edges so far (m) from its point nearest to the rotor's origin."""
+    if not isinstance(plate, Box):
+        return plate
     middle = np.clip(plate.to_body(np.zeros(3)), -plate.size / 2, plate.size / 2)
     low, high = np.maximum(-plate.size / 2, middle - reach), np.minimum(plate.size / 2, middle + reach)
     return replace(plate, size=high - low, center=plate.center + plate.rotation @ ((low + high) / 2))

@@ -293,7 +293,7 @@ def scene_bodies(scene: Scene, lines: Sequence[Array]) -> dict[str, Any]:
         "reach": [30.0, -50.0, 16.0],
     }
     if scene.plate is not None:
-        near = near_plate(scene.plate.box, SEEN)
+        near = near_plate(scene.plate.body, SEEN)
         edges = np.round(1e3 * near.corners[np.column_stack([SQUARES, SQUARES[:, 0]])], 3)
         found |= {"fixed": [_mesh(triangles(near), BALL, 0.25)], "edges": edges, "reach": [40.0, -64.0, 16.0]}
     return found

@@ -41,7 +41,7 @@ ROTORS = [rotor_table(r, "cuboid") for r in (horizontal(0.002, 0.01, 1.3, 1.0), 
 
 @pytest.fixture(scope="module")
 def space():
-    mesh = plate_mesh(PLATE.box.size, PLATE.conductivity, REGION.grid((2, 2, 2), fold=True), 250.0, RULE)
+    mesh = plate_mesh(PLATE.body, PLATE.conductivity, REGION.grid((2, 2, 2), fold=True), 250.0, RULE)
     return EddySpace(mesh, 2)
 
 
@@ -86,7 +86,7 @@ def test_the_bound_for_a_rotor_that_was_not_trained_holds(solution, rotor):
     stated = error_of(solution, probes)
     places = solution.probes[solution.boxes[0].contains(solution.probes)]
     corners = np.concatenate([box.grid((2, 2, 2), fold=True) for box in solution.boxes])
-    mesh = plate_mesh(PLATE.box.size, PLATE.conductivity, corners, 250.0, RULE)
+    mesh = plate_mesh(PLATE.body, PLATE.conductivity, corners, 250.0, RULE)
     response = solve_eddy(mesh, solution.space.order, 250.0, probes)
     exact = response.couplings_to(unit_dipoles(places)).T
     omega = 2 * np.pi * 250.0

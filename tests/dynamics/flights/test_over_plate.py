@@ -116,6 +116,6 @@ def test_what_cannot_be_flown_is_said(memory, starts):
         launched(SCENE, TABLE, memory, starts, 0.0)
     with pytest.raises(InputError, match="one state at least"):
         launched(SCENE, TABLE, memory, State(*(v[:0] for v in starts.vectors)), 1.0)
-    upright = replace(PLATE, box=replace(PLATE.box, rotation=rotation_matrix((0.0, 90.0, 0.0))))
+    upright = replace(PLATE, body=replace(PLATE.box, rotation=rotation_matrix((0.0, 90.0, 0.0))))
     with pytest.raises(InputError, match="lie flat"):
         launched(SCENE, TABLE, replace(memory, plate=upright), starts, 1.0)

@@ -10,6 +10,7 @@ from second_opinions.time_stepping import TimeStepper, work_on
 from spinlev.fem.closed_forms.potentials import Dipole, unit_dipoles
 from spinlev.fem.plate.eddy import EddySpace, solve_eddy
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
+from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)
 FREQUENCY = 200.0
@@ -20,7 +21,7 @@ PHASOR = np.array([1.0, -1j, 0.5])
 @pytest.fixture(scope="module")
 def space():
     """A plate whose slowest current decays in 0.5 ms, a tenth of a turn."""
-    return EddySpace(plate_mesh((0.03, 0.03, 0.006), 3.5e7, [PLACE], FREQUENCY, MeshRule(2.0, 4.0, 3.0)), 2)
+    return EddySpace(plate_mesh(Box((0.03, 0.03, 0.006)), 3.5e7, [PLACE], FREQUENCY, MeshRule(2.0, 4.0, 3.0)), 2)
 
 
 def field(space, per_turn):

@@ -19,6 +19,7 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
 from spinlev.geometry.meshes.plate import plate_mesh
 from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.geometry.shapes import Box
 
 ROTOR = vertical(0.014, 0.01, 1.305, 1.05)
 
@@ -29,7 +30,7 @@ def magnets():
 
 
 def plate():
-    conductors = plate_mesh((0.1, 0.24, 0.03), 3.5e7, [[0.03, 0.02, 0.04]], 100.0)
+    conductors = plate_mesh(Box((0.1, 0.24, 0.03)), 3.5e7, [[0.03, 0.02, 0.04]], 100.0)
     system = ShiftedSystem(EddySpace(conductors, 2), 628j)
     return system.fes, system.fes.FreeDofs(True), system.form.mat
 

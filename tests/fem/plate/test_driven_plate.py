@@ -73,7 +73,7 @@ def test_the_rotors_currents_are_in_the_network(made, rotor, region):
     rng = np.random.default_rng(4)
     points = region.lower + (region.upper - region.lower) * rng.random((4, 3))
     source = posed_rotor(rotor_parts(rotor, PLATE), PLATE, angle, depth)
-    mesh = plate_mesh(PLATE.box.size, PLATE.conductivity, points, frequency, RULE)
+    mesh = plate_mesh(PLATE.body, PLATE.conductivity, points, frequency, RULE)
     response = solve_eddy(mesh, 3, frequency, [source])
     exact = response.couplings_to(unit_dipoles(points))[:, 0].reshape(-1, 3)
     omega = 2 * np.pi * frequency
@@ -112,9 +112,9 @@ def test_everything_that_decides_is_in_the_key(rotor, region):
     changed = [
         (PLATE, rotor, region, FREQUENCIES, RTOL),
         (replace(PLATE, conductivity=3.4e7), rotor, region, FREQUENCIES, RTOL),
-        (replace(PLATE, box=Box(box.size * 1.01, box.center, box.rotation)), rotor, region, FREQUENCIES, RTOL),
-        (replace(PLATE, box=Box(box.size, box.center * 1.01, box.rotation)), rotor, region, FREQUENCIES, RTOL),
-        (replace(PLATE, box=Box(box.size, box.center)), rotor, region, FREQUENCIES, RTOL),
+        (replace(PLATE, body=Box(box.size * 1.01, box.center, box.rotation)), rotor, region, FREQUENCIES, RTOL),
+        (replace(PLATE, body=Box(box.size, box.center * 1.01, box.rotation)), rotor, region, FREQUENCIES, RTOL),
+        (replace(PLATE, body=Box(box.size, box.center)), rotor, region, FREQUENCIES, RTOL),
         (replace(PLATE, lowering=None), rotor, region, FREQUENCIES, RTOL),
         (PLATE, other, region, FREQUENCIES, RTOL),
         (PLATE, rotor, type(region)(region.lower, region.upper * 1.01), FREQUENCIES, RTOL),
@@ -154,6 +154,6 @@ def test_a_floater_in_the_plate_is_refused(center):
 
 
 def test_a_plate_in_the_rotor_is_refused(rotor):
-    near = replace(PLATE, box=Box(PLATE.box.size, (0.0, 0.0, -0.021)))
+    near = replace(PLATE, body=Box(PLATE.box.size, (0.0, 0.0, -0.021)))
     with pytest.raises(InputError, match=r"Input plate must stay farther than .* Move the plate away"):
         rotor_parts(rotor, near)

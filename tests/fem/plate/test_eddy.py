@@ -24,7 +24,7 @@ PLACES = np.array([[0.01, -0.02, 0.035], [0.0, 0.0, 0.04]])
 @pytest.fixture(scope="module")
 def coarse():
     """A mesh on which order 2 is good to some 1e-2: enough for identities that hold on any mesh."""
-    return plate_mesh(SIZE, SIGMA, PLACES, 100.0, MeshRule(2.0, 4.0, 3.0))
+    return plate_mesh(Box(SIZE), SIGMA, PLACES, 100.0, MeshRule(2.0, 4.0, 3.0))
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_high_frequency_shields_perfectly():
     """At 1 MHz (δ = 85 µm) the normal reaction of a plate much larger than the height is the image's."""
     height = 0.008
     place = [(0.0, 0.0, 0.015 + height)]
-    mesh = plate_mesh((0.2, 0.2, 0.03), SIGMA, place, 1e6, MeshRule(1.5, 3.0, 3.0))
+    mesh = plate_mesh(Box((0.2, 0.2, 0.03)), SIGMA, place, 1e6, MeshRule(1.5, 3.0, 3.0))
     found = solve_eddy(mesh, 3, 1e6, [Dipole(place[0], (0, 0, 1.0))]).couplings[0, 0]
     exact = reaction_tensor(Slab(SIGMA, 0.03), height, 1e6)[2, 2]
     print(f"\n1 MHz: {found.real / exact.real - 1:.1e}")
@@ -110,7 +110,7 @@ def test_high_frequency_shields_perfectly():
 def test_wide_plate_is_the_slab(axis, tolerance):
     """1.2 m wide, h = 12 mm: the missing rest answers with (12/600)³ ~ 1e-5, the boundary at 3.6 m with less."""
     place = np.array([0.0, 0.0, 0.027])
-    mesh = plate_mesh((1.2, 1.2, 0.03), SIGMA, [place], 200.0, MeshRule(1.2, 2.0, 2.0, reach=3.0))
+    mesh = plate_mesh(Box((1.2, 1.2, 0.03)), SIGMA, [place], 200.0, MeshRule(1.2, 2.0, 2.0, reach=3.0))
     found = solve_eddy(mesh, 4, 200.0, [Dipole(place, np.eye(3)[axis])]).couplings[0, 0]
     exact = reaction_tensor(Slab(SIGMA, 0.03), 0.012, 200.0)[axis, axis]
     print(f"\nmoment along axis {axis}: {abs(found / exact - 1):.1e}")
@@ -120,7 +120,7 @@ def test_wide_plate_is_the_slab(axis, tolerance):
 def test_mutual_coupling_over_a_wide_plate():
     """Two places: the off-diagonal tensors against the slab's."""
     places = np.array([[0.0, 0.0, 0.035], [0.015, 0.01, 0.045]])
-    mesh = plate_mesh((0.8, 0.8, 0.03), SIGMA, places, 100.0, MeshRule(1.5, 3.0, 2.0, reach=3.0))
+    mesh = plate_mesh(Box((0.8, 0.8, 0.03)), SIGMA, places, 100.0, MeshRule(1.5, 3.0, 2.0, reach=3.0))
     found = solve_eddy(mesh, 2, 100.0, unit_dipoles(places)).couplings[:3, 3:]
     exact = mutual_tensor(Slab(SIGMA, 0.03), places[0] - [0, 0, 0.015], places[1] - [0, 0, 0.015], 100.0)
     assert abs(found - exact).max() < 1e-2 * abs(exact).max()  # order 2 on a coarse mesh and the plate's finite width
@@ -150,8 +150,8 @@ def test_parity_parts_add_up():
         (lambda m: solve_eddy(m, 2, 1.0, []), "Input sources must hold at least one source"),
         (lambda m: ConductorMesh(m.mesh, {"plate": -1.0}), "Input conductivity of plate must be positive"),
         (lambda m: ConductorMesh(m.mesh, {"copper": 1.0}), "Input conductivity must name one of"),
-        (lambda m: plate_mesh(SIZE, SIGMA, [(0, 0, 0.01)], 50.0), "Input positions_m must lie outside the plate"),
-        (lambda m: plate_mesh((0.1, 0.0, 1), SIGMA, PLACES, 50.0), "Input size_m must be positive"),
+        (lambda m: plate_mesh(Box(SIZE), SIGMA, [(0, 0, 0.01)], 50.0), "Input positions_m must lie outside the plate"),
+        (lambda m: plate_mesh(Box((0.1, 0.0, 1)), SIGMA, PLACES, 50.0), "Input size_m must be positive"),
     ],
 )
 def test_bad_input_is_named(coarse, call, message):

@@ -14,6 +14,7 @@ from spinlev.fem.closed_forms.eddy_sphere import polarizability
 from spinlev.fem.closed_forms.potentials import HomogeneousField, unit_dipoles
 from spinlev.fem.plate.eddy import EddySpace, current_density, solve_eddy
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
+from spinlev.geometry.shapes import Box
 
 SetNumThreads(1)
 SIZE, SIGMA, FREQUENCY = (0.1, 0.24, 0.03), 3.5e7, 100.0
@@ -23,7 +24,7 @@ AMPLITUDES = np.array([1.0, -1j, 0.3])
 
 @pytest.fixture(scope="module")
 def response():
-    mesh = plate_mesh(SIZE, SIGMA, PLACE, FREQUENCY, MeshRule(2.0, 3.0, 3.0))
+    mesh = plate_mesh(Box(SIZE), SIGMA, PLACE, FREQUENCY, MeshRule(2.0, 3.0, 3.0))
     return solve_eddy(mesh, 3, FREQUENCY, unit_dipoles(PLACE))
 
 
@@ -122,7 +123,7 @@ def test_tetrahedra_and_hexahedra_agree():
     size, place = (0.04, 0.05, 0.02), [(0.0, 0.0, 0.025)]
     half = 500 * np.array(size)
     tets = occ_mesh({"plate": Conductor(OccBox(Pnt(*-half), Pnt(*half)), SIGMA, 9.0)}, reach=12.0)
-    hexes = plate_mesh(size, SIGMA, place, 100.0)
+    hexes = plate_mesh(Box(size), SIGMA, place, 100.0)
     tensors = [solve_eddy(mesh, 2, 100.0, unit_dipoles(place)).couplings for mesh in (tets, hexes)]
     assert abs(tensors[0] - tensors[1]).max() < 1e-2 * abs(tensors[1]).max()  # order 2, cells of the skin depth
 
@@ -130,7 +131,9 @@ def test_tetrahedra_and_hexahedra_agree():
 @pytest.mark.parametrize("order", [2, 4, 5])
 def test_values_of_a_function_from_its_coefficients_are_those_of_the_function(order):
     """Two ways of NGSolve to evaluate one function; from order 4 on hexahedra have more than 256 points."""
-    space = EddySpace(plate_mesh((0.02, 0.02, 0.01), 3.5e7, np.array([[0.0, 0.0, 0.012]]), 50.0, MeshRule(3.0)), order)
+    space = EddySpace(
+        plate_mesh(Box((0.02, 0.02, 0.01)), 3.5e7, np.array([[0.0, 0.0, 0.012]]), 50.0, MeshRule(3.0)), order
+    )
     function = ngsolve.GridFunction(space.real)
     function.vec.FV().NumPy()[:] = np.random.default_rng(0).normal(size=space.real.ndof)
     expected = function(space.conductors.mesh(*(space.points * 1e3).T))

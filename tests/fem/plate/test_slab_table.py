@@ -229,7 +229,7 @@ def test_rotors_permeability_is_heard():
         ),
         (FLAT, Region(np.full(3, -0.01), np.full(3, 0.02)), r"Move the plate, or model it by finite elements"),
         (FLAT, Region(np.array([0.0, 0.0, -0.03]), np.array([0.01, 0.01, -0.02])), "the floater's side"),
-        (replace(UPRIGHT, box=replace(UPRIGHT.box, center=(-0.018, 0.0, -0.02))), None, "comes .* mm below its face"),
+        (replace(UPRIGHT, body=replace(UPRIGHT.box, center=(-0.018, 0.0, -0.02))), None, "comes .* mm below its face"),
     ],
 )
 def test_a_plate_that_no_slab_can_stand_for_is_refused(plate, region, message):
