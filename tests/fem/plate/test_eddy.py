@@ -14,7 +14,7 @@ from spinlev.fem.plate.eddy import solve_eddy
 from spinlev.fem.plate.slab import Slab, mutual_tensor, reaction_tensor
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.meshes.plate import Block, ConductorMesh, MeshRule, hex_mesh, plate_mesh
-from spinlev.geometry.shapes import Box
+from spinlev.geometry.shapes import Box, Cylinder
 
 SetNumThreads(1)
 SIZE, SIGMA = (0.1, 0.24, 0.03), 3.5e7
@@ -152,6 +152,7 @@ def test_parity_parts_add_up():
         (lambda m: ConductorMesh(m.mesh, {"copper": 1.0}), "Input conductivity must name one of"),
         (lambda m: plate_mesh(Box(SIZE), SIGMA, [(0, 0, 0.01)], 50.0), "Input positions_m must lie outside the plate"),
         (lambda m: plate_mesh(Box((0.1, 0.0, 1)), SIGMA, PLACES, 50.0), "Input size_m must be positive"),
+        (lambda m: plate_mesh(Cylinder(0.1, 0.01), SIGMA, PLACES, 50.0), "Input body must be a cuboid"),
     ],
 )
 def test_bad_input_is_named(coarse, call, message):

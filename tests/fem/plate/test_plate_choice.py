@@ -8,10 +8,10 @@ from places import HORIZONTAL
 
 from spinlev.fem.plate.choice import resolve_plate_model
 from spinlev.fem.plate.eddy import plate_reaction
-from spinlev.fem.plate.slab import Slab, edge_error, measured_edge_error, reaction_tensor
+from spinlev.fem.plate.slab import EDGES, Slab, edge_error, measured_edge_error, reaction_tensor
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.scene.files import load_scene
-from spinlev.geometry.shapes import Box
+from spinlev.geometry.shapes import Box, Cylinder
 from spinlev.studies.run import plate_job
 
 SCENE = load_scene(HORIZONTAL)
@@ -67,6 +67,13 @@ def test_measured_edges_fade_as_the_plate_grows_and_are_below_the_bound():
     narrow, wide = (measured_edge_error(plate, PLACE[None], 100.0) for plate in plates)
     assert 0 < wide < narrow / 1.5
     assert wide < edge_error(plates[1], PLACE) / 2
+
+
+def test_what_lies_beyond_a_round_edge_counts():
+    """The share of 1/(d² + r²)² beyond a radius R is d²/(d² + R²), by 60 × 60 nodes on a step to a per cent."""
+    radius, depth = 0.4, 0.03
+    disc = Plate(Cylinder(radius, 0.01, (0.0, 0.0, PLACE[2] - depth + 0.005)), 3.5e7)
+    assert edge_error(disc, PLACE) == pytest.approx(EDGES * depth**2 / (depth**2 + radius**2), rel=0.02)
 
 
 def test_a_rotor_at_rest_leaves_the_slow_motions_to_measure():
