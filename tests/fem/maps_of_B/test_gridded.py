@@ -72,10 +72,7 @@ ROTORS = {
 }
 
 
-FAST = [pytest.param(name, marks=pytest.mark.slow) if name != "centred" else name for name in ROTORS]
-
-
-@pytest.fixture(scope="module", params=FAST)
+@pytest.fixture(scope="module", params=ROTORS)
 def fitted(request):
     rotor = ROTORS[request.param]
     centers = [magnet.box.center for magnet in rotor]
@@ -102,11 +99,12 @@ def test_divergence_and_curl_vanish_to_round_off(fitted):
     assert np.abs(np.trace(g, axis1=1, axis2=2)).max() < 1e-13 * np.abs(g).max()
 
 
-def test_the_gradient_is_the_derivative_of_the_field(fitted):
+def test_the_gradient_is_the_derivative_of_the_field():
     """Central differences of 1 µm: (1 µm / 13 mm)² of truncation times degree², and 1e-16/1e-4 of round-off."""
-    rotor, table = fitted
-    points, step = off_grid(rotor, 20) + 0.002 * np.array([0, 0, -1]), 1e-6
-    points = in_shell(points, rotor)
+    rotor = ROTORS["vertical"]
+    table = fit_field_map(grid_map(rotor, 0.004), [magnet.box.center for magnet in rotor], max_degree=9)
+    points, step = off_grid(rotor, 20), 1e-6
+    points = points[distance(points, rotor) > 0.014]
     _, g = table.evaluate(points)
     for axis, shift in enumerate(step * np.eye(3)):
         difference = (table.evaluate(points + shift)[0] - table.evaluate(points - shift)[0]) / (2 * step)
