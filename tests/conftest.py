@@ -65,8 +65,14 @@ def needs_3d():
 
 
 @pytest.fixture
-def undrawn(monkeypatch):
-    """Leaves out the process that draws in three dimensions, two seconds each time: for tests of something else."""
+def unprinted(monkeypatch):
+    """Figures are drawn and not printed, which takes a second each: for tests of something else."""
+    monkeypatch.setattr("spinlev.studies.figures.style.figure_bytes", lambda figure, kind: b"not printed")
+
+
+@pytest.fixture
+def undrawn(monkeypatch, unprinted):
+    """The same, and without the process that draws in three dimensions, two seconds each time."""
 
     def written(pictures, progress, command):
         return iter([b"not drawn"] * len(pictures))

@@ -123,6 +123,7 @@ def test_equilibria_over_a_grid_are_those_of_the_single_scenes(spinlev, tmp_path
     assert all(Path(file).stat().st_size > 5000 for file in answer["figures"])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_field_over_one_parameter(spinlev):
     status, answer, err = spinlev(
         "study", SCENE, "--vary", "rotor.remanence_T=0.5:1:0.25", "--ask", "field", "--at", "0,0,-20", *FAST
@@ -213,8 +214,9 @@ def test_what_is_cited(attributes, there, absent):
     assert not set(absent) & set(keys)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_study_has_no_scene_to_show(spinlev, tmp_path):
-    spinlev("study", SCENE, "--vary", "frequency_hz=110", "--ask", "field", *FAST)
+    spinlev("study", SCENE, "--vary", "frequency_hz=110", "--ask", "field", "--at", "0,0,-20", *FAST)
     status, _, err = spinlev("show", tmp_path / "out" / "question.nc")
     assert status == 2
     assert "must hold a flight" in err

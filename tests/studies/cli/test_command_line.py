@@ -8,26 +8,21 @@ import numpy as np
 import pytest
 from places import SCENES
 
+pytestmark = pytest.mark.usefixtures("undrawn")
 NO_PLATE = ("--plate-model", "none")
 GOOD = (SCENES / "horizontal.toml").read_text()
 
 
-@pytest.fixture
-def process(tmp_path):
-    """The same in a process of its own, as from a shell."""
+def test_a_process_answers_on_standard_output_and_complains_on_the_other(tmp_path, points):
+    """As from a shell: one answer; and one message without a file."""
     call = "import sys; from spinlev.studies.cli.start import main; sys.argv[0] = 'spinlev'; main()"
 
-    def run(*arguments):
+    def process(*arguments):
         command = [sys.executable, "-c", call, *map(str, arguments)]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         return done.returncode, done.stdout, done.stderr
 
-    return run
-
-
-def test_a_process_answers_on_standard_output_and_complains_on_the_other(process, tmp_path, points):
-    """One answer, and one message without a file."""
-    status, out, err = process("field", SCENES / "horizontal.toml", "--points", points, "--json")
+    status, out, err = process("field", SCENES / "horizontal.toml", "--points", points, "--model", "cuboid", "--json")
     assert status == 0, err
     assert np.shape(json.loads(out)["B_T"]) == (2, 3)
     status, out, err = process("run", "none.toml", "--out", "none")

@@ -85,10 +85,10 @@ def test_a_question_without_an_answer_says_why():
 
 def test_the_map_says_where_it_levitates():
     """At four of its points as a search for that scene does."""
-    fine = regions(STATE, ((100.0, 160.0), (6.0, 18.0)), "dipole", 41)
-    assert fine.kind.shape == (41, 41)
+    fine = regions(STATE, ((100.0, 160.0), (6.0, 18.0)), "dipole", 17)
+    assert fine.kind.shape == (17, 17)
     assert set(np.unique(fine.kind)) == {1, 2}
-    for row, column in ((0, 0), (0, 40), (20, 15), (40, 40)):
+    for row, column in ((0, 0), (0, 16), (8, 6), (16, 16)):
         there = STATE.changed("frequency_hz", float(fine.frequencies[row]))
         there = there.changed("rotor.angle_deg", float(fine.measures[column]))
         found = Levitation(there.scene, there.models).equilibria
