@@ -58,20 +58,16 @@ def test_a_point_whose_process_dies_each_time_is_named_and_those_of_its_batch_go
     assert "was killed (out of memory?), 3 times" in failed["reason"]
 
 
-def test_nobody_else_can_reach_the_processes_of_a_sweep(tmp_path):
+def test_nobody_else_runs_anything_in_the_processes_of_a_sweep(tmp_path, monkeypatch):
     """No port, and no socket with a name: any user of the machine could send code to them."""
-    asked = points(1.0, 4.0, asked_by=os.getpid())
-    found = swept(replace(STUDY, compute=listening), asked, Workers(workers=2), tmp_path)
-    np.testing.assert_array_equal(found["sockets"], [0, 0])
-
-
-def test_nothing_in_the_folder_at_hand_is_run(tmp_path, monkeypatch):
     (tmp_path / "spinlev").mkdir()
     for name in ("signal.py", "numpy.py", "spinlev/__init__.py", "select.py", "pickle.py", "roots.py"):
         (tmp_path / name).write_text(f"open({str(tmp_path / 'run')!r}, 'a').write({name!r})\n")
     monkeypatch.chdir(tmp_path)
-    found = swept(STUDY, points(1.0, 4.0), Workers(workers=2), tmp_path / "out")
+    asked = points(1.0, 4.0, asked_by=os.getpid())
+    found = swept(replace(STUDY, compute=listening), asked, Workers(workers=2), tmp_path / "out")
     np.testing.assert_array_equal(found["root"], [1.0, 2.0])
+    np.testing.assert_array_equal(found["sockets"], [0, 0])
     with safe_path():
         subprocess.run([sys.executable, "-c", "import signal, numpy, spinlev"], check=True)
     assert not (tmp_path / "run").exists()
@@ -106,14 +102,30 @@ def test_a_program_that_is_changed_while_it_computes_is_not_mixed(tmp_path, monk
         swept(STUDY, points(1.0, 4.0), Workers(workers=2), tmp_path)
 
 
-def test_workers_of_another_version_compute_nothing(tmp_path, caplog):
+@pytest.fixture(scope="module")
+def cluster():
+    """A scheduler with two workers, whose start takes seconds."""
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+    ) as scheduler:
+        yield scheduler
+
+
+def test_serial_local_processes_and_a_scheduler_give_the_same_file(cluster, tmp_path):
+    asked = points(*np.linspace(0.0, 7.0, 8).tolist())
+    files = [bytes_of(swept(STUDY, asked, Workers(workers=n), tmp_path), tmp_path / f"{n}.nc") for n in (1, 2)]
+    there = swept(STUDY, asked, Workers(scheduler=cluster.scheduler_address), tmp_path / "there")
+    files.append(bytes_of(there, tmp_path / "there.nc"))
+    assert files[0] == files[1] == files[2]
+    np.testing.assert_array_equal(there["root"], np.sqrt(np.linspace(0.0, 7.0, 8)))
+
+
+def test_workers_of_another_version_compute_nothing(cluster, tmp_path, caplog):
+    """The last that asks this scheduler: its workers are of another version from here on."""
     caplog.set_level(logging.INFO, "spinlev")
     log = tmp_path / "log"
     asked = points(*np.linspace(0.0, 7.0, 8).tolist(), log=str(log))
-    with (
-        LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
+    with Client(cluster, set_as_default=False) as client:
         here = Workers(scheduler=cluster.scheduler_address)
         workers = list(client.scheduler_info()["workers"])
         client.run(another_version, workers=workers[:1])
@@ -144,16 +156,6 @@ def test_a_scheduler_that_is_lost_costs_no_finished_point(tmp_path, monkeypatch,
     with quickly, pytest.raises(ComputationError, match=r"was lost\. The finished points are kept"):
         swept(STUDY, asked, Workers(scheduler=cluster.scheduler_address), tmp_path)
     assert len(list(tmp_path.glob("roots.points/0*.json"))) >= 1
-
-
-def test_serial_local_processes_and_a_scheduler_give_the_same_file(tmp_path):
-    asked = points(*np.linspace(0.0, 7.0, 8).tolist())
-    files = [bytes_of(swept(STUDY, asked, Workers(workers=n), tmp_path), tmp_path / f"{n}.nc") for n in (1, 2)]
-    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
-        there = swept(STUDY, asked, Workers(scheduler=cluster.scheduler_address), tmp_path / "there")
-    files.append(bytes_of(there, tmp_path / "there.nc"))
-    assert files[0] == files[1] == files[2]
-    np.testing.assert_array_equal(there["root"], np.sqrt(np.linspace(0.0, 7.0, 8)))
 
 
 def test_finished_points_are_not_computed_again(tmp_path):

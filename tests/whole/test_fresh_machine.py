@@ -251,12 +251,13 @@ def test_a_pin_that_the_oldest_python_cannot_install_is_found(package, said):
         ("cluster", "dask", ["study", "SCENE", "--vary", "frequency_hz=100:120:10", "--scheduler", "tcp://x:1"]),
     ],
 )
-def test_a_command_whose_extra_is_missing_says_so(tmp_path, extra, hidden, given):
-    """In a process that does not find the library, as after `pip install spinlev` alone."""
+def test_a_command_whose_extra_is_missing_says_so(monkeypatch, capsys, tmp_path, extra, hidden, given):
+    """The library is not found, as after `pip install spinlev` alone; the page looks for its own as it is loaded."""
+    for name in [name for name in sys.modules if name.startswith((f"{hidden}.", "spinlev.studies.page"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, hidden, None)
     named = {"SCENE": SCENE, "QUICK": str(QUICK)}
-    code = f"import sys; sys.modules[{hidden!r}] = None\nfrom spinlev.studies.cli.start import main; sys.exit(main())"
-    command = [sys.executable, "-c", code, *(named.get(word, word) for word in given), "--out", str(tmp_path)]
-    found = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert found.returncode == 1
-    assert f"{hidden} is needed for this and is not installed: pip install 'spinlev[{extra}]'" in found.stderr
-    assert "Traceback" not in found.stderr
+    assert _status([*(named.get(word, word) for word in given), "--out", str(tmp_path)], io.StringIO()) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{hidden} is needed for this and is not installed: pip install 'spinlev[{extra}]'" in said
+    assert "Traceback" not in said
