@@ -179,8 +179,8 @@ DAMAGES = {
     ),
     "of another kind": lambda content, name: seal(zlib.compress(f"{name}\nexpression\n".encode() + pickle.dumps(2))),
     "a pickle": lambda content, name: seal(zlib.compress(pickle.dumps(Planted()))),
-    "a pickle under a known name": lambda content, name: seal(
-        zlib.compress(f"{name}\ncfunc_dbl\n".encode() + pickle.dumps(Planted()))
+    "a pickle under a known name": lambda content, name: seal(  # heyoka takes newer ones' first bytes for half a GB
+        zlib.compress(f"{name}\ncfunc_dbl\n".encode() + pickle.dumps(Planted(), protocol=2))
     ),
     "a bare pickle": lambda content, name: pickle.dumps(Planted()),
 }

@@ -77,19 +77,19 @@ def test_a_magnet_thrown_at_cold_copper_turns_round_in_mid_air(model: str, error
 
 
 def test_a_magnet_dropped_from_far_off_feels_the_plate_where_it_comes_to():
-    """70 mm off, the plate does less than a millionth of the weight and is left out; at its face it is not."""
-    scene = dropped(0.07, (0.0, 0.0, -0.3))
-    light = replace(scene, floater=replace(scene.floater, remanence=2e-3))
-    levitation = Levitation(light, Models(plate_model="auto", plate_rtol=0.05))
+    """40 mm off, the plate does less than a millionth of the weight and is left out; at its face it is not."""
+    scene = dropped(0.04, (0.0, 0.0, -0.5))
+    light = replace(scene, floater=replace(scene.floater, remanence=5e-4))
+    levitation = Levitation(light, Models(plate_model="auto", plate_rtol=0.1))
     assert levitation.plate is None
-    flown = levitation.flight(0.2)
+    flown = levitation.flight(0.08)
     assert levitation.flight_plate is not None
     assert not flown.left_plate_table
 
 
 def test_a_flight_beyond_what_a_table_can_reach_ends_there_and_says_so():
     """At 2.5 m/s along the face, 10 mm over it: to the sides a table reaches 3 times its distance from it."""
-    levitation = Levitation(dropped(0.01, (2.5, 0.0, 0.0)), Models(plate_model="slab", plate_rtol=0.05))
+    levitation = Levitation(dropped(0.01, (2.5, 0.0, 0.0)), Models(plate_model="slab", plate_rtol=0.1))
     flown = levitation.flight(0.1)
     assert (flown.ended_by, flown.left_plate_table) == ("lost", True)
     assert flown.levitated_s < 0.01
@@ -109,7 +109,7 @@ def test_a_flight_that_begins_off_its_equilibrium_has_a_table_there():
         plate=sl.plate(size_mm=[100.0, 240.0, 30.0], center_mm=[0.0, 0.0, -65.0], conductivity_S_m=3.5e7),
         start={"offset_mm": [0.0, 0.0, -5.0]},
     )
-    flown = sl.simulate(scene, 0.01, "dipole", "slab", plate_rtol=0.05)
+    flown = sl.simulate(scene, 0.01, "dipole", "slab", plate_rtol=0.1)
     assert flown.attrs["beyond_plate_table"] == 0.0
     assert flown.attrs["levitated_s"] > 0
 

@@ -54,7 +54,7 @@ def table(tmp_path_factory):
 
 
 @pytest.fixture
-def spinlev(tmp_path, monkeypatch, capsys):
+def spinlev(tmp_path, monkeypatch, capsys, unprinted):
     """Run the command line in this process in an empty folder; gives exit status, answer and messages.
 
     Tables have a cache of their own there; compiled code is that of the session, for it is no matter of these tests.
@@ -493,7 +493,7 @@ def as_map(strength):
     """A map of the field of a cube of 10 mm, 2 mm off the axis."""
     (magnet,) = load_scene(SCENE).rotor
     rotor = (replace(magnet, polarization=strength * magnet.polarization, recoil_permeability=1.0),)
-    ticks = np.arange(-0.036, 0.037, 0.006)
+    ticks = np.arange(-0.03, 0.031, 0.01)
     points = np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), -1).reshape(-1, 3)
     points = points[np.linalg.norm(points, axis=1) > 0.0075]
     rows = np.hstack([1e3 * points, RotorTable("cuboid", rotor, rotor).evaluate(points)[0]])

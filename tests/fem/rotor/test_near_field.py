@@ -94,11 +94,11 @@ def test_the_gradient_is_that_of_the_field():
     magnet = Magnet(Cylinder(5e-3, 8e-3), POLARIZATION, 1.05)
     points = np.array([[1e-3, 2e-3, 1e-3], [6e-3, 0.5e-3, 2e-3], [-2e-3, -1e-3, -5e-3]])
     step = 1e-6
-    found = near_field((magnet,), points)
     moved = np.concatenate([points + s * step * axis for axis in np.eye(3) for s in (1, -1)])
-    around = near_field((magnet,), np.concatenate([points, moved])).flux_density[3:].reshape(3, 2, 3, 3)
+    found = near_field((magnet,), np.concatenate([points, moved]), 1e-3)
+    around = found.flux_density[3:].reshape(3, 2, 3, 3)
     numeric = np.moveaxis((around[:, 0] - around[:, 1]) / (2 * step), 0, -1)
-    assert np.abs(found.gradient - numeric).max() < 2e-2 * np.abs(numeric).max()
+    assert np.abs(found.gradient[:3] - numeric).max() < 2e-2 * np.abs(numeric).max()
 
 
 @pytest.mark.parametrize(

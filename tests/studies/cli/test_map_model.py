@@ -12,7 +12,7 @@ from spinlev.geometry.scene.messages import SceneError
 from spinlev.studies.cli import main as cli
 from spinlev.studies.cli.options import shipped_scene
 
-GRID = np.arange(-0.036, 0.037, 0.006)
+GRID = np.arange(-0.03, 0.031, 0.01)
 HEADER = "x_mm,y_mm,z_mm,Bx_mT,By_mT,Bz_mT"
 
 
