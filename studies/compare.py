@@ -22,7 +22,7 @@ from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from .cli.console import note, to_json
 from .cli.options import FieldModel, Models
-from .figures.style import PAGE, PALETTE, legend_below, panels, save_figures, styled
+from .figures.style import PALETTE, legend_below, panels, save_figures, styled
 from .levitation import Levitation
 from .plan import sources
 from .result import variable, write_dataset
@@ -257,7 +257,7 @@ def _cells(row: Compared) -> tuple[str, ...]:
 @styled
 def compare_figure(result: xr.Dataset) -> Figure:
     """Levitation distance of every model by frequency, and how far each is from the best."""
-    figure, ((left, right),) = panels(1, 2, (PAGE, 2.9))
+    figure, ((left, right),) = panels(1, 2, 2.9)
     best = result.isel(model=-1)
     for k, color in zip(range(result.sizes["model"]), PALETTE, strict=False):
         one = result.isel(model=k)
@@ -274,7 +274,7 @@ def compare_figure(result: xr.Dataset) -> Figure:
         panel.set_xlabel("rotor frequency (Hz)")
     left.set_ylabel("levitation distance (mm)")
     right.set_ylabel(f"difference from {best['model'].item()} (mm)")
-    legend_below(figure, left, columns=4)
+    legend_below(figure, left)
     return figure
 
 

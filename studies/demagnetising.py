@@ -88,7 +88,7 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
             "axis": list(AXIS),
             "share": ("level", shares, {"units": "1", "long_name": "share of the volume"}),
         },
-        {"title": "Field along the easy axes of the rotor's magnets, rotor's frame"},
+        {"study": "working-point", "title": "Field along the easy axes of the rotor's magnets, rotor's frame"},
     )
 
 

@@ -21,7 +21,7 @@ from ..geometry.scene.contents import AbsoluteStart, Scene
 from .cli.console import note
 from .cli.options import Models
 from .figures.pictures import plate_currents
-from .figures.style import NAMES, PAGE, panels, save_figures, styled
+from .figures.style import NAMES, colour_bar, panels, save_figures, styled, titled
 from .levitation import Levitation
 from .plan import sources
 from .result import write_dataset
@@ -37,36 +37,42 @@ def field_map_figure(found: xr.Dataset) -> Figure:
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import LogLocator
 
-    figure, axes = panels(2, 3, (PAGE, 4.6), sharex=True, sharey=True)
+    figure, axes = panels(2, 3, 2.3, sharex=True, sharey=True)
     size = 1e3 * np.linalg.norm(found["B"].values, axis=-1)
     limits = LogNorm(*np.nanpercentile(size[2], [1, 99.5]))
     for k, model in enumerate(found["model"].values.tolist()):
         shown = _colours(axes[0, k], found, size[k], limits, "viridis")
         _lines(axes[0, k], found, model)
-        axes[0, k].set_title("closed form (μr = 1)" if model == "cuboid" else NAMES[model])
-    u, v, outside = 1e3 * found["u"].values, 1e3 * found["v"].values, found["outside"].values
+        titled(axes[0, k], "cuboid (μr = 1)" if model == "cuboid" else NAMES[model])
+    u, v = _axes(found)
     for axis in axes[:, 0]:  # a dipole's field means nothing there
-        axis.contourf(u, v, outside, levels=[-np.inf, 0.0], colors=["0.85"], hatches=["////"], zorder=2)
-    bar = figure.colorbar(shown, ax=axes[0].tolist(), label="|B| (mT)", ticks=LogLocator(subs=(1, 2, 5)), format="%g")
-    bar.ax.yaxis.set_minor_formatter("")
+        axis.contourf(u, v, found["outside"], levels=[-np.inf, 0.0], colors=["0.85"], hatches=["////"], zorder=2)
+    bar = colour_bar(figure, shown, axes[0], label="|B| (mT)", ticks=LogLocator(subs=(1, 3)), format="%g")
+    bar.minorticks_off()
     apart = LogNorm(1e-6, 1.0)
     error = found["error"].values / np.linalg.norm(found["B"].sel(model="fem").values, axis=-1)
-    titles = ("dipole, difference", "closed form, difference", "finite elements, stated error")
+    titles = ("its difference", "its difference", "stated error")
     differences = [found["difference"].sel(model=model).values for model in ("dipole", "cuboid")]
     for axis, values, title in zip(axes[1], [*differences, error], titles, strict=True):
         shown = _colours(axis, found, np.clip(values, 1e-6, 1.0), apart, "magma")
-        axis.set_title(title)
-        axis.set_xlabel(f"{found.attrs['plane'][0]} (mm)")
-    figure.colorbar(shown, ax=axes[1].tolist(), label="|ΔB| / |B|")
-    for axis in axes[:, 0]:
-        axis.set_ylabel(f"{found.attrs['plane'][1]} (mm)")
+        titled(axis, title)
+    colour_bar(figure, shown, axes[1], label="|ΔB| / |B|")
+    for axis in axes.flat:
+        axis.set(xlabel=f"{found.attrs['plane'][0]} (mm)", ylabel=f"{found.attrs['plane'][1]} (mm)")
+        axis.label_outer()
     return figure
 
 
+def _axes(found: xr.Dataset) -> tuple[Array, Array]:
+    """Coordinates of the plane across and up, mm."""
+    across, up = (1e3 * found[name].values for name in str(found.attrs["plane"]))
+    return across, up
+
+
 def _colours(axes: Axes, found: xr.Dataset, values: Any, norm: Any, cmap: str) -> Any:
-    u, v, inside = 1e3 * found["u"].values, 1e3 * found["v"].values, -found["outside"].values
+    u, v = _axes(found)
     shown = axes.pcolormesh(u, v, values, norm=norm, cmap=cmap, shading="gouraud", rasterized=True)
-    axes.contour(u, v, inside, levels=[0.0], colors="white", linewidths=0.8)
+    axes.contour(u, v, found["outside"], levels=[0.0], colors="white", linewidths=0.8)
     axes.set_aspect("equal")
     axes.grid(False)
     return shown
@@ -76,8 +82,7 @@ def _lines(axes: Axes, found: xr.Dataset, model: str) -> None:
     """Lines of B in the plane; they go on in the magnets, as B has no sources."""
     plane = ["xyz".index(name) for name in str(found.attrs["plane"])]
     b = np.nan_to_num(found["B"].sel(model=model).values)
-    u, v = 1e3 * found["u"].values, 1e3 * found["v"].values
-    even = [np.linspace(line[0], line[-1], len(line)) for line in (u, v)]
+    even = [np.linspace(line[0], line[-1], len(line)) for line in _axes(found)]
     across, up = b[..., plane[0]], b[..., plane[1]]
     axes.streamplot(even[0], even[1], across, up, color="white", linewidth=0.4, density=1.1, arrowsize=0.5)
 
@@ -240,7 +245,7 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
     error[clear], magnet[clear] = elements.error, elements.magnet
     size_b = np.linalg.norm(b, axis=2)
     shape = (len(v), len(u))
-    dims = ("v", "u")
+    dims = (plane[1], plane[0])
     vectors, attrs = ("model", *dims, "component"), {"units": "T"}
     difference = np.linalg.norm(b - b[2], axis=2) / size_b[2]
     return xr.Dataset(
@@ -256,10 +261,15 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
         {
             "model": list(MODELS),
             "component": list("xyz"),
-            "u": ("u", u, {"units": "m", "long_name": plane[0]}),
-            "v": ("v", v, {"units": "m", "long_name": plane[1]}),
+            plane[0]: (plane[0], u, {"units": "m"}),
+            plane[1]: (plane[1], v, {"units": "m"}),
         },
-        {"plane": plane, "offset_m": offset, "title": "Field of the rotor on a plane, in its frame at t = 0"},
+        {
+            "study": "field-map",
+            "plane": plane,
+            "offset_m": offset,
+            "title": "Field of the rotor on a plane, in its frame at t = 0",
+        },
     )
 
 
@@ -274,7 +284,7 @@ def _dipoles(scene: Scene, places: Array) -> Array:
 
 def _write_vtu(found: xr.Dataset, path: Path, plane: str, offset: float) -> None:
     along, up, _ = PLANES[plane]
-    places, cells = _lattice([found["v"].values, found["u"].values])
+    places, cells = _lattice([found[plane[1]].values, found[plane[0]].values])
     points = np.full((len(places), 3), offset)
     points[:, up], points[:, along] = places.T
     data: dict[str, Array] = {"error": found["error"].values.ravel(), "magnet": found["magnet"].values.ravel()}

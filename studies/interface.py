@@ -39,6 +39,7 @@ from .compare import compared, compared_dataset
 from .demagnetising import working_point_dataset
 from .exchange import PLANES, field_map as plane_map
 from .figures.run import scene_figure
+from .figures.style import FigureWidth, figures_across
 from .levitation import Levitation
 from .plan import SceneLike, given_scene
 from .processes import mapped
@@ -271,8 +272,7 @@ def field_map(
     if ends is not None and not (len(ends) == 4 and ends[0] < ends[1] and ends[2] < ends[3]):
         said = "left, right, lower and upper end in rising order, m"
         raise InputError(f"Input extent must be {said}; instead received {extent}.")
-    found = plane_map(given_scene(scene), plane, ends, finite("offset", offset), steps)
-    return found.rename(u=plane[0], v=plane[1])
+    return plane_map(given_scene(scene), plane, ends, finite("offset", offset), steps)
 
 
 @documented
@@ -334,7 +334,7 @@ def working_point(
         No magnet has a polarisation, or a model, a tolerance or a file that cannot be used.
     """
     levitation = Levitation(scene, Models(model, rtol=rtol, interaction=interaction))
-    return working_point_dataset(levitation).assign_attrs(study="working-point", scene=scene_text(levitation.scene))
+    return working_point_dataset(levitation).assign_attrs(scene=scene_text(levitation.scene))
 
 
 @documented
@@ -524,14 +524,16 @@ def _computed(study: Study, points: Sequence[Point], engine: Workers, out: Path)
     return result
 
 
-def draw(result: xr.Dataset | SceneLike) -> Mapping[str, Figure]:
+def draw(result: xr.Dataset | SceneLike, width: FigureWidth = "page") -> Mapping[str, Figure]:
     """The figures of a result, or of a scene before anything is computed; a notebook shows them.
 
     Parameters
     ----------
     result : xarray.Dataset, Scene, str or Path
-        Of `equilibria`, `stability`, `simulate`, `compare`, `sweep`, `run_study`, or read from a file; or a scene, or
-        the path of its file.
+        Of `equilibria`, `stability`, `simulate`, `compare`, `field_map`, `working_point`, `sweep`, `run_study`, or read
+        from a file; or a scene, or the path of its file.
+    width : {"page", "column"}
+        Of a journal: 170 mm or 85 mm.
 
     Returns
     -------
@@ -541,6 +543,7 @@ def draw(result: xr.Dataset | SceneLike) -> Mapping[str, Figure]:
     Raises
     ------
     InputError
-        The result has no figure, or the scene cannot be used.
+        The result has no figure, the scene cannot be used, or the width is another.
     """
-    return figures_of(result) if isinstance(result, xr.Dataset) else {"scene": scene_figure(given_scene(result))}
+    with figures_across(width):
+        return figures_of(result) if isinstance(result, xr.Dataset) else {"scene": scene_figure(given_scene(result))}

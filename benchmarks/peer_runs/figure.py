@@ -23,7 +23,7 @@ def draw(work, curves):
 @styled
 def _figure(work, curves):
     cases = [case for case in work.cases if any(one == case for one, _ in curves)]
-    figure, axes = panels(1, len(cases), (2.6 * len(cases) + 0.6, 3.4), sharey=True)
+    figure, axes = panels(1, len(cases), 3.4, sharey=True)
     names = sorted({peer for _, peer in curves}, key=lambda name: (name != "spinlev", name))
     for panel, case in zip(axes.flat, cases, strict=True):
         for k, name in enumerate(names):
@@ -40,5 +40,5 @@ def _figure(work, curves):
             panel.xaxis.set_minor_formatter(NullFormatter())
         panel.set(title=case, xlabel="processor time (s)")
     axes.flat[0].set_ylabel("relative error")
-    legend_below(figure, *axes.flat, columns=3)
+    legend_below(figure)
     return figure

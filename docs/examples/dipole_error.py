@@ -20,7 +20,7 @@ distance = np.linspace(13e-3, 60e-3, 95)  # m, below the cube's centre
 points = np.stack([np.full(distance.shape, 2e-3), 0 * distance, -distance], axis=1)
 field = {model: rotor_table(scene, model).evaluate(points)[0] for model in ("dipole", "cuboid", "fem")}
 
-figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
+figure, ((axes,),) = panels(1, 1, 3.6)
 apart = {}
 for model in ("dipole", "cuboid"):
     apart[model] = np.linalg.norm(field[model] - field["fem"], axis=1) / np.linalg.norm(field["fem"], axis=1)

@@ -33,7 +33,7 @@ elements = np.array([field_mT(d, "fem") for d in coarse])
 off_axis_mT = elements[0, 0]
 print(f"Displaced by 1 mm: {off_axis_mT:.2f} mT off-axis, {elements[0, 1]:.2f} mT on-axis")
 
-figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
+figure, ((axes,),) = panels(1, 1, 3.6)
 for k, name in enumerate(("off-axis", "on-axis")):
     (line,) = axes.plot(fine, closed[:, k], label=f"{name}, closed form")
     axes.plot(coarse, elements[:, k], "o", color=line.get_color(), label=f"{name}, finite elements")

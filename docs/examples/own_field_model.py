@@ -73,7 +73,7 @@ found = {name: find_equilibria(scene, table)[0] for name, table in tables.items(
 apart_um = 1e6 * np.linalg.norm(found["charges"].position - found["closed form"].position)
 print(found, f"apart: {apart_um:.4f} µm", sep="\n")
 
-figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
+figure, ((axes,),) = panels(1, 1, 3.6)
 depth = np.linspace(8e-3, 40e-3, 65)
 points = np.stack([0 * depth, 0 * depth, -depth], axis=1)
 true = tables["closed form"].evaluate(points)[0]

@@ -44,7 +44,7 @@ def compute(point):
 @styled
 def picture(result):
     """The axial mode against the density."""
-    figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
+    figure, ((axes,),) = panels(1, 1, 3.6)
     axes.plot(result["density"], result["axial"], "o-")
     axes.set(
         xlabel="density of the floater (kg/m³)", ylabel="axial mode (Hz)", title="A heavier floater oscillates faster"

@@ -25,7 +25,7 @@ response = reaction_tensor(Slab(conductivity=3.5e7, thickness=0.03), 0.015, freq
 torque = -(moment**2) * response.imag  # N m
 slow = torque[0] * frequency / frequency[0]
 
-figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
+figure, ((axes,),) = panels(1, 1, 3.6)
 axes.loglog(frequency, 1e6 * torque, label="plate")
 axes.loglog(frequency, 1e6 * slow, "--", label="proportional to the frequency")
 axes.set(xlabel="frequency (Hz)", ylabel="braking torque (µN m)", ylim=(1e-1, 1e3), title="Moment over a plate")

@@ -22,7 +22,7 @@ damped = stability(scene, model="cuboid", plate_model="slab")
 print(damped)
 slowest_per_s = -float(damped["growth"])
 
-figure, ((axes,),) = panels(1, 1, (5.5, 3.6))
+figure, ((axes,),) = panels(1, 1, 3.6)
 place = np.arange(bare.sizes["mode"])
 for shift, result, name in ((-0.2, bare, "air alone"), (0.2, damped, "with the plate")):
     axes.bar(place + shift, -result["mode_growth"], 0.38, label=name)

@@ -28,7 +28,7 @@ distance_mm = 1e3 * (swept["position"] ** 2).sum("axis") ** 0.5
 distance_mm_118 = distance_mm.sel(frequency=118.0).item()
 print(f"At 118 Hz {distance_mm_118:.2f} mm")
 
-figure, ((left, right),) = panels(1, 2, (7.5, 3.2))
+figure, ((left, right),) = panels(1, 2, 3.2)
 left.plot(frequencies, distance_mm, "o-")
 right.plot(frequencies, swept["polar_angle"], "o-")
 left.set(xlabel="frequency (Hz)", ylabel="levitation distance (mm)", title="Distance")

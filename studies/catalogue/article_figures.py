@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from ...dynamics.continuation.frequencies import kicked, levitating_branch
 from ...dynamics.flights.flight import simulate
 from ...geometry.common import Array
-from ..figures.style import DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
+from ..figures.style import DASHES, NAMES, PALETTE, legend_below, panels, plot_branch, styled
 from ..levitation import Levitation
 from ..plan import sources
 from ..result import Columns, variable
@@ -36,7 +36,7 @@ from .article import (
     stable_in_flight,
 )
 from .article_formulas import field, force, side_radius
-from .drawing import by_configuration, by_rotor, configuration_panels, drawn, explain, plot_branch, rotor_panels
+from .drawing import by_configuration, by_rotor, configuration_panels, drawn, explain, rotor_panels
 from .tables import span, text_table
 
 # On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
@@ -241,7 +241,7 @@ POINTS = {"near_tipping": ("<", "near tipping point"), "equilibrium": ("o", "sta
 @drawn
 def parts_figure(result: xr.Dataset) -> Figure:
     """Attraction, repulsion and net force at one frequency by each way of computing, and how far these are apart."""
-    figure, ((left, right),) = panels(1, 2, (PAGE, 3.9))
+    figure, ((left, right),) = panels(1, 2, 3.9)
     one = result.isel(frequency=min(1, result.sizes["frequency"] - 1))
     true = case_with(one, model="fem")
     for model, (style, text) in STYLES.items():
@@ -264,7 +264,7 @@ def parts_figure(result: xr.Dataset) -> Figure:
 @drawn
 def net_figure(result: xr.Dataset) -> Figure:
     """The net force at every frequency, and the polar angle that goes with it."""
-    figure, ((net, angle),) = panels(1, 2, (PAGE, 3.2))
+    figure, ((net, angle),) = panels(1, 2, 3.2)
     for k, color in zip(range(result.sizes["frequency"]), PALETTE, strict=False):
         for model in ("dipole", "fem"):
             found = case_with(result, model=model).isel(frequency=k)
@@ -377,7 +377,7 @@ def _predicted(simulated: xr.Dataset) -> float:
 @styled
 def orbit_figure(result: xr.Dataset) -> Figure:
     """The orbit of rotor and floater seen from above, and their coordinates, in one flight."""
-    figure, ((above, *others),) = panels(1, 3, (PAGE, 2.9))
+    figure, ((above, *others),) = panels(1, 3, 2.9)
     simulated = case_with(result, model="fem", **ROTOR)
     circle, radius = np.linspace(0, 2 * np.pi, 200), _predicted(simulated)
     x, y, turned = 1e3 * simulated["flight_x"], 1e3 * simulated["flight_y"], simulated["flight_angle"].values

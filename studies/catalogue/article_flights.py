@@ -18,7 +18,7 @@ from ...dynamics.motion.state import Scales
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..figures.style import PALETTE
+from ..figures.style import PALETTE, plot_branch
 from ..levitation import Levitation
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
@@ -37,7 +37,7 @@ from .article import (
     stable_in_flight,
 )
 from .article_formulas import analytic_distance, balanced
-from .drawing import by_configuration, by_rotor, drawn, explain, plot_branch, rotor_panels, small_multiples
+from .drawing import by_configuration, by_rotor, drawn, explain, rotor_panels, small_multiples
 from .tables import span, text_table
 
 # Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.

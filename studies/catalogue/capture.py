@@ -27,7 +27,7 @@ from ...fem.plate.tables import slab_and_rotor_table
 from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Lowering, Scene
-from ..figures.style import PAGE, PALETTE, panels, styled
+from ..figures.style import PALETTE, colour_bar, panels, styled, titled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
 from .article import (
@@ -280,7 +280,7 @@ def place_figure(result: xr.Dataset) -> Figure:
     every = each_place(result)
     found = [(label, [one for name, one in every if name == label]) for label in SHOWN]
     chosen = [(label, some[len(some) // 2]) for label, some in found if some]
-    figure, (maps, leans) = panels(2, len(chosen), (PAGE, 4.6), sharey="row")
+    figure, (maps, leans) = panels(2, len(chosen), 2.3)
     side, height = np.linspace(0, SIDEWAYS, 5), np.linspace(-NEARER, FARTHER, 9)
     edges = np.degrees(np.linspace(0, LEAN, BINS + 1))
     for top, bottom, (label, one) in zip(maps, leans, chosen, strict=True):
@@ -288,15 +288,13 @@ def place_figure(result: xr.Dataset) -> Figure:
         mean = 100 * scipy.stats.binned_statistic_2d(*at, hits.astype(float), bins=(side, height)).statistic
         shades = top.pcolormesh(1e3 * side, 1e3 * height, mean.T, vmin=0, vmax=100, cmap="viridis")
         top.grid(False)
-        top.set_title(f"{top.get_title('left')} {label}, {float(one['rotor_frequency']):.0f} Hz")
-        top.set_xlabel("lateral offset (mm)")
+        titled(top, f"{label}, {float(one['rotor_frequency']):.0f} Hz")
+        ends = 1e3 * height[[-1, 0]]
+        top.set(xlabel="lateral offset (mm)", ylabel="farther from the rotor (mm)", ylim=ends)
         lean = np.digitize(np.degrees(one["lean"].values), edges) - 1
         _shares(bottom, (edges[1:] + edges[:-1]) / 2, [hits[lean == k] for k in range(BINS)], PALETTE[0], "")
-        bottom.set(xlabel="moment to the axis (°)", ylim=(-2, 102))
-    maps[0].set_ylabel("farther from the rotor (mm)")
-    maps[0].invert_yaxis()  # shared by all
-    leans[0].set_ylabel("capture probability (%)")
-    figure.colorbar(shades, ax=maps, label="captured (%)")
+        bottom.set(xlabel="moment to the axis (°)", ylabel="capture probability (%)", ylim=(-2, 102))
+    colour_bar(figure, shades, maps, label="captured (%)")
     return figure
 
 

@@ -12,15 +12,13 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
-from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import Array
-from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
+from ..figures.style import PALETTE, legend_below, panels, styled, titled
 from ..study import cases_with
 from .article import CONFIGURATIONS, label_of, rotor_label
 
 TITLES = {"horizontal": "displaced cube", "vertical": "two cubes", "tilt": "tilted cube"}
-LINE = 135  # Characters of a legend across the page
 Arguments = ParamSpec("Arguments")
 
 
@@ -31,8 +29,7 @@ def drawn(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
     @wraps(draw)
     def inside(*arguments: Arguments.args, **options: Arguments.kwargs) -> Figure:
         figure = draw(*arguments, **options)
-        lengths = [len(name) for axes in figure.axes for name in axes.get_legend_handles_labels()[1]] or [0]
-        legend_below(figure, columns=int(LINE // (8 + (max(lengths) + np.mean(lengths)) / 2)))
+        legend_below(figure)
         return figure
 
     return inside
@@ -52,17 +49,12 @@ def small_multiples(
     shared : as of `Figure.subplots`
     """
     count = len(titles)
-    columns = min(columns, count)
-    rows = -(-count // columns)
-    figure, grid = panels(rows, columns, (PAGE, height * rows + 0.5), **shared)
-    for unused in grid.flat[count:]:
-        unused.remove()
-    axes = list(grid.flat[:count])
+    figure, ((*axes,),) = panels(1, count, height + 0.3, min(columns, count), **shared)
     for k, (panel, title) in enumerate(zip(axes, titles, strict=True)):
-        panel.set_title(f"{panel.get_title('left')} {title}".strip())
-        if k % columns == 0:
+        titled(panel, title)
+        if (place := panel.get_subplotspec()).is_first_col():
             panel.set_ylabel(ylabel)
-        if k + columns >= count:
+        if k + place.get_gridspec().ncols >= count:
             panel.set_xlabel(xlabel)
             panel.tick_params(labelbottom=True)  # the last in its column, though another row may follow
     return figure, axes
@@ -153,13 +145,6 @@ def plain_log(axes: Axes, ticks: Sequence[float] = ()) -> None:
         major_formatter="{x:g}",
         minor_locator=NullLocator(),
     )
-
-
-def plot_branch(axes: Axes, x: ArrayLike, y: ArrayLike, solid: NDArray[np.bool_], **style: Any) -> None:
-    """A curve, solid where `solid`, else dashed, without a gap between."""
-    inside = solid & np.append(solid[1:], True) & np.append(True, solid[:-1])
-    axes.plot(x, np.where(inside, np.nan, y), "--", **{**style, "label": None})
-    axes.plot(x, np.where(solid, y, np.nan), "-", **style)
 
 
 def mode_label(mode: str) -> str:

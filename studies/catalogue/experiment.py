@@ -18,7 +18,7 @@ from scipy.special import logsumexp, ndtri
 from scipy.stats import qmc
 
 from ...geometry.common import Array
-from ..figures.style import PAGE, PALETTE, legend_below, panels, styled
+from ..figures.style import PALETTE, legend_below, panels, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .drawing import drawn
@@ -328,7 +328,7 @@ def corner_figure(result: xr.Dataset) -> Figure:
     scale = np.where(some["unit"] == "S/m", 1e-6, 1.0)
     before, draws = prior_quantiles(some) * scale[:, None], some["posterior"].dropna("draw").values * scale
     limits = np.quantile(draws, (0.003, 0.997), axis=0).T
-    figure, axes = panels(len(SHOWN), len(SHOWN), (PAGE, PAGE), sharex="col")
+    figure, axes = panels(len(SHOWN), len(SHOWN), 6.7 / len(SHOWN), stays=True, sharex="col")
     for (i, j), panel in np.ndenumerate(axes):
         panel.set_title("")  # a letter for each of a corner's many panels says nothing
         if j > i:
@@ -356,7 +356,7 @@ def unknowns_figure(result: xr.Dataset) -> Figure:
     """The middle 68 % of each unknown's posterior in deviations of its prior, for each variant fitted to the facts."""
     before = prior_quantiles(result)
     middle, half = before[:, [1]], (before[:, [2]] - before[:, [0]]) / 2
-    figure, ((panel,),) = panels(1, 1, (PAGE, 1.4 + 0.24 * len(middle)))
+    figure, ((panel,),) = panels(1, 1, 1.4 + 0.24 * len(middle))
     places = np.arange(len(middle))[::-1]
     panel.axvspan(-1, 1, color="0.92", zorder=0, label="prior")
     fitted_to_facts = [name for name in result["variant"].values.tolist() if name != SYNTHETIC]
@@ -374,7 +374,7 @@ def facts_figure(result: xr.Dataset) -> Figure:
     """Each fact's probability beforehand, given the others, and in the fit; and which facts go together."""
     weighed, gain = facts_weighed(result.isel(variant=0))
     names, places = weighed["fact"].values.tolist(), np.arange(weighed.sizes["fact"])
-    figure, ((left, right),) = panels(1, 2, (PAGE, 1.8 + 0.28 * len(names)), sharey=True)
+    figure, ((left, right),) = panels(1, 2, 1.8 + 0.28 * len(names), stays=True, sharey=True)
     marks = {"probability": "o beforehand", "given_others": "s given all others", "in_fit": "^ in the fit"}
     for key, mark in marks.items():
         left.plot(weighed[key], places, mark[0], ms=4, label=mark[2:])

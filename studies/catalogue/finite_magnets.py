@@ -22,7 +22,7 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Floater, Scene
 from ...geometry.scene.files import load_scene
 from ..cli.options import Models, shipped_scene
-from ..figures.style import PAGE, PALETTE, panels
+from ..figures.style import PALETTE, panels
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, recorded, study_of_one
@@ -373,7 +373,7 @@ LABELS = {
 @drawn
 def floater_figure(result: xr.Dataset) -> Figure:
     """What the rigid dipole misses against distance: share of force and torque; axial force by its two causes."""
-    figure, ((left, right),) = panels(1, 2, (PAGE, 3.3))
+    figure, ((left, right),) = panels(1, 2, 3.3)
     distance, weight = 1e3 * result["distance"].values, float(result.attrs["weight_N"])
     for quantity, color in zip(("force", "torque"), PALETTE, strict=False):
         share, error = (result[f"{quantity}_{name}"].values for name in ("missed", "missed_error"))

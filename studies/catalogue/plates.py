@@ -22,7 +22,7 @@ from ...geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box, rotation_matrix
 from ..cli.options import PlateModel
-from ..figures.style import PAGE, PALETTE, panels
+from ..figures.style import PALETTE, panels
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with, each_case, study_of_one
@@ -241,7 +241,7 @@ def _damped(
 @drawn
 def rotors_figure(result: xr.Dataset) -> Figure:
     """Damping rate of the least stable mode of every rotor of the article, plate below and beside, face at 18 mm."""
-    figure, ((axes,),) = panels(1, 1, (PAGE, 3.4))
+    figure, ((axes,),) = panels(1, 1, 3.4)
     for sweep, place, marker, color in zip(ROTORS, PLACES, "os", PALETTE, strict=False):
         part = part_of(result, sweep)
         places = np.arange(part.sizes["case"])
@@ -454,7 +454,7 @@ def team7_lines(result: xr.Dataset) -> list[str]:
 @drawn
 def team7_figure(result: xr.Dataset) -> Figure:
     """The four curves with what is measured, and their deviation."""
-    figure, ((left, right),) = panels(1, 2, (PAGE, 3.2))
+    figure, ((left, right),) = panels(1, 2, 3.2)
     x = 1e3 * result["x"].values
     for curve, color in zip(result["curve"].values, PALETTE, strict=False):
         here = result.sel(curve=curve)

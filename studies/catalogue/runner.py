@@ -21,6 +21,7 @@ from ...geometry.solids import moved
 from ..cli.console import note, progress
 from ..cli.options import NAMES, Models, Workers, combinations
 from ..compare import compare_figure
+from ..exchange import field_map_figure
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
 from ..figures.run import (
@@ -31,6 +32,7 @@ from ..figures.run import (
     question_figure,
     question_lines,
     trajectory_figure,
+    working_point_figure,
 )
 from ..figures.style import save_figures
 from ..figures.view import SEEN, Currents, current_places, near_plate
@@ -46,6 +48,8 @@ from .entries import CATALOGUE
 QUESTION = "question"  # What the result of one's own question is called
 DRAWN = {
     "branch_distance": ("compare", compare_figure),
+    "outside": ("field-map", field_map_figure),
+    "easy_axis": ("working-point", working_point_figure),
     "axis_field": ("field", field_figure),
     "curve_force": ("force", force_figure),
     "position_rotor_frame": ("trajectory", trajectory_figure),

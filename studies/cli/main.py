@@ -17,9 +17,10 @@ from cyclopts import App, CycloptsError
 from rich.console import Console
 
 from ...geometry.common import SpinlevError, printable
+from ..figures.style import figures_across
 from . import commands
 from .console import FORTRAN, answers_only, heard, is_missing_library, missing_extra, note, to_json, way_out
-from .options import Answer
+from .options import Answer, Output
 from .start import STOPPED, TOO_MANY_FILES
 
 LONGEST = 1000  # characters of a line of a message
@@ -95,8 +96,9 @@ def _unforeseen(error: Exception) -> str:
 def _answer(arguments: list[str], out: Any) -> None:
     began = time.perf_counter()
     said_of_itself = Console(file=out)  # help and version
-    how: dict[str, Any] = {"exit_on_error": False, "print_error": False, "result_action": "return_value"}
-    answer = app(arguments, console=said_of_itself, **how)
+    command, bound, _ = app.parse_args(arguments, console=said_of_itself, exit_on_error=False, print_error=False)
+    with figures_across(bound.arguments.get("output", Output()).width):
+        answer = command(*bound.args, **bound.kwargs)
     if isinstance(answer, Answer):
         values = {**answer.values, "seconds": time.perf_counter() - began}
         lines = printable("\n".join(answer.lines))

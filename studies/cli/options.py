@@ -21,6 +21,7 @@ from cyclopts import Parameter
 
 from ...geometry.common import Array, InputError, no_argument, shown
 from ...geometry.files import file_content
+from ..figures.style import FigureWidth
 from .console import heard
 
 COLUMNS = ("x_mm", "y_mm", "z_mm")
@@ -213,12 +214,15 @@ class Output:
         Print one JSON object and nothing else on standard output.
     out
         Folder for the files; left out: `out`, or beside a result that is asked about.
+    width
+        Width of figures in a journal: page (170 mm) or column (85 mm).
     verbose
         Report why each model was chosen, its number of unknowns, and how well energy is conserved.
     """
 
     json: Flag = False
     out: Path | None = None
+    width: FigureWidth = "page"
     verbose: Flag = False
 
     @property

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import ConvexHull
@@ -13,7 +16,7 @@ from scipy.spatial import ConvexHull
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ...geometry.solids import Solid
-from .style import COLORS, COLUMN, DASHES, NAMES, PAGE, PALETTE, legend_below, panels, styled
+from .style import COLORS, DASHES, NAMES, PALETTE, legend_below, panels, plot_branch, styled, titled
 from .view import near_plate, triangles
 
 if TYPE_CHECKING:
@@ -33,6 +36,8 @@ COARSE = 0.05
 """Interval of samples (s) that lets a bounce pass unseen: a line through them would show slow motions that are none."""
 HOURS = 7200.0  # Flights that take longer are drawn over hours, s
 MODE_MARKERS = "osD^v"
+FAMILY = 6  # curves that a panel tells apart, at most
+APART = 0.3  # of the distance: farther from the last point of a branch the next is of another one
 NO_GROWTH = 1e-9  # Growth that counts as none, 1/s
 QUANTITIES = {
     "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
@@ -46,7 +51,7 @@ def scene_figure(scene: Scene) -> Figure:
     """A scene to scale, from the side and from above, as it stands at t = 0; nothing is computed for it."""
     from matplotlib.patches import Polygon
 
-    figure, ((side, top),) = panels(1, 2, (PAGE, 3.4))
+    figure, ((side, top),) = panels(1, 2, 3.4)
     lowest = min(float(magnet.box.corners[:, 2].min()) for magnet in scene.rotor)
     name, moment = "floater (where it levitates is not computed)", np.eye(3)[2]
     where = np.array([0.0, 0.0, lowest - 2 * scene.floater.radius])
@@ -71,15 +76,19 @@ def scene_figure(scene: Scene) -> Figure:
             panel.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": PALETTE[0]})
         panel.set(aspect="equal", xlabel="x (mm)", ylabel=f"{'xyz'[up]} (mm)")
         panel.autoscale_view()
+        panel.set_xlim(-1.05 * reach, 1.05 * reach)
+    top.set_ylim(-1.05 * reach, 1.05 * reach)
     side.axvline(0.0, color="0.3", lw=0.8, ls="-.", label="axis of rotation")
-    legend_below(figure, side, columns=3)
+    legend_below(figure, side)
     return figure
 
 
 @styled
 def field_figure(result: xr.Dataset) -> Figure:
     """The field's two components on the axis below the rotor, and how far the models are from the best of them."""
-    figure, ((left, right),) = panels(1, 2, (PAGE, 3.2))
+    from matplotlib.ticker import LogLocator
+
+    figure, ((left, right),) = panels(1, 2, 3.2)
     distance, reference = -1e3 * result["axis_height"].values, str(result.attrs["best_model"])
     fields = {str(model): result["axis_field"].sel(model=model).values for model in result["model"].values}
     best = fields.pop(reference)
@@ -98,15 +107,16 @@ def field_figure(result: xr.Dataset) -> Figure:
     error = result["axis_error"].sel(model=reference).values
     right.fill_between(distance, np.nanmin(error) / 3, error, color="0.85", label=f"error estimate, {NAMES[reference]}")
     left.set(xlabel=DISTANCE, ylabel=f"|B component| (mT), {NAMES[reference]}")
+    left.yaxis.set(major_locator=LogLocator(subs=(1.0, 2.0, 5.0)), major_formatter="{x:g}", minor_formatter="")
     right.set(xlabel=DISTANCE, ylabel=f"|ΔB| / |B| against {NAMES[reference]}")
-    legend_below(figure, columns=3)
+    legend_below(figure)
     return figure
 
 
 @styled
 def force_figure(result: xr.Dataset) -> Figure:
     """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
-    figure, ((axes, near),) = panels(1, 2, (PAGE, 3.6))
+    figure, ((axes, near),) = panels(1, 2, 3.6)
     weight = -1e3 * float(result.attrs["weight_N"])
     felt = result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1  # older results do not say
     depth = -1e3 * result["equilibrium_position"].sel(axis="z")
@@ -140,14 +150,14 @@ def force_figure(result: xr.Dataset) -> Figure:
         near.locator_params(nbins=5)
     else:
         near.set_axis_off()
-    legend_below(figure, axes, columns=3)
+    legend_below(figure, axes)
     return figure
 
 
 @styled
 def trajectory_figure(result: xr.Dataset) -> Figure:
     """Distance and polar angle of a trajectory as envelopes, and a closer look at its beginning, or its end if lost."""
-    figure, ((far, look), (tilt, above)) = panels(2, 2, (PAGE, 4.8))
+    figure, ((far, look), (tilt, above)) = panels(2, 2, 2.4)
     seconds, moment = result["time"].values, result["moment"].values
     time, unit = (seconds / 3600, "h") if seconds[-1] > HOURS else (seconds, "s")
     distance = -1e3 * result["position"].sel(axis="z").values
@@ -189,7 +199,7 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     above.set(xlabel=f"x (mm), {frame}", ylabel="y (mm)", aspect="equal", adjustable="datalim")
     for panel in (far, look, tilt, above):
         panel.locator_params(axis="x", nbins=5)
-    legend_below(figure, columns=3)
+    legend_below(figure)
     return figure
 
 
@@ -206,7 +216,7 @@ def _smooth(parameter: Array, *curves: Array) -> tuple[Array, ...]:
 def working_point_figure(found: xr.Dataset) -> Figure:
     """A row per magnet: a section along the easy axis through the lowest place, and the field over the volume."""
     count = found.sizes["magnet"]
-    figure, axes = panels(count, 2, (PAGE, 2.9 * count))
+    figure, axes = panels(count, 2, 2.9)
     for k, (section, volume) in enumerate(axes):
         one = found.isel(magnet=k)
         u, v, knee = 1e3 * one["along"].values, 1e3 * one["across"].values, float(one["knee"])
@@ -219,7 +229,7 @@ def working_point_figure(found: xr.Dataset) -> Figure:
         away = one["place"].values - one["center"].values
         where = [1e3 * float(away @ one[name].values) for name in ("easy_axis", "across_axis")]
         section.plot(*where, "o", color=PALETTE[1], markersize=5, markeredgecolor="white", clip_on=False)
-        section.set_title(f"{section.get_title('left')} magnet {int(one['magnet'])}")
+        titled(section, f"magnet {int(one['magnet'])}")
         section.set(xlabel="along the easy axis (mm)", ylabel="across (mm)")
         section.set_aspect("equal")
         section.grid(False)
@@ -235,7 +245,7 @@ def working_point_figure(found: xr.Dataset) -> Figure:
 @styled
 def modes_figure(result: xr.Dataset) -> Figure:
     """Rate and frequency of every normal mode; open where it decays, filled where it grows."""
-    figure, ((axes,),) = panels(1, 1, (1.5 * COLUMN, 3.4))
+    figure, ((axes,),) = panels(1, 1, 3.4)
     listed = result if "equilibrium" in result.dims else result.expand_dims("equilibrium")
     for k, color in zip(range(listed.sizes["equilibrium"]), PALETTE * 9, strict=False):
         one = listed.isel(equilibrium=k)
@@ -251,36 +261,47 @@ def modes_figure(result: xr.Dataset) -> Figure:
     axes.plot([], [], "o", color="0.3", label="filled: grows")
     axes.set(yscale="log", xlabel="frequency, rotor's frame (Hz)", ylabel="rate of decay or growth (1/s)")
     axes.margins(0.08)
-    legend_below(figure, columns=3)
+    legend_below(figure)
     return figure
 
 
 def drawable(result: xr.Dataset) -> bool:
-    """Whether there is a figure for so many parameters."""
-    return len(_varied(result)) <= 2
+    """Whether there is a figure: at most `FAMILY` curves over one parameter, or a map over two numbers."""
+    along, others = _axes(result)
+    family = math.prod(result.sizes[key] for key in others)
+    return family <= FAMILY or (len(others) == 1 and {result[k].dtype.kind for k in (along, *others)} <= set("iuf"))
 
 
 @styled
 def question_figure(result: xr.Dataset) -> Figure:
-    """Curves over one parameter, one for each model if these were varied too, or maps over two numbers."""
-    shown = _derived(result)
-    names, varied = _shown(shown), _varied(result)
-    rows = -(-len(names) // 2)
-    figure, axes = panels(rows, 2, (PAGE, 2.9 * rows + 0.4))
-    words = [key for key in varied if result[key].dtype.kind not in "iuf"]
-    for panel in axes.ravel()[len(names) :]:
-        panel.remove()
-    for panel, name in zip(axes.ravel(), names, strict=False):
-        if len(varied) == 1:
-            _curves(panel, shown, name, varied[0], PALETTE[0])
-        elif len(words) == 1:
-            (number,) = set(varied) - set(words)
-            for value, color in zip(shown[words[0]].values, PALETTE * 9, strict=False):
-                _curves(panel, shown.sel({words[0]: value}), name, number, color, f"{NAMES[str(value)]}, ")
-        else:
-            _map(panel, shown, name, varied)
-    legend_below(figure, columns=2)
+    """Curves over the number with most values, one for each combination of the others, or maps where they are many.
+
+    Of equilibria the branch on which the floater levitates; solid and filled where it is stable.
+    """
+    shown, (along, others) = _derived(result), _axes(result)
+    names = _shown(shown)
+    figure, ((*axes,),) = panels(1, len(names), 3.1, 2)
+    members = list(product(*(shown[key].values.tolist() for key in others)))
+    for panel, name in zip(axes, names, strict=True):
+        if len(members) > FAMILY:
+            _map(panel, shown, name, [*others, along])
+        for values, color in zip(members if len(members) <= FAMILY else (), PALETTE, strict=False):
+            chosen = dict(zip(others, values, strict=True))
+            label = ", ".join(
+                NAMES[v] if isinstance(v, str) else _label(shown[k], f" = {v:g}") for k, v in chosen.items()
+            )
+            _curve(panel, shown.sel(chosen), name, along, color, label)
+    if "stable" in shown and len(members) <= FAMILY:
+        axes[0].plot([], [], "o--", ms=3, color="0.3", mfc="white", label="unstable")
+    legend_below(figure)
     return figure
+
+
+def _axes(result: xr.Dataset) -> tuple[str, list[str]]:
+    """What is varied along the curves: the number of most values, if any is a number; and what else is varied."""
+    varied = [str(key) for key in np.atleast_1d(result.attrs["varied"])]
+    along = max(varied, key=lambda key: (result[key].dtype.kind in "iuf", result.sizes[key]))
+    return along, [key for key in varied if key != along]
 
 
 def _shown(result: xr.Dataset) -> list[str]:
@@ -304,25 +325,51 @@ def _derived(result: xr.Dataset) -> xr.Dataset:
     return result
 
 
-def _curves(axes: Axes, result: xr.Dataset, name: str, key: str, color: str, of: str = "") -> None:
-    values, x = result[name], result[key].values
-    if "equilibrium" not in values.dims:
-        axes.plot(x, values.values, "o-", ms=3, color=color, label=of.rstrip(", "))
-    else:
-        for stable, fill in ((1, color), (0, "white")):
-            chosen = values.where(result["stable"] == stable).transpose(key, "equilibrium").values
-            axes.plot([], [], "o", color=color, mfc=fill, ms=4, label=f"{of}{'stable' if stable else 'unstable'}")
-            axes.plot(x, chosen, "o", color=color, mfc=fill, ms=4)
+def _curve(axes: Axes, result: xr.Dataset, name: str, key: str, color: str, label: str) -> None:
+    values, solid = result[name], np.ones(result.sizes[key], bool)
+    if "equilibrium" in values.dims:
+        number = _levitating(result, key)
+        branch = result[[name, "stable"]].isel(equilibrium=xr.DataArray(number, dims=key)).where(number >= 0)
+        values, solid = branch[name].assign_attrs(values.attrs), branch["stable"].values == 1
+    x, y = result[key].values, values.values.astype(float)
+    style: dict[str, Any] = {"color": color, "ms": 3.5}
+    axes.plot([], [], "o-", label=label or None, **style)
+    if result[key].dtype.kind in "iuf":
+        plot_branch(axes, x, y, solid, color=color)
+    axes.plot(x, np.where(solid, y, np.nan), "o", **style)
+    axes.plot(x, np.where(solid, np.nan, y), "o", mfc="white", **style)
     axes.set(xlabel=_label(result[key]), ylabel=_label(values))
-    if name == "growth":
-        axes.set_yscale("symlog", linthresh=1e-3)
+    if name in QUANTITIES["field"] and np.nanmin(y, initial=np.inf) > 0:
+        axes.set_yscale("log")
+    elif name == "growth":
+        axes.axhline(0.0, color="0.3", lw=0.8)
+
+
+def _levitating(result: xr.Dataset, key: str) -> NDArray[np.int_]:
+    """Numbers of the equilibria along a parameter on the branch of the stable ones, or of the first; -1 beyond its end.
+
+    From the first stable one on to both sides, each is the nearest to the one before, a stable one if there is any.
+    """
+    place = result["position"].transpose(key, "equilibrium", "axis").values
+    stable = result["stable"].transpose(key, "equilibrium").values == 1
+    begin, numbers = int(np.argmax(stable.any(axis=1))), np.full(len(place), -1)
+    for order in (range(begin, len(place)), range(begin, -1, -1)):
+        last = place[begin, 0]  # the stable ones are the first
+        for k in order:
+            known = stable[k] if stable[k].any() else np.isfinite(place[k, :, 2])
+            apart = np.where(known, np.linalg.norm(place[k] - last, axis=1), np.inf)
+            if apart.min() > APART * np.linalg.norm(last):
+                break
+            numbers[k] = np.argmin(apart)
+            last = place[k, numbers[k]]
+    return numbers
 
 
 def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
     values = result[name]
     if "equilibrium" in values.dims:  # the first is stable wherever any is
         values = values.where(result["stable"] == 1).isel(equilibrium=0).assign_attrs(values.attrs)
-        axes.set_title(f"{axes.get_title('left')} stable equilibrium nearest to the rotor")
+        titled(axes, "stable equilibrium")
     drawn = axes.pcolormesh(
         result[keys[1]].values, result[keys[0]].values, values.transpose(*keys).values, shading="nearest"
     )
@@ -331,18 +378,15 @@ def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
         axes.figure.colorbar(drawn, ax=axes, label=_label(values))
 
 
-def _label(values: xr.DataArray) -> str:
-    unit = {"1": "", "deg": " (°)"}.get(str(values.attrs.get("units", "1")), f" ({values.attrs.get('units')})")
-    return f"{values.attrs.get('long_name', values.name)}{unit}"
-
-
-def _varied(result: xr.Dataset) -> list[str]:
-    return [str(key) for key in np.atleast_1d(result.attrs["varied"])]
+def _label(values: xr.DataArray, value: str = "") -> str:
+    """Name and unit as of an axis, or with a value between them."""
+    unit = {"1": "", "deg": "°", "1/s": "s⁻¹"}.get(units := str(values.attrs.get("units", "1")), units)
+    return f"{values.attrs.get('long_name', values.name)}{value} {unit if value or not unit else f'({unit})'}".rstrip()
 
 
 def question_lines(result: xr.Dataset) -> list[str]:
     """What was found, in a few lines."""
-    varied, ask = _varied(result), str(result.attrs["ask"])
+    varied, ask = np.atleast_1d(result.attrs["varied"]), str(result.attrs["ask"])
     grid = " × ".join(f"{key} ({result.sizes[key]})" for key in varied)
     lines = [f"Asked for {ask} over {grid}."]
     shown = _derived(result)

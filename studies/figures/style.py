@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import wraps
 from pathlib import Path
 from string import ascii_lowercase
-from typing import TYPE_CHECKING, Any, ParamSpec
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec
+
+import numpy as np
 
 from ...fem.files import write_whole
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
 
 PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 """Colours of M. Okabe and K. Ito, which all kinds of colour vision tell apart."""
@@ -34,7 +41,13 @@ STYLE: Any = {
     "pdf.fonttype": 42,  # journals take no Type 3 fonts
     "figure.constrained_layout.use": True,
 }
-COLUMN, PAGE = 85 / 25.4, 170 / 25.4  # Width of a figure in one column of a journal and across its page, inches
+FigureWidth = Literal["column", "page"]
+WIDTHS: Mapping[str, float] = {"column": 85 / 25.4, "page": 170 / 25.4}  # of a journal's column and page, inches
+LOWER = 0.85  # height of a row of panels in a column, in units of that across the page
+BELOW = 0.6  # of a row's height is taken by what is written above and below its panels, inches
+LETTERS = 16  # of a label along an inch
+LEGEND = 0.4  # height of a legend that a figure's height reckons with, inches
+_width: ContextVar[FigureWidth] = ContextVar("width", default="page")
 
 
 class _Looks(dict[str, str]):
@@ -67,42 +80,98 @@ def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
         import matplotlib as mpl
 
         with mpl.rc_context(STYLE):
-            return draw(*arguments, **options)
+            figure = draw(*arguments, **options)
+        for panel in figure.axes:
+            if place := panel.get_subplotspec():  # a colour bar has none
+                room = figure.get_figheight() / place.get_gridspec().nrows - BELOW
+                lines = panel.get_ylabel().split("\n")
+                panel.set_ylabel("\n".join(fill(line, max(12, int(LETTERS * room))) for line in lines))
+        return figure
 
     return inside
 
 
-def panels(rows: int, columns: int, size: tuple[float, float], **shared: Any) -> tuple[Figure, Any]:
-    """A figure without a window and its axes, lettered (a), (b) where there are several.
+def titled(panel: Axes, words: str) -> None:
+    """Add words to the letter of a panel."""
+    panel.set_title(f"{panel.get_title('left')} {words}".strip())
+
+
+@contextmanager
+def figures_across(width: FigureWidth) -> Iterator[None]:
+    """What is drawn inside is as wide as a journal's column (85 mm) or page (170 mm)."""
+    token = _width.set(width)
+    try:
+        yield
+    finally:
+        _width.reset(token)
+
+
+def panels(
+    rows: int, columns: int, height: float, beside: int | None = None, stays: bool = False, **shared: Any
+) -> tuple[Figure, Any]:
+    """A figure without a window and its axes (rows, columns), lettered (a), (b) where there are several.
+
+    In a column panels stand one below the other where they are up to four, else in pairs; their text keeps its size.
 
     Parameters
     ----------
     rows, columns : of the panels
-    size : width and height, inches
+    height : of a row of panels, inches across the page
+    beside : panels next to each other across the page; by default a row
+    stays : whether the figure is across the page always, because its panels belong together
     shared : as of `Figure.subplots`
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size)
-    axes = figure.subplots(rows, columns, squeeze=False, **shared)
-    for letter, panel in zip(ascii_lowercase, axes.flat if rows * columns > 1 else (), strict=False):
+    width, count, turned = "page" if stays else _width.get(), rows * columns, False
+    beside = beside or columns
+    if width == "column":
+        turned, beside, height = columns > rows > 1, min(beside, 2 if count > 4 else 1), LOWER * height
+    shape = (columns, rows) if turned else (-(-count // beside), beside)  # each row becomes a column, or is wrapped
+    figure = Figure(figsize=(WIDTHS[width], height * shape[0]))
+    axes = figure.subplots(*shape, squeeze=False, **shared)
+    axes = axes.T if turned else axes.ravel()
+    for unused in axes.flat[count:]:
+        unused.remove()
+    axes = axes.flat[:count].reshape(rows, columns)
+    for letter, panel in zip(ascii_lowercase, axes.flat if count > 1 else (), strict=False):
         panel.set_title(f"({letter})")
     return figure, axes
 
 
-def legend_below(figure: Figure, *labelled: Any, columns: int = 6) -> None:
-    """One legend below all panels, where nothing that is drawn lies under it.
+def colour_bar(figure: Figure, shown: Any, axes: Any, **options: Any) -> Any:
+    """The bar of the colours in a row of panels beside it, of those in a column below it; options of `colorbar`."""
+    row = len({panel.get_subplotspec().rowspan.start for panel in axes}) == 1
+    return figure.colorbar(shown, ax=list(axes), location="right" if row else "bottom", **options)
+
+
+def plot_branch(axes: Axes, x: ArrayLike, y: ArrayLike, solid: NDArray[np.bool_], **style: Any) -> None:
+    """A curve, solid where `solid`, else dashed, without a gap between."""
+    inside = solid & np.append(solid[1:], True) & np.append(True, solid[:-1])
+    axes.plot(x, np.where(inside, np.nan, y), "--", **{**style, "label": None})
+    axes.plot(x, np.where(solid, y, np.nan), "-", **style)
+
+
+def legend_below(figure: Figure, *labelled: Any) -> None:
+    """One legend below all panels in as many columns as fit, up to six; the figure becomes higher by its height.
 
     Parameters
     ----------
     figure : with its panels
     labelled : the axes whose names it explains; all where none are given
-    columns : at most
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     named = labelled or figure.axes
     entries = {n: h for axes in named for h, n in zip(*axes.get_legend_handles_labels(), strict=True)}
-    if entries:
-        figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=min(columns, len(entries)))
+    canvas: Any = FigureCanvasAgg(figure)
+    for columns in range(min(len(entries), 6), 0, -1):
+        legend = figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns)
+        size = legend.get_window_extent(canvas.get_renderer())
+        if columns == 1 or size.width < figure.bbox.width:
+            figure.set_figheight(figure.get_figheight() + max(0.0, size.height / figure.dpi - LEGEND))
+            return
+        legend.remove()
 
 
 def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:

@@ -19,7 +19,7 @@ from ...geometry.scene.files import canonical_keys, scene_text
 from ..cli.console import to_json
 from ..cli.options import Models
 from ..figures.pictures import drawn_field
-from ..figures.style import PAGE, PALETTE, figure_bytes, panels, styled
+from ..figures.style import PALETTE, figure_bytes, panels, styled
 from ..figures.view import field_lines
 from ..levitation import Levitation
 from ..result import Result, write_dataset
@@ -246,7 +246,7 @@ def screen_figure(state: PageState, shown: Shown | None, regions: Regions | None
     """Map, numbers and trajectory, (3, n) time s, height mm and polar angle °."""
     from matplotlib.colors import ListedColormap
 
-    figure, ((chart, height), (words, tilt)) = panels(2, 2, (PAGE, 4.6))
+    figure, ((chart, height), (words, tilt)) = panels(2, 2, 2.3)
     if shown is not None:
         figure.suptitle(shown.headline, fontsize=8, x=0.01, ha="left", wrap=True)
         lines = [f"By: {shown.sign}", f"spinlev equilibria scene.toml {state.command}"]

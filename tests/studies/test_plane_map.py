@@ -74,7 +74,7 @@ def written(tmp_path_factory):
 
 def test_the_files_of_a_map_are_labelled_and_open_elsewhere(written):
     with xr.open_dataset(written / "field-map.nc", engine="h5netcdf") as found:
-        assert found["B"].dims == ("model", "v", "u", "component")
+        assert found["B"].dims == ("model", "z", "x", "component")
         assert found["B"].attrs["units"] == "T"
         assert set(np.unique(found["magnet"])) == {0, 1}
         b = found["B"].sel(model="fem").values

@@ -6,6 +6,7 @@ import threading
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -127,28 +128,41 @@ def test_the_report_of_a_run_has_its_numbers_cut_where_they_are_long(scene, tmp_
         report_job(tmp_path, tmp_path)
 
 
-def test_equilibria_over_one_parameter_are_points_on_the_figure():
-    """Two equilibria at the first value and one at the second: stable ones filled, unstable ones hollow."""
-    growth = {"units": "1/s", "long_name": "growth rate"}
-    place = np.array([[[0, 0, -0.02], [0, 0, -0.03]], [[0, 0, -0.018], [np.nan] * 3]])
-    result = xr.Dataset(
-        {
-            "position": (("frequency_hz", "equilibrium", "axis"), place, {"units": "m"}),
-            "stable": (("frequency_hz", "equilibrium"), [[1, 0], [1, np.nan]]),
-            "growth": (("frequency_hz", "equilibrium"), [[0.0, 40.0], [0.0, np.nan]], growth),
-        },
-        {"frequency_hz": [110.0, 120.0], "axis": ["x", "y", "z"]},
-        {"study": "question", "ask": "equilibria", "varied": ["frequency_hz"]},
+def question(place, stable, **varied):
+    """A result of a sweep of equilibria at places (m) by the values varied."""
+    dims = (*varied, "equilibrium")
+    columns = {"position": ((*dims, "axis"), place, {"units": "m"}), "stable": (dims, stable)}
+    attrs = {"study": "question", "ask": "equilibria", "varied": [*varied]}
+    return xr.Dataset(columns, {**varied, "axis": ["x", "y", "z"]}, attrs)
+
+
+def test_a_sweep_draws_the_branch_on_which_the_floater_levitates():
+    """From the stable one on, hollow where it is unstable; neither its end nor other branches."""
+    height = np.array([[-0.021, -0.03], [-0.02, -0.03], [-0.019, -0.03], [-0.0305, -np.nan]])
+    place = np.stack([0 * height, 0 * height, height], axis=-1)
+    result = question(place, [[0, 0], [1, 0], [0, 0], [0, np.nan]], frequency_hz=[110.0, 115.0, 120.0, 125.0])
+    (axes,) = question_figure(result).axes
+    filled, hollow = (
+        np.concatenate([line.get_ydata() for line in axes.lines if line.get_marker() == "o" and face(line) == fill])
+        for fill in (False, True)
     )
-    axes = next(a for a in question_figure(result).axes if "distance" in a.get_ylabel())
-    shown = {}
-    for line in axes.lines:
-        if len(line.get_xdata()):
-            shown.setdefault(line.get_markerfacecolor(), []).append(np.asarray(line.get_ydata(), float))
-    hollow = np.concatenate(shown.pop("white"))
-    (filled,) = map(np.concatenate, shown.values())
-    np.testing.assert_allclose(sorted(filled[np.isfinite(filled)]), [18.0, 20.0])
-    np.testing.assert_allclose(hollow[np.isfinite(hollow)], [30.0])
+    np.testing.assert_allclose(filled[np.isfinite(filled)], [20.0])
+    np.testing.assert_allclose(hollow[np.isfinite(hollow)], [21.0, 19.0])
+
+
+def face(line):
+    """Whether a line's markers are hollow."""
+    return line.get_markerfacecolor() == "white"
+
+
+@pytest.mark.parametrize(("members", "panels"), [(3, 1), (7, 2)])
+def test_a_second_number_is_a_family_of_curves_and_of_many_values_a_map(members, panels):
+    place = np.zeros((8, members, 1, 3)) - 0.02
+    result = question(place, np.ones((8, members, 1)), frequency_hz=np.arange(8.0), angle=np.arange(members) + 1.0)
+    figure = question_figure(result)
+    assert len(figure.axes) == panels  # a map has a bar
+    names = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert names == ["angle = 1", "angle = 2", "angle = 3", "unstable"][: 4 * (panels == 1)]
 
 
 def test_every_point_of_every_study_is_known_to_json():
@@ -190,7 +204,7 @@ def test_what_nobody_foresaw_ends_in_one_message(monkeypatch, capsys):
     def fails(*arguments, **options):
         raise ZeroDivisionError("a mistake of ours")
 
-    monkeypatch.setattr(cli, "app", fails)
+    monkeypatch.setattr(cli, "app", SimpleNamespace(parse_args=fails))
     assert _status([], io.StringIO()) == 1
     said = capsys.readouterr().err
     assert f"failed at {Path(__file__).parent.name}/{Path(__file__).name}:" in said

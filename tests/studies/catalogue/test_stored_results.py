@@ -3,16 +3,38 @@
 import re
 import shutil
 
+import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from places import QUICK
 
 from spinlev.studies.catalogue.entries import CATALOGUE
 from spinlev.studies.catalogue.report import cite_job, report_job
 from spinlev.studies.catalogue.runner import figures_of, read_result
-from spinlev.studies.figures.style import figure_bytes
+from spinlev.studies.figures.style import STYLE, figure_bytes, figures_across
 
 STORED = sorted(QUICK.glob("*.nc"))
+
+
+@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
+def test_figures_fit_into_a_column_of_a_journal_with_the_text_of_the_page(path):
+    """85 mm wide, no text below 7 points, no panel lost, and nothing cut."""
+    result = read_result(path)
+    page = figures_of(result)
+    with figures_across("column"):
+        column = figures_of(result)
+    for name, figure in column.items():
+        figure_bytes(figure, "pdf")
+        assert figure.get_figwidth() == pytest.approx(85 / 25.4)
+        assert len(figure.axes) == len(page[name].axes)
+        with mpl.rc_context(STYLE):  # labels of ticks that are looked at are made anew
+            needed, (wide, high) = figure.get_tightbbox(), figure.get_size_inches()
+        assert min(needed.x0, needed.y0) > -0.01
+        assert needed.x1 < wide + 0.01
+        assert needed.y1 < high + 0.01
+        texts = figure.findobj(Text)
+        assert min(text.get_fontsize() for text in texts if text.get_text() and text.get_visible()) >= 7
 
 
 @pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
