@@ -54,7 +54,7 @@ def truth(scene: Scene, height: float, speed: float, time: Array) -> Array:
     return np.asarray(np.interp(time, fine, found))
 
 
-@pytest.mark.parametrize(("model", "error"), [pytest.param("slab", 0.76, marks=pytest.mark.slow), ("auto", 0.098)])
+@pytest.mark.parametrize(("model", "error"), [("slab", 0.76), pytest.param("auto", 0.098, marks=pytest.mark.slow)])
 def test_a_magnet_thrown_at_cold_copper_turns_round_in_mid_air(model: str, error: float):
     """As far as 42 mm from where it begins, from where the first table reaches 3 mm: no impact, as it was once told.
 
@@ -77,12 +77,12 @@ def test_a_magnet_thrown_at_cold_copper_turns_round_in_mid_air(model: str, error
 
 
 def test_a_magnet_dropped_from_far_off_feels_the_plate_where_it_comes_to():
-    """40 mm off, the plate does less than a millionth of the weight and is left out; at its face it is not."""
-    scene = dropped(0.04, (0.0, 0.0, -0.5))
+    """20 mm off, the plate does less than a millionth of the weight and is left out; at its face it is not."""
+    scene = dropped(0.02, (0.0, 0.0, -0.5))
     light = replace(scene, floater=replace(scene.floater, remanence=5e-4))
     levitation = Levitation(light, Models(plate_model="auto", plate_rtol=0.1))
     assert levitation.plate is None
-    flown = levitation.flight(0.08)
+    flown = levitation.flight(0.03)
     assert levitation.flight_plate is not None
     assert not flown.left_plate_table
 

@@ -53,7 +53,7 @@ COMMANDS = {
 FAST = {("field", name) for name in SCENES} | {
     ("equilibria", "wide ring"), ("equilibria", "at rest"), ("simulate", "slow"), ("plate", "over a plate"),
 }  # fmt: skip
-QUICK = {"field": ["--model", "cuboid"], "simulate": ["--model", "dipole"]}
+QUICK = {"field": ["--model", "cuboid"], "simulate": ["--model", "dipole"], "plate": ["--model", "slab"]}
 """Models of the fast ones; the slow ones take what accuracy needs."""
 ANSWERS = ("no stable equilibrium", "Input scene must have a [plate]")
 """Why there may be no numbers: nothing holds the floater, or the scene has not what the command asks about."""
