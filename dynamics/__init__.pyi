@@ -11,12 +11,16 @@ from .equilibria.equilibrium import (
 from .equilibria.path import Steps as Steps
 from .equilibria.search import find_equilibria as find_equilibria, survey as survey, with_plate as with_plate
 from .flights.flight import (
-    Checkpoint as Checkpoint,
     StartError as StartError,
     initial_state as initial_state,
     simulate as simulate,
     starting_point as starting_point,
 )
-from .flights.trajectory import FlightStopped as FlightStopped, Trajectory as Trajectory, flight_kind as flight_kind
+from .flights.trajectory import (
+    Checkpoint as Checkpoint,
+    FlightStopped as FlightStopped,
+    Trajectory as Trajectory,
+    flight_kind as flight_kind,
+)
 from .motion.plate import PlateMemory as PlateMemory
 from .motion.rates import Rates as Rates

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
-from ..dynamics.flights.flight import Checkpoint, initial_state, most_like_levitation, simulate, starting_point
+from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
-from ..dynamics.flights.trajectory import FlightStopped, Trajectory
+from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
 from ..dynamics.motion.effect import Interaction, interaction_of
 from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, mutual_choice, with_effects
 from ..dynamics.motion.equations import FORCE_ALONE

@@ -13,8 +13,8 @@ import xarray as xr
 
 from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey, nearest_of
 from ..dynamics.equilibria.search import free_of_bodies
-from ..dynamics.flights.flight import Checkpoint, most_like_levitation, starting_point
-from ..dynamics.flights.trajectory import FlightStopped, Trajectory
+from ..dynamics.flights.flight import most_like_levitation, starting_point
+from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
 from ..fem.cache import program_digest
 from ..fem.closed_forms.eddy_sphere import ComplexArray
 from ..fem.files import write_whole

@@ -18,7 +18,7 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..motion.effect import Effect, Fittable, Interaction, interaction_of
 from ..motion.events import clearance, rotor_gap
-from ..motion.state import Parameter, Vector, turned_about_z
+from ..motion.state import Parameter, turned_about_z
 
 DEGREE = len(Parameter)  # Number of the runtime parameter that says of which degree the ball is: 0 where there is none
 # The second kind, twice as wide and half again as slow, is for a floater that has left a small ball.
@@ -35,7 +35,6 @@ LEAST = 1.5  # Smallest radius of a ball in spacings: a floater that enters it i
 TRIALS = 5
 ANGLES, DEPTHS = 72, 400
 MOST = 4096  # Balls that are remembered, 2.6 kB each
-INSIDE = 1 - 1e-9  # Square of the distance from a ball's centre, in radii, from which on the floater has left it
 # A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius, up or down.
 STAY = 4.0
 SNUG = 0.97  # Largest part of a ball's radius to which the circle may reach on which the rotor sees the floater
@@ -60,11 +59,6 @@ def in_ball(whole: Interaction, formula: BallField) -> Interaction:
         else:
             effects.append(effect)
     return Interaction(formula, tuple(effects))
-
-
-def within(formula: BallField, position: Vector) -> hy.expression:
-    """An expression that becomes negative where a scaled position leaves the ball."""
-    return 1.0 - hy.sum([t * t for t in formula.offset([hy.par[Parameter.LENGTH] * x for x in position])])
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +95,6 @@ class Balls:
                 values[DEGREE], values[DEGREE + 1 : DEGREE + 1 + len(numbers)] = formula.degree, numbers
                 return error
         return 0.0
-
-    def hold(self, state: Array, values: Array) -> bool:
-        """Whether there is a ball, and a floater in a scaled state has not left it."""
-        degree, *center, inverse = values[DEGREE : DEGREE + 5]
-        away = state[:3] * values[Parameter.LENGTH] - center
-        return bool(degree) and bool(away @ away * inverse**2 < INSIDE)
 
     def at(self, formula: BallField, reach: float, place: Array) -> tuple[Array, float] | None:
         """Parameters and error of a `formula`'s ball for `place` (3,) m; None near a body or loss (`reach`, m)."""

@@ -27,8 +27,8 @@ from ..motion.events import BEYOND, CONTACT, Events, clearance, flight_events, p
 from ..motion.plate import PlateForce, PlateMemory
 from ..motion.state import Parameter, State, Vector
 from .balls import LARGE, SMALL
-from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight, IntegrationError
-from .trajectory import DURATION, Recorder, Trajectory
+from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight, IntegrationError, Recorder
+from .trajectory import DURATION, Trajectory
 
 LANES = 8  # Measured: a flight in eight lanes takes a quarter of the time of one alone, in four a half, in 16 a third
 TOGETHER = 200  # Steps between two looks for lanes whose flights have ended; a hundred are about 16 turns

@@ -9,12 +9,8 @@ last bit.  `initial_state` says where a trajectory begins.
 
 from __future__ import annotations
 
-import hashlib
-import io
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -22,7 +18,6 @@ import heyoka as hy
 import numpy as np
 
 from ...fem.compiled_code import compiled
-from ...fem.files import seal, unsealed, write_whole
 from ...fem.harmonics.interior import BallField
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array, ComputationError, InputError
@@ -46,54 +41,11 @@ from ..motion.events import (
 )
 from ..motion.plate import PlateForce, PlateMemory, plate_numbers
 from ..motion.state import Parameter, Scales, State
-from .balls import DEGREE, LARGE, SMALL, Balls, in_ball, is_long, within
-from .trajectory import DURATION, STOPPED, FieldChanges, FlightStopped, Recorder, Trajectory
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """The file in which a `Course` is kept while it lasts."""
-
-    path: Path  #: where it is
-    identity: str  #: everything that the flight depends on, as text; another flight's checkpoint is refused
-    every: float = 5.0  #: seconds between two writings
-
-    @property
-    def _key(self) -> str:
-        return hashlib.sha256(self.identity.encode()).hexdigest()
-
-    def write(self, content: Mapping[str, Any]) -> None:
-        """Keep arrays by name; the file is whole or as it was."""
-        stream = io.BytesIO()
-        np.savez(stream, allow_pickle=False, key=np.array(self._key), **content)
-        write_whole(self.path, seal(stream.getvalue()))
-
-    def read(self) -> dict[str, Any] | None:
-        """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
-
-        Raises InputError: the file is damaged, or belongs to another flight.
-        """
-        if not os.path.lexists(self.path):
-            return None
-        whole = unsealed(self.path, name="checkpoint")  # so that no library meets a damaged archive
-        if whole is None:
-            raise InputError(
-                f"Input {self.path} must be a checkpoint; instead it is damaged or of an older version: delete it."
-            )
-        with np.load(io.BytesIO(whole)) as data:
-            content = dict(data)
-        if str(content.pop("key")) != self._key:
-            raise InputError(
-                f"Input {self.path} must be a checkpoint of this flight; instead it was kept by another scene, model, "
-                "duration or version: delete it, choose another --out, or leave out --resume."
-            )
-        return content
-
-    def remove(self) -> None:
-        self.path.unlink(missing_ok=True)
-
+from .balls import DEGREE, LARGE, SMALL, Balls, in_ball, is_long
+from .trajectory import DURATION, STOPPED, Checkpoint, FieldChanges, FlightStopped, Trajectory
 
 LEFT = "left"
+INSIDE = 1 - 1e-9  # Square of the distance from a ball's centre, in radii, from which on the floater has left it
 # Of a Taylor step. Measured over 1300 turns: J drifts by 3e-13 at 1e-15, by 1e-14 at 1e-16 with 1 % more steps.
 TOLERANCE = 1e-16
 # Of a Taylor step with a plate: energy is balanced to 1e-7 in 20 s (3e-9 at 1e-13, which is 1.4 times as slow), while
@@ -194,11 +146,13 @@ class Flight:
 
     def equations(self, degree: int) -> tuple[Equations, Events]:
         """Equations of motion and terminal events; a ball is free of bodies and ends before the floater is lost."""
-        whole = in_ball(self.whole, BallField(DEGREE + 1, degree)) if degree else self.whole
+        ball = BallField(DEGREE + 1, degree)
+        whole = in_ball(self.whole, ball) if degree else self.whole
         equations = equations_of_motion(whole, self.tilted, self.memory, self.first)
         position = equations.variables[:3]
         if degree:
-            events = [(within(BallField(DEGREE + 1, degree), position), LEFT)]
+            away = ball.offset([hy.par[Parameter.LENGTH] * x for x in position])
+            events = [(1.0 - hy.sum([a * a for a in away]), LEFT)]
         else:
             events = flight_events(self.scene, position)
         return equations, events if self.memory is None else [*events, *range_events(self.memory, position)]
@@ -252,6 +206,47 @@ class Flight:
         return float(min(turn / SAMPLES_PER_TURN, duration / 1000) / self.scales.time)
 
 
+class Recorder:
+    """Samples at multiples of an interval, which doubles, dropping every other sample, when there are too many.
+
+    Parameters
+    ----------
+    state : (n,) at the first time
+    interval : first spacing of the samples
+    capacity : most samples kept
+    now : the first time
+    """
+
+    def __init__(self, state: Array, interval: float, capacity: int, now: float = 0.0) -> None:
+        self.interval, self.capacity = interval, capacity
+        self.times, self.states = np.array([now]), state[None]  # (m,) and (m, n)
+
+    def grid(self, now: float, end: float, count: int) -> Array:
+        """Times to visit next: `now`, then at most `count` multiples of the interval, and `end` if they reach it."""
+        first = int(np.floor(now / self.interval + 1e-9)) + 1
+        times = self.interval * np.arange(first, first + count)
+        times = times[times < end - 1e-9 * self.interval]
+        return np.concatenate([[now], times, [end] if len(times) < count else []])
+
+    def due(self, seen: float, now: float, end: float) -> Array:
+        """Multiples of the interval after `seen`, up to `now` and before `end`."""
+        first, last = (int(np.floor(time / self.interval + 1e-9)) for time in (seen, now))
+        times = self.interval * np.arange(first + 1, last + 1)
+        return np.asarray(times[times < end - 1e-9 * self.interval])
+
+    def add(self, times: Array, states: Array, last: bool) -> None:
+        """Keep `states` (m, n) at those of `times` that are multiples of the interval; of the `last` ones all."""
+        on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
+        kept = on_grid | last
+        self.times, self.states = np.append(self.times, times[kept]), np.concatenate([self.states, states[kept]])
+        while len(self.times) > self.capacity:
+            self.interval *= 2
+            even = np.round(self.times / self.interval) * self.interval
+            kept = np.abs(self.times - even) < 1e-6 * self.interval
+            kept[-1] |= last
+            self.times, self.states = self.times[kept], self.states[kept]
+
+
 @dataclass(eq=False)
 class Course:
     """How far a trajectory is."""
@@ -281,7 +276,11 @@ class Course:
 
     def change_ball(self) -> None:
         """Go over to a large ball about the place now; its difference in energy is added to the work."""
-        if self.flight.balls is None or self.flight.balls.hold(self.state, self.values):
+        if self.flight.balls is None:
+            return
+        degree, *center, inverse = self.values[DEGREE : DEGREE + 5]
+        away = self.state[:3] * self.values[Parameter.LENGTH] - center
+        if degree and away @ away * inverse**2 < INSIDE:
             return
         after, now, row = self.values.copy(), np.array([self.time[0]]), self.state[None]
         error = self.flight.balls.enter((LARGE,), self.state, after)

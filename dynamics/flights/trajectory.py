@@ -1,54 +1,19 @@
-"""Samples of a long motion: evenly spaced, and never more than fit."""
+"""Samples of a flight, how it ended, what kind of flight it was, and the file in which it is kept while it lasts."""
 
+import hashlib
+import io
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ...geometry.common import Array, html_table, millimetres
+from ...fem.files import seal, unsealed, write_whole
+from ...geometry.common import Array, InputError, html_table, millimetres
 from ..equilibria.balance import Indices
 from ..motion.state import State
-
-
-class Recorder:
-    """Samples at multiples of an interval, which doubles, dropping every other sample, when there are too many.
-
-    Parameters
-    ----------
-    state : (n,) at the first time
-    interval : first spacing of the samples
-    capacity : most samples kept
-    now : the first time
-    """
-
-    def __init__(self, state: Array, interval: float, capacity: int, now: float = 0.0) -> None:
-        self.interval, self.capacity = interval, capacity
-        self.times, self.states = np.array([now]), state[None]  # (m,) and (m, n)
-
-    def grid(self, now: float, end: float, count: int) -> Array:
-        """Times to visit next: `now`, then at most `count` multiples of the interval, and `end` if they reach it."""
-        first = int(np.floor(now / self.interval + 1e-9)) + 1
-        times = self.interval * np.arange(first, first + count)
-        times = times[times < end - 1e-9 * self.interval]
-        return np.concatenate([[now], times, [end] if len(times) < count else []])
-
-    def due(self, seen: float, now: float, end: float) -> Array:
-        """Multiples of the interval after `seen`, up to `now` and before `end`."""
-        first, last = (int(np.floor(time / self.interval + 1e-9)) for time in (seen, now))
-        times = self.interval * np.arange(first + 1, last + 1)
-        return np.asarray(times[times < end - 1e-9 * self.interval])
-
-    def add(self, times: Array, states: Array, last: bool) -> None:
-        """Keep `states` (m, n) at those of `times` that are multiples of the interval; of the `last` ones all."""
-        on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
-        kept = on_grid | last
-        self.times, self.states = np.append(self.times, times[kept]), np.concatenate([self.states, states[kept]])
-        while len(self.times) > self.capacity:
-            self.interval *= 2
-            even = np.round(self.times / self.interval) * self.interval
-            kept = np.abs(self.times - even) < 1e-6 * self.interval
-            kept[-1] |= last
-            self.times, self.states = self.times[kept], self.states[kept]
-
 
 DURATION, STOPPED = "duration", "stopped"
 
@@ -116,6 +81,49 @@ class FlightStopped(KeyboardInterrupt):
     def __init__(self, flown: Trajectory) -> None:
         self.flown = flown
         super().__init__(f"The simulation was stopped at {flown.levitated_s:.4g} s.")
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The file in which a flight is kept while it lasts."""
+
+    path: Path  #: where it is
+    identity: str  #: everything that the flight depends on, as text; another flight's checkpoint is refused
+    every: float = 5.0  #: seconds between two writings
+
+    @property
+    def _key(self) -> str:
+        return hashlib.sha256(self.identity.encode()).hexdigest()
+
+    def write(self, content: Mapping[str, Any]) -> None:
+        """Keep arrays by name; the file is whole or as it was."""
+        stream = io.BytesIO()
+        np.savez(stream, allow_pickle=False, key=np.array(self._key), **content)
+        write_whole(self.path, seal(stream.getvalue()))
+
+    def read(self) -> dict[str, Any] | None:
+        """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
+
+        Raises InputError: the file is damaged, or belongs to another flight.
+        """
+        if not os.path.lexists(self.path):
+            return None
+        whole = unsealed(self.path, name="checkpoint")  # so that no library meets a damaged archive
+        if whole is None:
+            raise InputError(
+                f"Input {self.path} must be a checkpoint; instead it is damaged or of an older version: delete it."
+            )
+        with np.load(io.BytesIO(whole)) as data:
+            content = dict(data)
+        if str(content.pop("key")) != self._key:
+            raise InputError(
+                f"Input {self.path} must be a checkpoint of this flight; instead it was kept by another scene, model, "
+                "duration or version: delete it, choose another --out, or leave out --resume."
+            )
+        return content
+
+    def remove(self) -> None:
+        self.path.unlink(missing_ok=True)
 
 
 STABLE, LINEAR_FALL, OSCILLATING_LOSS = "stable", "linear fall", "oscillating loss"

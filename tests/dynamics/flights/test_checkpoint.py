@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from article import FLOATER, MAGNETS
 
-from spinlev.dynamics.flights.flight import Checkpoint, simulate
-from spinlev.dynamics.flights.trajectory import FlightStopped
+from spinlev.dynamics.flights.flight import simulate
+from spinlev.dynamics.flights.trajectory import Checkpoint, FlightStopped
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.common import InputError

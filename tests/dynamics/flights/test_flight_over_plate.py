@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from article import FLOATER, MAGNETS
 
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Checkpoint, Flight, initial_state, integrate
-from spinlev.dynamics.flights.trajectory import FlightStopped
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
+from spinlev.dynamics.flights.trajectory import Checkpoint, FlightStopped
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table

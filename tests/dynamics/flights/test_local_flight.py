@@ -8,8 +8,8 @@ import pytest
 from article import MAGNETS, SCENE
 
 from spinlev.dynamics.flights.balls import ERROR
-from spinlev.dynamics.flights.flight import Checkpoint, Flight, initial_state, integrate, simulate
-from spinlev.dynamics.flights.trajectory import FlightStopped
+from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
+from spinlev.dynamics.flights.trajectory import Checkpoint, FlightStopped
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.harmonics.interior import Ball, BallField
