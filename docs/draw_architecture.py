@@ -1,4 +1,4 @@
-"""Draws the house, the way of the data and the walk of a run from the code itself, in docs/pictures.
+"""Draws the house, the way of the data and the walks of a run and of a flight from the code itself, in docs/pictures.
 
 .venv/bin/python docs/draw_architecture.py
 """
@@ -22,6 +22,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 from spinlev.studies.cli.main import run
+from spinlev.studies.cli.options import Models
+from spinlev.studies.levitation import Levitation
 
 ROOT = Path(__file__).parent.parent
 PICTURES = Path(__file__).parent / "pictures"
@@ -222,6 +224,48 @@ def draw_walk() -> Figure:
     return figure
 
 
+def first_calls(seconds: float) -> list[Room]:
+    """Functions of `flights` and `motion` under `simulate`, in the order of their first calls: file and name."""
+    levitation = Levitation(ROOT / "scenes" / "horizontal.toml", Models(plate_model="reduced"))
+    found, inside = dict[Room, None](), 0
+
+    def look(frame: FrameType, event: str, _: object) -> None:
+        nonlocal inside
+        file, name = "/".join(Path(frame.f_code.co_filename).parts[-3:]), frame.f_code.co_qualname
+        if event not in ("call", "return") or not file.startswith(("dynamics/flights/", "dynamics/motion/")):
+            return
+        if (file, name) == ("dynamics/flights/flight.py", "simulate"):
+            inside += 1 if event == "call" else -1
+        if inside and event == "call" and "<" not in name:
+            found.setdefault((file.removeprefix("dynamics/"), name))
+
+    sys.setprofile(look)
+    levitation.flight(seconds)
+    sys.setprofile(None)
+    return list(found)
+
+
+def draw_simulate() -> Figure:
+    """The files of `simulate` in the order of calls: how many functions each stay reads for the first time."""
+    files = [file for file, _ in first_calls(2.0)]
+    stays = [(file, len(list(group))) for file, group in groupby(files)]
+    own = [file for file, _ in groupby(file for file in files if file.startswith("flights"))]
+    order = sorted(dict.fromkeys(files), key=lambda file: file.split("/")[0])
+    figure = Figure(figsize=(11, 0.4 * len(order) + 1.2), layout="constrained")
+    axes, begin = figure.add_subplot(), 0
+    for file, count in stays:
+        color = COLORS["dynamics" if file in own else "fem"]
+        axes.barh(order.index(file), count, left=begin, color=color, edgecolor="0.4")
+        begin += count
+    axes.set_yticks(range(len(order)), order)
+    axes.invert_yaxis()
+    axes.set_xlabel("functions in the order of their first calls")
+    told = f"flights: {len(own)} stays in {len(set(own))} files; with motion {len(stays)} in {len(order)}"
+    axes.set_title(told, loc="left")
+    return figure
+
+
 if __name__ == "__main__":
-    for name, figure in (("house", draw_house()), ("data", draw_data()), ("walk", draw_walk())):
+    pictures = {"house": draw_house(), "data": draw_data(), "walk": draw_walk(), "simulate": draw_simulate()}
+    for name, figure in pictures.items():
         figure.savefig(PICTURES / f"{name}.png", dpi=110)
