@@ -15,7 +15,7 @@ from importlib.resources import files
 import numpy as np
 import xarray as xr
 
-from spinlev import draw, load_scene, parse_scene, run_study, stability
+from spinlev import Levitation, Models, draw, load_scene, parse_scene, run_study
 from spinlev.studies.catalogue.entries import CATALOGUE
 from spinlev.studies.figures.style import panels, styled
 from spinlev.studies.result import variable
@@ -32,12 +32,12 @@ def points(quick):
 def compute(point):
     """Axial mode and position of one floater: a dataset over `case` of length one."""
     scene = parse_scene(TEXT, changes={"floater.density_kg_m3": point["density"]})
-    found = stability(scene, model="dipole", plate_model="none")
-    axial = found["mode_frequency"].sel(mode="bounce").item()
+    found = Levitation(scene, Models("dipole", "none")).stability
+    axial = next(mode.frequency_hz for mode in found.modes if mode.name == "bounce")
     return xr.Dataset({
         "density": variable(("case",), [point["density"]], "kg/m³", "density of the floater"),
         "axial": variable(("case",), [axial], "Hz", "frequency of the axial mode"),
-        "height": variable(("case",), [found["position"].sel(axis="z").item()], "m", "height"),
+        "height": variable(("case",), [found.position[2]], "m", "height"),
     })  # fmt: skip
 
 
