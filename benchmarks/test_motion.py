@@ -112,7 +112,7 @@ def test_flight_with_plate(benchmark, start, model, plate_model, rtol):
     table = rotor_table(SCENE.rotor, model, nearest=SCENE.floater.radius)
     levitation = Levitation(SCENE, Models(model, interaction="rigid"))
     memory = levitation.plate_about(start.position, PlatePlan(plate_model, 0.0, rtol))
-    table = rotor_nearby(table, SCENE.rotor, start.position, SCENE.floater.radius, 3e-6)
+    table = rotor_nearby(table, SCENE.rotor, tuple(start.position.tolist()), SCENE.floater.radius, 3e-6)
     equilibria = with_plate(SCENE, table, survey(SCENE, table), memory, Rates(table)).equilibria
     begun, currents = initial_state(SCENE, table, equilibria, memory)
     flight = Flight(SCENE, table, LONG, PLATE_TOLERANCE, True, memory)

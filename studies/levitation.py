@@ -391,9 +391,9 @@ class Levitation:
         if self.wider or self.plate is None or not isinstance(table, RotorTable):
             return table
         place, scene = self._flight_place, self.scene
-        return (
-            table if place is None else rotor_nearby(table, scene.rotor, place, scene.floater.radius, self.models.rtol)
-        )
+        if place is None:
+            return table
+        return rotor_nearby(table, scene.rotor, tuple(place.tolist()), scene.floater.radius, self.models.rtol)
 
     @property
     def _known_for_flight(self) -> Sequence[Equilibrium]:

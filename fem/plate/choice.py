@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -220,7 +220,10 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
     return found
 
 
-def rotor_nearby(table: RotorTable, rotor: tuple[Magnet, ...], place: Array, radius: float, rtol: float) -> RotorTable:
+@lru_cache(1)  # a flight and what is said of it ask for the same
+def rotor_nearby(
+    table: RotorTable, rotor: tuple[Magnet, ...], place: tuple[float, ...], radius: float, rtol: float
+) -> RotorTable:
     """The rotor's table with coefficients that count for `rtol`, `REACH` nearer than `place` (3,) m or `radius` on."""
     gap = min(float(magnet.body.distance(place)) for magnet in rotor) - REACH
     return shortened_table(table, Accuracy(rtol, max(gap, radius)))

@@ -42,7 +42,7 @@ def test_a_closed_form_stays_as_it_is():
 def test_a_flight_takes_the_table_for_its_place():
     """At 22 mm below the cube it holds from 14 mm off the faces on, next to contact from contact on."""
     whole = rotor_table(ROTOR, "moments", RTOL, CONTACT)
-    far, near = (rotor_nearby(whole, ROTOR, np.array([2e-3, 0.0, z]), CONTACT, RTOL) for z in (-22e-3, -13e-3))
+    far, near = (rotor_nearby(whole, ROTOR, (2e-3, 0.0, z), CONTACT, RTOL) for z in (-22e-3, -13e-3))
     points = points_around(ROTOR, 14e-3)
     assert np.all(far.absolute_error(points)[0] <= RTOL * typical_field(ROTOR, points))
     assert coefficients(far) < coefficients(near) <= coefficients(whole)
