@@ -105,3 +105,20 @@ def test_a_rotor_at_rest_has_no_equilibrium_but_its_floater_still_falls(spinlev,
     answer = json.loads(out)
     assert answer["ended_by"] == "lost"
     assert "Earnshaw" in answer["failed"]
+
+
+def test_a_quick_run_is_coarser_and_says_so(spinlev, monkeypatch, tmp_path):
+    """What is asked for coarser still, or by name, stays as it is asked for."""
+    seen = []
+
+    def job(scene, asked, spin, duration, out):
+        seen.append(asked)
+        return {}, ["the answer"]
+
+    monkeypatch.setattr("spinlev.studies.run.main_job", job)
+    status, out, err = spinlev("run", SCENES / "horizontal.toml", "--quick", "--plate-rtol", "0.1")
+    assert status == 0, err
+    assert seen == [Models(rtol=1e-3, plate_rtol=0.1, interaction="rigid")]
+    assert out.splitlines()[1].startswith("Quick: field to 0.1%, plate's response to 10%")
+    spinlev("run", SCENES / "horizontal.toml", "--quick", "--interaction", "mutual")
+    assert seen[1].interaction == "mutual"
