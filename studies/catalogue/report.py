@@ -22,21 +22,36 @@ from ..figures.style import figure_bytes
 from .entries import CATALOGUE
 from .runner import DRAWN, QUESTION, failure_lines, figures_of, flight_of, read_result
 
+# By key of an entry of BibTeX: author, title, where, year, doi, and for what it is cited.
 REFERENCES = {
-    "effect": "J. M. Hermansen, F. L. Durhuus, R. Bjørk, Appl. Phys. Lett. 127, 012402 (2025), doi 10.1063/5.0267494 "
-    "(levitation by rotation)",
-    "program": "The spinlev developers, spinlev (this program; see CITATION.cff)",
-    "ngsolve": "J. Schöberl, C++11 implementation of finite elements in NGSolve, ASC Report 30/2014, TU Wien "
-    "(finite elements)",
-    "netgen": "J. Schöberl, Comput. Vis. Sci. 1, 41 (1997), doi 10.1007/s007910050004 (meshes)",
-    "heyoka": "F. Biscani, D. Izzo, Mon. Not. R. Astron. Soc. 504, 2614 (2021), doi 10.1093/mnras/stab1032 (motion)",
-    "eddy": "O. Bíró, Comput. Methods Appl. Mech. Engrg. 169, 391 (1999) (eddy currents with edge elements)",
-    "team7": "K. Fujiwara, T. Nakata, COMPEL 9, 137 (1990) (measurement of TEAM workshop problem 7)",
-    "magpylib": "M. Ortner, L. G. Coliado Bandeira, SoftwareX 11, 100466 (2020), doi 10.1016/j.softx.2020.100466 "
-    "(peer)",
-    "scikit-fem": "T. Gustafsson, G. D. McBain, J. Open Source Softw. 5, 2369 (2020), doi 10.21105/joss.02369 (peer)",
-    "air": "S. C. R. Dennis, S. N. Singh, D. B. Ingham, J. Fluid Mech. 101, 257 (1980) (torque of air on a sphere)",
-}
+    "effect": (
+        "Hermansen, Joachim Marco and Durhuus, Frederik Laust and Bjørk, Rasmus",
+        "Magnetic levitation at low rotation frequencies using an on-axis magnetic field",
+        "Applied Physics Letters 127, 012402", 2025, "10.1063/5.0267494", "levitation by rotation",
+    ),
+    "program": ("{The spinlev developers}", "spinlev: magnetic levitation by rotation with full fields", "", 2026, "",
+        "this program; see CITATION.cff"),
+    "ngsolve": ("Schöberl, Joachim", "C++11 implementation of finite elements in NGSolve",
+        "ASC Report 30/2014, TU Wien", 2014, "", "finite elements"),
+    "netgen": ("Schöberl, Joachim", "NETGEN: an advancing front 2D/3D-mesh generator based on abstract rules",
+        "Computing and Visualization in Science 1, 41", 1997, "10.1007/s007910050004", "meshes"),
+    "heyoka": ("Biscani, Francesco and Izzo, Dario",
+        "Revisiting high-order Taylor methods for astrodynamics and celestial mechanics",
+        "Monthly Notices of the Royal Astronomical Society 504, 2614", 2021, "10.1093/mnras/stab1032", "motion"),
+    "eddy": ("Bíró, Oszkár", "Edge element formulations of eddy current problems",
+        "Computer Methods in Applied Mechanics and Engineering 169, 391", 1999, "", "eddy currents"),
+    "team7": ("Fujiwara, Koji and Nakata, Takayoshi",
+        "Results for benchmark problem 7 (asymmetrical conductor with a hole)", "COMPEL 9, 137", 1990, "",
+        "measurement of TEAM workshop problem 7"),
+    "magpylib": ("Ortner, Michael and Coliado Bandeira, Lucas Gabriel",
+        "Magpylib: a free Python package for magnetic field computation",
+        "SoftwareX 11, 100466", 2020, "10.1016/j.softx.2020.100466", "peer"),
+    "scikit-fem": ("Gustafsson, Tom and McBain, G. D.", "scikit-fem: a Python package for finite element assembly",
+        "Journal of Open Source Software 5, 2369", 2020, "10.21105/joss.02369", "peer"),
+    "air": ("Dennis, S. C. R. and Singh, S. N. and Ingham, D. B.",
+        "The steady flow due to a rotating sphere at low and moderate Reynolds numbers",
+        "Journal of Fluid Mechanics 101, 257", 1980, "", "torque of air on a sphere"),
+}  # fmt: skip
 STUDIES = {
     "team7": ("team7", "eddy"),
     "speed-accuracy": ("magpylib", "scikit-fem"),
@@ -50,8 +65,21 @@ STATIC = ("dipole-validity", "speed-accuracy", "field-hard-cases", "field-compon
 
 
 def cite_job(path: Path) -> list[str]:
-    """References of what a result used, a line each. Raises InputError where the file is no result."""
-    return [REFERENCES[key] for key in used_references(read_result(path))]
+    """References of what a result used as entries of BibTeX. Raises InputError where the file is no result."""
+    return [bibtex(key) for key in used_references(read_result(path))]
+
+
+def bibtex(key: str) -> str:
+    """An entry of BibTeX from `REFERENCES`."""
+    author, title, where, year, doi, note = REFERENCES[key]
+    journal, _, pages = where.rpartition(", ")
+    name, _, volume = journal.rpartition(" ")
+    fields = {"author": author, "title": f"{{{title}}}", "howpublished": where, "year": year, "doi": doi, "note": note}
+    kind = "article" if volume.isdecimal() else "misc"
+    if kind == "article":
+        fields |= {"journal": name, "volume": volume, "pages": pages, "howpublished": ""}
+    body = ",\n".join(f"  {name} = {{{value}}}" for name, value in fields.items() if value)
+    return f"@{kind}{{{key},\n{body}\n}}"
 
 
 def used_references(result: xr.Dataset) -> list[str]:

@@ -52,7 +52,9 @@ def test_a_stored_result_is_drawn_and_reported_from_its_file_alone(path):
         assert figure_bytes(figure, "png").startswith(b"\x89PNG")
     lines = CATALOGUE[path.stem].report(result)
     assert any(re.search(r"\d", line) for line in lines)
-    assert cite_job(path)
+    entries = cite_job(path)
+    assert all(re.fullmatch(r"@(article|misc)\{[\w-]+,\n(  \w+ = \{.+\},?\n)+\}", entry) for entry in entries)
+    assert "  volume = {127},\n  pages = {012402}" in entries[0]
 
 
 def test_stored_results_make_one_report(tmp_path):
