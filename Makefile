@@ -137,4 +137,4 @@ check-pins: develop
 	$(BIN)/python tests/check_pins.py
 
 clean:
-	rm -rf $(VENV) build dist out docs/_build docs/gallery .coverage*
+	rm -rf $(VENV) build dist out docs/_build docs/api docs/gallery .coverage*

@@ -10,12 +10,13 @@ project = "spinlev"
 author = "The spinlev developers"
 version = release = installed_version("spinlev")
 extensions = [
-    *("myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx.ext.viewcode"),
+    *("myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx.ext.viewcode"),
     *("sphinx_copybutton", "sphinx-mathjax-offline", "sphinx_gallery.gen_gallery"),
 ]
 numpydoc_show_class_members = False
 myst_enable_extensions = ["dollarmath", "deflist"]
-exclude_patterns = ["_build", "examples"]
+exclude_patterns = ["_build", "examples", "templates"]
+templates_path = ["templates"]
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
     "gallery_dirs": "gallery",

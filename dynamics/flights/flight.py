@@ -374,6 +374,8 @@ class Course:
         assert self.recorder is not None
         scales, velocity, changes = self.flight.scales, self.flight.scene.angular_velocity, self.changes
         time, states = np.minimum(self.recorder.times * scales.time, self.duration), self.recorder.states
+        if self.ended_by == DURATION:  # not a last digit less
+            time[-1] = self.duration
         lab, memory, beyond = scales.unpack(states).to_lab(velocity * time), self.flight.memory, 0.0
         if memory is not None:
             beyond = float(1 - np.mean(memory.in_range(lab.position, plate_depth(memory.plate, time))))

@@ -67,6 +67,15 @@ def test_the_front_door_has_its_functions():
     assert {"equilibria", "simulate", "sweep", "draw", "load_scene", "tilt", "to_magpylib"} <= set(FUNCTIONS)
 
 
+def test_every_function_has_an_example_on_its_page():
+    program, pages = ((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("api_examples.py", "api.md"))
+    shown = re.findall(r"(?m)^# \[(\w+)\]\n(?!# )", program)
+    listed = re.findall(r"(?m)^   (\w+)$", pages)
+    assert sorted(shown) == sorted(listed)
+    assert set(FUNCTIONS) <= set(listed)
+    assert [name for name in FUNCTIONS if f"sl.{name}" not in program] == []
+
+
 SILENT = {"tilt", "horizontal", "vertical", "magnets", "sphere", "plate", "to_magpylib"}
 """Raise nothing of their own: what they are given is checked with the whole scene."""
 

@@ -98,6 +98,14 @@ def test_one_question_takes_twelve_lines():
 
 
 @pytest.mark.slow
+def test_the_examples_of_the_functions_run_one_after_the_other(tmp_path):
+    (tmp_path / "scenes").symlink_to(HORIZONTAL.parent)
+    found = runpy.run_path(str(DOCS / "api_examples.py"))
+    assert found["levitation"].flight(1.0).levitated_s == 1.0
+    assert float(found["field"][0, 0]) == pytest.approx(-12.67e-3, abs=1e-5)  # 12.49 mT of finite elements, and 1.6 %
+
+
+@pytest.mark.slow
 def test_the_first_steps_say_what_it_prints():
     page = (DOCS / "first-steps.md").read_text(encoding="utf-8")
     told = re.search(r"rotor.edge_mm\n((?:    [\d.]+ +[\d.]+ +[\d.]+\n)+)", page)[1]
