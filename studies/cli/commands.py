@@ -84,8 +84,8 @@ def run(
     asked = asked.checked()
     if quick:
         interaction: InteractionModel = "rigid" if asked.interaction == "auto" else asked.interaction
-        coarser = {"rtol": max(asked.rtol, 1e-3), "plate_rtol": max(asked.plate_rtol, 0.05)}
-        asked = replace(asked, interaction=interaction, **coarser)
+        rtol, plate_rtol = max(asked.rtol, 1e-3), max(asked.plate_rtol, 0.05)
+        asked = replace(asked, interaction=interaction, rtol=rtol, plate_rtol=plate_rtol)
     loaded = _loaded(scene or default_scene())
     from ...fem.cache import owned
     from ..run import main_job
