@@ -7,7 +7,8 @@ from pathlib import Path
 from places import ROOT, TESTS
 
 FLOORS = ("geometry", "fem", "dynamics", "studies")
-SOURCES = [path for floor in FLOORS for path in sorted((ROOT / floor).rglob("*.py"))]
+SOURCES = {path: ast.parse(path.read_text()) for floor in FLOORS for path in sorted((ROOT / floor).rglob("*.py"))}
+"""Each module's tree."""
 LONGEST = 600
 """Lines of a module; one of a single subject has about 400."""
 
@@ -26,9 +27,9 @@ def imported(path: Path, body: list[ast.stmt]) -> set[Path]:
 
 def test_a_floor_knows_those_below_alone():
     wrong = []
-    for path in SOURCES:
+    for path, tree in SOURCES.items():
         floor = FLOORS.index(path.relative_to(ROOT).parts[0])
-        known = {other.relative_to(ROOT).parts[0] for other in imported(path, ast.parse(path.read_text()).body)}
+        known = {other.relative_to(ROOT).parts[0] for other in imported(path, tree.body)}
         wrong += [f"{path} imports from {other}" for other in known if FLOORS.index(other) > floor]
     assert wrong == []
 
@@ -36,8 +37,8 @@ def test_a_floor_knows_those_below_alone():
 def test_no_modules_import_each_other():
     """At their top; a command that calls another one late may."""
     graph = {}
-    for path in SOURCES:
-        top = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.ImportFrom)]
+    for path, tree in SOURCES.items():
+        top = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
         graph[path] = imported(path, top)
     TopologicalSorter(graph).prepare()  # raises CycleError
 
@@ -45,8 +46,8 @@ def test_no_modules_import_each_other():
 def test_rooms_are_used_in_one_order():
     """At the top of their modules; a module that lies in no room counts as one."""
     graph: dict[tuple[str, ...], set[tuple[str, ...]]] = {}
-    for path in (path for path in SOURCES if path.name != "__init__.py"):
-        top = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.ImportFrom)]
+    for path, tree in ((path, tree) for path, tree in SOURCES.items() if path.name != "__init__.py"):
+        top = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
         graph.setdefault(room(path), set()).update({room(other) for other in imported(path, top)} - {room(path)})
     TopologicalSorter(graph).prepare()
 
@@ -64,16 +65,16 @@ def test_the_tests_mirror_the_rooms():
 
 
 def test_a_room_says_what_it_is_and_no_module_is_crowded():
-    assert [path for path in SOURCES if not ast.get_docstring(ast.parse(path.read_text()))] == []
+    assert [path for path, tree in SOURCES.items() if not ast.get_docstring(tree)] == []
     assert [path for path in SOURCES if path.read_text().count("\n") > LONGEST] == []
 
 
 def test_dynamics_knows_no_mesh_and_geometry_and_dynamics_no_solver():
-    for path in SOURCES:
+    for path, tree in SOURCES.items():
         text, floor = path.read_text(), path.relative_to(ROOT).parts[0]
         if floor in ("dynamics", "studies"):
             assert "import ngsolve" not in text
             assert "from ngsolve" not in text
         if floor == "dynamics":
-            meshes = [other for other in imported(path, ast.parse(text).body) if "meshes" in other.parts]
+            meshes = [other for other in imported(path, tree.body) if "meshes" in other.parts]
             assert meshes == []
