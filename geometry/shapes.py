@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,6 +91,11 @@ class Body:
     @abstractmethod
     def described_size(self) -> str:
         """Shape and size as a person writes them, mm."""
+
+    @property
+    @abstractmethod
+    def keys(self) -> dict[str, Any]:
+        """What a scene file says of its shape; lengths in mm, lists as arrays."""
 
     @abstractmethod
     def reach(self, directions: Array) -> Array:
@@ -183,6 +188,10 @@ class Box(Body):
     def described_size(self) -> str:
         return millimetres(self.size)
 
+    @property
+    def keys(self) -> dict[str, Any]:
+        return {"size_mm": 1e3 * self.size}
+
     def reach(self, directions: Array) -> Array:
         return np.asarray(np.abs(directions @ self.rotation) @ self.half_edges)
 
@@ -249,6 +258,11 @@ class Cylinder(Body):
     def described_size(self) -> str:
         name, hole = ("ring ", f" / {self.inner_radius * 2e3:.4g}") if self.inner_radius else ("", "")
         return f"{name}Ø {self.radius * 2e3:.4g}{hole} × {self.height * 1e3:.4g} mm"
+
+    @property
+    def keys(self) -> dict[str, Any]:
+        solid = {"shape": self.kind, "diameter_mm": 2e3 * self.radius, "height_mm": 1e3 * self.height}
+        return solid | ({"inner_diameter_mm": 2e3 * self.inner_radius} if self.inner_radius else {})
 
     def reach(self, directions: Array) -> Array:
         along = np.abs(directions @ self.rotation[:, 2])
@@ -320,6 +334,10 @@ class Sphere(Body):
     @property
     def described_size(self) -> str:
         return f"sphere Ø {self.radius * 2e3:.4g} mm"
+
+    @property
+    def keys(self) -> dict[str, Any]:
+        return {"shape": self.kind, "diameter_mm": 2e3 * self.radius}
 
     def reach(self, directions: Array) -> Array:
         return np.full(len(directions), self.radius)

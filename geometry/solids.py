@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import permutations
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -97,6 +97,10 @@ class Part(Body):
     @property
     def described_size(self) -> str:
         return f"{self.file.name} {millimetres(self.size)}"
+
+    @property
+    def keys(self) -> dict[str, Any]:
+        return {"file": str(self.file)}
 
     @cached_property
     def edges(self) -> Array:

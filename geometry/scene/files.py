@@ -16,7 +16,7 @@ import numpy as np
 from ..common import Array, InputError, shown, spelled
 from ..files import file_content, regular_file
 from ..magnets import Magnet
-from ..shapes import Cylinder, rotation_angles
+from ..shapes import rotation_angles
 from ..solids import Part, Solid
 from . import schema
 from .contents import Drag, OffsetStart, Scene
@@ -360,15 +360,11 @@ def _start(scene: Scene) -> dict[str, Any] | None:
 
 
 def shape_keys(body: Solid) -> dict[str, Any]:
-    """The keys of a body's shape."""
-    if isinstance(body, Part):
-        return {"file": str(body.file)}
-    if body.kind == "cuboid":
-        return {"size_mm": _all_rounded(1e3 * body.size)}
-    sizes = {"diameter_mm": body.size[0]}
-    sizes |= {} if body.kind == "sphere" else {"height_mm": body.size[2]}
-    sizes |= {"inner_diameter_mm": 2 * body.inner_radius} if isinstance(body, Cylinder) and body.inner_radius else {}
-    return {"shape": body.kind, **{key: _rounded(1e3 * size) for key, size in sizes.items()}}
+    """The keys of a body's shape, without round-off."""
+    return {
+        key: _all_rounded(value) if isinstance(value, np.ndarray) else _rounded(value) if key.endswith("mm") else value
+        for key, value in body.keys.items()
+    }
 
 
 def pose_keys(body: Solid) -> dict[str, Any]:

@@ -57,13 +57,13 @@ MagnetPermeability = Annotated[
 ]
 # The keys of every shape; its axis, where it has one, is along the body's z.
 SIZES: dict[str, tuple[str, ...]] = {
-    "cube": ("edge_mm",),
     "cuboid": ("size_mm",),
-    "cylinder": ("diameter_mm", "height_mm"),
+    "cube": ("edge_mm",),
     "ring": ("diameter_mm", "inner_diameter_mm", "height_mm"),
+    "cylinder": ("diameter_mm", "height_mm"),
     "sphere": ("diameter_mm",),
 }
-SIZE_KEYS = ("size_mm", "edge_mm", "diameter_mm", "inner_diameter_mm", "height_mm")
+SIZE_KEYS = tuple(dict.fromkeys(key for keys in SIZES.values() for key in keys))
 
 
 class Table(BaseModel):
