@@ -838,6 +838,8 @@ def _one(kind: str, seed: int, folder: Path, ignored: list[BaseException | None]
 
 if __name__ == "__main__":
     asked, many, first = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    if asked not in (*KINDS, "all"):
+        sys.exit(f"Input KIND must be one of {', '.join([*KINDS, 'all'])}; instead received {asked!r}.")
     wrong: list[str] = []
     for one in KINDS if asked == "all" else [asked]:
         began = time.perf_counter()

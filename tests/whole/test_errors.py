@@ -3,6 +3,7 @@
 import io
 import re
 from importlib import import_module
+from types import SimpleNamespace
 
 from places import ROOT
 
@@ -49,7 +50,7 @@ def test_every_error_exits_with_its_status(monkeypatch, capsys):
         def fails(*arguments, kind=kind, **options):
             raise kind.__new__(kind, "That is why.")
 
-        monkeypatch.setattr(cli, "app", fails)
+        monkeypatch.setattr(cli, "app", SimpleNamespace(parse_args=fails))
         status = 2 if issubclass(kind, InputError) else 1
         assert (cli._status([], io.StringIO()), kind.exit_status, name) == (status, status, name)
         assert capsys.readouterr().err == "spinlev: That is why.\n"

@@ -117,7 +117,7 @@ def test_a_command_tells_of_a_library_that_is_missing(monkeypatch, capsys):
     def fails(*arguments, **options):
         raise ImportError("libopenblas.so.0: cannot open shared object file")
 
-    monkeypatch.setattr(cli, "app", fails)
+    monkeypatch.setattr(cli, "app", SimpleNamespace(parse_args=fails))
     assert _status([], io.StringIO()) == 1
     said = capsys.readouterr().err
     assert "a library cannot be loaded: libopenblas.so.0: cannot open shared object file." in said

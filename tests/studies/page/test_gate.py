@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
+import psutil
 import pytest
 from places import OVER_PLATE
 
@@ -199,8 +200,8 @@ def test_the_token_is_not_on_the_browsers_command_line(monkeypatch):
 
 def test_it_listens_on_this_machine_alone(page):
     port = urlsplit(page.address).port
-    others = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}
-    for address in [one for one in others if not one.startswith("127.")]:
+    mine = [one.address for some in psutil.net_if_addrs().values() for one in some if one.family == socket.AF_INET]
+    for address in [one for one in mine if not one.startswith("127.")]:
         with pytest.raises(OSError, match=r".*"), socket.create_connection((address, port), timeout=5):
             pass
 
