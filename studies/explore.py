@@ -14,7 +14,7 @@ from .plan import SceneLike, given_scene
 if TYPE_CHECKING:
     from .page.server import Pages
 
-HEIGHT = 900  # of the page in a notebook, pixels
+HEIGHT = 1000  # of the page in a notebook, pixels
 
 
 class LivePage:

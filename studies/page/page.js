@@ -172,9 +172,16 @@
   };
   const slide = (name, value) => { at(name).value = value; at(name).previousSibling.textContent = +(+value).toFixed(2); };
   const millimetres = place => `${(-place[2]).toPrecision(4)} mm`;
+  const save = (name, blob) => {
+    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  };
+  let copies = {};
   const texts = id => text => { at(id).textContent = text; };
   const show = {
-    message: texts("message"), says: texts("says"), map_says: texts("map_says"), command: texts("command"),
+    message: texts("message"), says: texts("says"), map_says: texts("map_says"),
+    copies: found => { copies = found; at("command").textContent = found.line; at("copied").textContent = ""; },
     place: place => { at("place").textContent = place ? millimetres(place) : "–"; },
     beside: found => {
       ghost = found && found[0];
@@ -246,17 +253,29 @@
       history.replaceState(null, "", `${location.pathname}?token=${token}&${query}`);
     },
     file: ({ name, kind, content }) => {
-      const bytes = Uint8Array.from(atob(content), letter => letter.charCodeAt(0));
-      const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([bytes], { type: kind })), download: name });
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+      save(name, new Blob([Uint8Array.from(atob(content), letter => letter.charCodeAt(0))], { type: kind }));
     },
   };
   line.onmessage = event => { for (const [name, value] of Object.entries(JSON.parse(event.data))) show[name](value); };
   line.onclose = () => { if (!at("message").textContent) at("message").textContent = "The connection to spinlev was closed. Load the page again, or start spinlev explore again."; };
 
   for (const name of ["model", "plate_model"]) at(name).addEventListener("change", () => send("choose", name, at(name).value));
-  for (const kind of ["toml", "json", "nc", "png"]) at(`get_${kind}`).addEventListener("click", () => send("get", kind));
+  for (const kind of ["toml", "json", "nc"]) at(`get_${kind}`).addEventListener("click", () => send("get", kind));
+  for (const kind of ["command", "python"]) at(`copy_${kind}`).addEventListener("click", () => navigator.clipboard.writeText(copies[kind])
+    .then(() => "Copied.", () => "The browser does not let pages copy.").then(texts("copied")));
+  at("preset").addEventListener("change", () => { if (at("preset").value) send("preset", at("preset").value); });
+  at("figure").addEventListener("click", () => {  // the charts as they are, with the text above them
+    const charts = [map, side, running.height, running.tilt], whole = grow(document.createElementNS("http://www.w3.org/2000/svg", "g"), "svg");
+    const places = [[10, 30], [450, 30], [10, 420], [450, 420]];
+    for (const [key, value] of Object.entries({ viewBox: "0 0 880 580", width: 880, height: 580 })) whole.setAttribute(key, value);
+    grow(whole, "style", {}, "text { font: 11px sans-serif; fill: #2e3440; } image { image-rendering: pixelated; }");
+    grow(whole, "text", { x: 10, y: 18 }, `${at("headline").textContent} ${at("sign").textContent}`);
+    charts.forEach((chart, k) => {
+      const copy = whole.appendChild(chart.svg.cloneNode(true));
+      for (const [key, value] of Object.entries({ x: places[k][0], y: places[k][1], width: chart.width, height: chart.height })) copy.setAttribute(key, value);
+    });
+    save("explore.svg", new Blob([new XMLSerializer().serializeToString(whole)], { type: "image/svg+xml" }));
+  });
   at("play").addEventListener("click", () => show.playing(!playing));
   at("reset").addEventListener("click", () => { show.playing(false); send("reset"); });
   at("up").addEventListener("click", () => send("kick", 0, 0, +at("strength").value));

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
+from ..cli.options import KINDS, shipped_scene
 from ..figures.view import SQUARES, Surface, arrow, near_plate, triangles
 from . import work
 from .state import PageState, controls
@@ -56,7 +57,6 @@ class Page:
         self.number = 0  # of answers
         self.shown: Shown | None = None
         self.preview: Shown | None = None
-        self.regions: Regions | None = None
         self.samples = np.zeros((3, 0))  # of the flight: time s, height mm and polar angle °
         self.resting: asyncio.TimerHandle | None = None
         self.mapped, self.begun = "", False
@@ -67,6 +67,7 @@ class Page:
             "move": lambda name, value: self._become("changed", name, round(float(value), 9)),
             "choose": lambda name, value: self._become("with_query", {name: value}),
             "open": self._opened,
+            "preset": lambda kind: self._become("opened", shipped_scene(KINDS[kind]).read_bytes(), kind),
             "go": self._go,
             "get": self._download,
             "fly": self._fly,
@@ -119,7 +120,7 @@ class Page:
             self._land()
         if work.has_map(self.state):
             self.tell(point=[control.value for control in controls(self.state)[:2]])
-        self.tell(command=f"spinlev equilibria scene.toml {self.state.command}")
+        self.tell(copies=self.state.copies())
         if isinstance(preview, str):
             self._failed(preview)
         else:
@@ -185,7 +186,7 @@ class Page:
 
     def _forget_map(self, why: str) -> None:
         self.mapper.stop()
-        self.mapped, self.regions = "", None
+        self.mapped = ""
         self.tell(regions=None, map_says=why)
 
     def _no_map(self, why: str) -> None:
@@ -193,7 +194,6 @@ class Page:
         self.tell(map_says=f"No map: {why}")
 
     def _map(self, found: Regions) -> None:
-        self.regions = found
         name = {"dipole": "point dipole", "cuboid": "closed form"}[found.model]
         says = f"Stable (blue), only unstable (grey): {name}, without the plate. Click to go there."
         self.tell(regions={**vars(found), "title": controls(self.state)[1].title}, map_says=says)
@@ -202,12 +202,11 @@ class Page:
         """Send a file that goes home."""
         name, form = work.FILES[kind]
         self.tell(message="")
-        seen = self.shown, self.regions, self.samples
 
         def downloaded(data: bytes) -> None:
             self.tell(file={"name": name, "kind": form, "content": base64.b64encode(data).decode()})
 
-        self.porter.ask(kind, lambda: (work.content, kind, self.state, *seen), downloaded)
+        self.porter.ask(kind, lambda: (work.content, kind, self.state), downloaded)
 
     # The flight, which page.js asks for piece by piece
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...geometry.common import InputError, shown
 from ...geometry.scene.contents import Scene
-from ...geometry.scene.files import changed, parse_scene, scene_keys
+from ...geometry.scene.files import changed, parse_scene, scene_keys, scene_text
 from ...geometry.scene.making import assemble
 from ...geometry.scene.messages import SceneError
 from ..cli.options import FieldModel, Models, PlateModel, finite
@@ -64,6 +64,15 @@ class PageState:
         """Options of the command line that ask for the same of the scene file."""
         spin = f" --spin {self.spin:g}" if self.spin else ""
         return f"--model {self.model} --plate-model {self.plate_model}{spin}"
+
+    def copies(self) -> dict[str, str]:
+        """What asks for the same elsewhere: a `line` about a scene file, a whole `command` of a shell, and `python`."""
+        line, text = f"spinlev equilibria scene.toml {self.command}", scene_text(self.scene)
+        asked = f'model="{self.model}", plate_model="{self.plate_model}", spin={self.spin:g}'
+        program = f'scene = sl.parse_scene(r"""\n{text}""")\nfound = sl.equilibria(scene, {asked})\n'
+        program += 'print(found[["distance", "polar_angle", "growth", "stable"]].to_dataframe())\n'
+        command = f"cat > scene.toml << 'END'\n{text}END\n{line}\n"
+        return {"line": line, "command": command, "python": f"import spinlev as sl\n\n{program}"}
 
     def changed(self, key: str, value: float) -> PageState:
         """With another number: of the scene file, by its dotted key, or `spin`. Raises SceneError."""

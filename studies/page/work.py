@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -19,15 +19,11 @@ from ...geometry.scene.files import canonical_keys, scene_text
 from ..cli.console import to_json
 from ..cli.options import Models
 from ..figures.pictures import drawn_field
-from ..figures.style import PALETTE, figure_bytes, panels, styled
 from ..figures.view import field_lines
 from ..levitation import Levitation
 from ..result import Result, write_dataset
 from ..words import equilibria_rows, headline, left_out_words, worth_a_row
-from .state import MEASURES, PageState, controls
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .state import MEASURES, PageState
 
 SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)  # The box in which field lines are drawn, m
 ENDS = {
@@ -48,7 +44,6 @@ FILES = {
     "toml": ("scene.toml", "text/plain"),
     "json": ("equilibria.json", "application/json"),
     "nc": ("equilibria.nc", "application/x-netcdf"),
-    "png": ("explore.png", "image/png"),
 }  # What can be taken home: a file's name and its type
 
 
@@ -218,8 +213,8 @@ def polar_angle(moments: Array) -> Array:
     return np.asarray(np.degrees(np.arctan2(np.hypot(moments[..., 0], moments[..., 1]), moments[..., 2])))
 
 
-def content(kind: str, state: PageState, shown: Shown | None, regions: Regions | None, samples: Array) -> bytes:
-    """The content of a file of `FILES`, which the command line computes alike; a picture is of what the page shows.
+def content(kind: str, state: PageState) -> bytes:
+    """The content of a file of `FILES`, which the command line computes alike.
 
     Raises
     ------
@@ -227,8 +222,6 @@ def content(kind: str, state: PageState, shown: Shown | None, regions: Regions |
     """
     if kind == "toml":
         return scene_text(state.scene).encode()
-    if kind == "png":
-        return figure_bytes(screen_figure(state, shown, regions, samples), "png")
     levitation = Levitation(state.scene, state.models, state.spin)
     result = Result(levitation, levitation.survey)
     if kind == "json":
@@ -239,33 +232,3 @@ def content(kind: str, state: PageState, shown: Shown | None, regions: Regions |
         path = Path(folder) / "equilibria.nc"
         write_dataset(dataset, path, state.scene)
         return path.read_bytes()
-
-
-@styled
-def screen_figure(state: PageState, shown: Shown | None, regions: Regions | None, samples: Array) -> Figure:
-    """Map, numbers and trajectory, (3, n) time s, height mm and polar angle °."""
-    from matplotlib.colors import ListedColormap
-
-    figure, ((chart, height), (words, tilt)) = panels(2, 2, 2.3)
-    if shown is not None:
-        figure.suptitle(shown.headline, fontsize=8, x=0.01, ha="left", wrap=True)
-        lines = [f"By: {shown.sign}", f"spinlev equilibria scene.toml {state.command}"]
-        for table in (shown.rows, shown.modes):
-            widths = [max(map(len, column)) for column in zip(*table, strict=False)]
-            lines += ["", *(" ".join(map(str.rjust, row[:4], widths)) for row in table)]
-        words.text(0, 1, "\n".join(lines), va="top", fontsize=6, family="monospace")
-    words.set(title="")
-    words.set_axis_off()
-    if regions is None:
-        chart.set_axis_off()
-    else:
-        frequency, measure = controls(state)[:2]
-        look: dict[str, Any] = {"cmap": ListedColormap(["white", "#D8DEE9", PALETTE[5]]), "vmin": 0, "vmax": 2}
-        chart.pcolormesh(regions.frequencies, regions.measures, regions.kind.T, rasterized=True, **look)
-        chart.plot(frequency.value, measure.value, "o", color=PALETTE[1])
-        title = f"(a) stable regions ({MODEL_WORDS[regions.model]})"
-        chart.set(xlabel=frequency.title, ylabel=measure.title, title=title)
-    for axes, values, label in ((height, samples[1], "Height (mm)"), (tilt, samples[2], "Polar angle (°)")):
-        axes.plot(samples[0], values)
-        axes.set(xlabel="Time (s)", ylabel=label)
-    return figure

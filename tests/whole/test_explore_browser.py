@@ -10,6 +10,7 @@ import time
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import parse_qs, urlsplit
+from xml.etree import ElementTree
 
 import numpy as np
 import psutil
@@ -196,10 +197,10 @@ def assert_dragged(tab):
 def assert_downloaded(tab, folder):
     """Each file arrives; the scene is that of the address, the result that of the command line."""
     tab.ask("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
-    for kind, name in (("toml", "scene.toml"), ("json", "equilibria.json"), ("png", "explore.png")):
+    for kind, name in (("toml", "scene.toml"), ("json", "equilibria.json"), ("figure", "explore.svg")):
         file = folder / name
         file.unlink(missing_ok=True)
-        click(tab, f"get_{kind}")
+        click(tab, kind if kind == "figure" else f"get_{kind}")
         end = time.monotonic() + 60
         while not file.exists():
             tab.run("0")
@@ -212,8 +213,8 @@ def assert_downloaded(tab, folder):
     known, _ = equilibria_job(scene, Models("dipole", "slab"), 0.03, other)
     places = [[e["position_mm"] for e in one["equilibria"]] for one in (found, known)]
     assert np.allclose(*places, rtol=1e-12, atol=1e-12)
-    with Image.open(folder / "explore.png") as figure:
-        assert figure.size[0] > 1000
+    figure = ElementTree.parse(folder / "explore.svg").getroot()
+    assert len(figure.findall("{http://www.w3.org/2000/svg}svg")) == 4
 
 
 def test_two_pages_do_not_disturb_each_other_and_a_killed_one_frees_its_work(server, browser):

@@ -220,6 +220,13 @@ def test_another_scene_of_the_page(reader):
     page.until(lambda: "rotor.configuration=horizontal" in page.shown.get("address", ""))
 
 
+def test_a_scene_to_start_from(reader):
+    page = reader()
+    page.answered()
+    page.say("preset", "vertical")
+    page.until(lambda: "rotor.configuration=vertical" in page.shown.get("address", ""))
+
+
 def test_a_flight_is_played_kicked_stopped_and_forgotten(reader):
     """Piece by piece, as page.js asks for them."""
     page = reader("plate_model=none")
