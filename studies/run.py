@@ -236,7 +236,7 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
     survey = Survey((), ())
     try:
         if scene.plate is not None:  # in seconds; the plate's currents can take minutes
-            said = headline(levitation, levitation.without_plate.equilibria)
+            said = headline(levitation, free_of_bodies(levitation.scene, levitation.without_plate).equilibria)
             note(f"Without the plate: {said[0].lower()}{said[1:]}")
         best = levitation.field(exact).model
         alone = {
