@@ -5,7 +5,7 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 import pytest
-from article import PERMEABLE
+from article import PERMEABLE, PERMEABLE_MAGNETS
 
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, in_ball
@@ -24,7 +24,7 @@ from spinlev.geometry.common import InputError
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
-SCENE = Scene(110.0, horizontal(2e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))
+SCENE = Scene(110.0, PERMEABLE_MAGNETS, PERMEABLE, Drag(0.0, 0.0))
 SCALES = Scales.of(SCENE)
 
 

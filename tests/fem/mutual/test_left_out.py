@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
-from article import PERMEABLE
+from article import PERMEABLE, PERMEABLE_MAGNETS as MAGNETS
 
 from spinlev.fem.harmonics.interior import dipole_sources, field_at_center, multipole_force, multipole_torque
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body
 from spinlev.fem.mutual.samples import places_around
 from spinlev.fem.mutual.table import induced_sources
-from spinlev.geometry.rotor import horizontal
 
-MAGNETS = horizontal(2e-3, 10e-3, 1.305, 1.05)
 DEGREE = 20
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 import pytest
-from article import PERMEABLE
+from article import PERMEABLE, PERMEABLE_MAGNETS as MAGNETS
 from numpy.polynomial import legendre
 
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center
@@ -19,7 +19,6 @@ from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
 from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.shapes import Box, rotation_matrix
 
-MAGNETS = horizontal(2e-3, 10e-3, 1.305, 1.05)
 FINER = MeshSettings(magnet_size=0.6)
 
 
@@ -124,7 +123,7 @@ def test_a_file_holds_all_of_it(table, tmp_path):
 
 
 def test_what_is_not_permeable_does_not_answer():
-    hard = tuple(replace(magnet, recoil_permeability=1.0) for magnet in MAGNETS)
+    hard = tuple(replace(m, recoil_permeability=1.0, transverse_permeability=1.0) for m in MAGNETS)
     table = mutual_table(hard, replace(PERMEABLE, recoil_permeability=1.0))
     energy, slope, second = table.derivatives(*poses(0.5, 3, 7))
     assert not energy.any()
