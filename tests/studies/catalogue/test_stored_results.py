@@ -17,11 +17,16 @@ from spinlev.studies.figures.style import STYLE, figure_bytes, figures_across
 STORED = sorted(QUICK.glob("*.nc"))
 
 
-@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
-def test_figures_fit_into_a_column_of_a_journal_with_the_text_of_the_page(path):
+@pytest.fixture(scope="module", params=STORED, ids=lambda path: path.stem)
+def stored(request):
+    """A result's file, what is in it, and its figures across a page."""
+    result = read_result(request.param)
+    return request.param, result, figures_of(result)
+
+
+def test_figures_fit_into_a_column_of_a_journal_with_the_text_of_the_page(stored):
     """85 mm wide, no text below 7 points, no panel lost, and nothing cut."""
-    result = read_result(path)
-    page = figures_of(result)
+    _, result, page = stored
     with figures_across("column"):
         column = figures_of(result)
     for name, figure in column.items():
@@ -37,11 +42,10 @@ def test_figures_fit_into_a_column_of_a_journal_with_the_text_of_the_page(path):
         assert min(text.get_fontsize() for text in texts if text.get_text() and text.get_visible()) >= 7
 
 
-@pytest.mark.parametrize("path", STORED, ids=lambda path: path.stem)
-def test_a_stored_result_is_drawn_and_reported_from_its_file_alone(path):
-    result = read_result(path)
+def test_a_stored_result_is_drawn_and_reported_from_its_file_alone(stored):
+    path, result, page = stored
     assert result.attrs["study"] == path.stem
-    for name, figure in figures_of(result).items():
+    for name, figure in page.items():
         assert name.startswith(path.stem)
         shown = [axes for axes in figure.axes if axes.has_data()]
         assert shown
