@@ -89,7 +89,7 @@ def sweep(text, asked):
 
 
 def live_motion(text, asked):
-    return levitation(text + START, asked).live_motion().onward(0.1).lab.position[-1]
+    return levitation(text + START, asked).live_flight().onward(0.1).lab.position[-1]
 
 
 USES = (equilibria, modes, trajectory, ensemble, sweep, live_motion)
