@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import os
+import re
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -22,36 +23,6 @@ from ..figures.style import figure_bytes
 from .entries import CATALOGUE
 from .runner import DRAWN, QUESTION, failure_lines, figures_of, flight_of, read_result
 
-# By key of an entry of BibTeX: author, title, where, year, doi, and for what it is cited.
-REFERENCES = {
-    "effect": (
-        "Hermansen, Joachim Marco and Durhuus, Frederik Laust and Bjørk, Rasmus",
-        "Magnetic levitation at low rotation frequencies using an on-axis magnetic field",
-        "Applied Physics Letters 127, 012402", 2025, "10.1063/5.0267494", "levitation by rotation",
-    ),
-    "program": ("{The spinlev developers}", "spinlev: magnetic levitation by rotation with full fields", "", 2026, "",
-        "this program; see CITATION.cff"),
-    "ngsolve": ("Schöberl, Joachim", "C++11 implementation of finite elements in NGSolve",
-        "ASC Report 30/2014, TU Wien", 2014, "", "finite elements"),
-    "netgen": ("Schöberl, Joachim", "NETGEN: an advancing front 2D/3D-mesh generator based on abstract rules",
-        "Computing and Visualization in Science 1, 41", 1997, "10.1007/s007910050004", "meshes"),
-    "heyoka": ("Biscani, Francesco and Izzo, Dario",
-        "Revisiting high-order Taylor methods for astrodynamics and celestial mechanics",
-        "Monthly Notices of the Royal Astronomical Society 504, 2614", 2021, "10.1093/mnras/stab1032", "motion"),
-    "eddy": ("Bíró, Oszkár", "Edge element formulations of eddy current problems",
-        "Computer Methods in Applied Mechanics and Engineering 169, 391", 1999, "", "eddy currents"),
-    "team7": ("Fujiwara, Koji and Nakata, Takayoshi",
-        "Results for benchmark problem 7 (asymmetrical conductor with a hole)", "COMPEL 9, 137", 1990, "",
-        "measurement of TEAM workshop problem 7"),
-    "magpylib": ("Ortner, Michael and Coliado Bandeira, Lucas Gabriel",
-        "Magpylib: a free Python package for magnetic field computation",
-        "SoftwareX 11, 100466", 2020, "10.1016/j.softx.2020.100466", "peer"),
-    "scikit-fem": ("Gustafsson, Tom and McBain, G. D.", "scikit-fem: a Python package for finite element assembly",
-        "Journal of Open Source Software 5, 2369", 2020, "10.21105/joss.02369", "peer"),
-    "air": ("Dennis, S. C. R. and Singh, S. N. and Ingham, D. B.",
-        "The steady flow due to a rotating sphere at low and moderate Reynolds numbers",
-        "Journal of Fluid Mechanics 101, 257", 1980, "", "torque of air on a sphere"),
-}  # fmt: skip
 STUDIES = {
     "team7": ("team7", "eddy"),
     "speed-accuracy": ("magpylib", "scikit-fem"),
@@ -66,24 +37,12 @@ STATIC = ("dipole-validity", "speed-accuracy", "field-hard-cases", "field-compon
 
 def cite_job(path: Path) -> list[str]:
     """References of what a result used as entries of BibTeX. Raises InputError where the file is no result."""
-    return [bibtex(key) for key in used_references(read_result(path))]
+    keys, text = used_references(read_result(path)), files(__package__).joinpath("references.bib").read_text("utf-8")
+    return [entry for entry, key in re.findall(r"(?ms)^(@\w+\{([\w-]+),.*?^\})$", text) if key in keys]
 
 
-def bibtex(key: str) -> str:
-    """An entry of BibTeX from `REFERENCES`."""
-    author, title, where, year, doi, note = REFERENCES[key]
-    journal, _, pages = where.rpartition(", ")
-    name, _, volume = journal.rpartition(" ")
-    fields = {"author": author, "title": f"{{{title}}}", "howpublished": where, "year": year, "doi": doi, "note": note}
-    kind = "article" if volume.isdecimal() else "misc"
-    if kind == "article":
-        fields |= {"journal": name, "volume": volume, "pages": pages, "howpublished": ""}
-    body = ",\n".join(f"  {name} = {{{value}}}" for name, value in fields.items() if value)
-    return f"@{kind}{{{key},\n{body}\n}}"
-
-
-def used_references(result: xr.Dataset) -> list[str]:
-    """Keys of `REFERENCES` that a result used, told from its attributes."""
+def used_references(result: xr.Dataset) -> set[str]:
+    """Keys of the entries in references.bib that a result used, told from its attributes."""
     study, attrs = str(result.attrs["study"]), result.attrs
     keys = {"effect", "program", *STUDIES.get(study, ())}
     if attrs.get("model") not in ("dipole", "cuboid", "map"):
@@ -92,7 +51,7 @@ def used_references(result: xr.Dataset) -> list[str]:
         keys.add("heyoka")
     if attrs.get("plate_model", "none") != "none":
         keys |= {"eddy", "ngsolve"}
-    return [key for key in REFERENCES if key in keys]
+    return keys
 
 
 SUMMARIES = {
