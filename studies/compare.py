@@ -205,7 +205,8 @@ def compare_words(rows: Sequence[Compared]) -> list[str]:
     """The answer in a sentence or two, the table, and its conditions."""
     best, dipole = rows[-1], rows[0]
     scene = best.levitation.scene
-    said = [f"At {scene.frequency:g} Hz the floater has no equilibrium by {best.name}."]
+    name = best.name.replace("fem", "finite elements").replace("+ mutual", "with mutual magnetisation")
+    said = [f"At {scene.frequency:g} Hz the floater has no equilibrium by {name}."]
     if best.found is not None and dipole.found is not None:
         apart = 1e3 * float(best.found.position[2] - dipole.found.position[2])
         share = abs(apart) / (1e3 * best.found.distance)
@@ -213,10 +214,10 @@ def compare_words(rows: Sequence[Compared]) -> list[str]:
         more = "more" if apart > 0 else "less"
         said = [
             f"Levitation distance by the point dipole: {bracketed(abs(apart), error, 2)} mm {more} "
-            f"({share:.1%}) than by {best.name}; {_verdict(dipole, best)}."
+            f"({share:.1%}) than by {name}; {_verdict(dipole, best)}."
         ]
     elif best.found is not None:
-        said = [f"The point dipole has no equilibrium at {scene.frequency:g} Hz; {best.name} has one."]
+        said = [f"At {scene.frequency:g} Hz there is no equilibrium by the point dipole, but one by {name}."]
     table = [COLUMNS, *(_cells(row) for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = [

@@ -128,5 +128,5 @@ def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     if scene.floater.body is not None:
         return ListedEffect(REAL_AIR, False, None, None, f"{OF_SPHERES}; the drag is Stokes' on a sphere of its volume")
     h = float(swinging(reynolds(scene.floater.radius, scene.angular_velocity)))
-    why = f'drag.model is not "air"; it would make the torque on a swing {h:.2g} times Stokes\''
+    why = f'drag.model is not "air"; the torque on an oscillating floater would be {h:.2g} times that of Stokes'
     return ListedEffect(REAL_AIR, False, 0.0, None, why)

@@ -80,7 +80,10 @@ def test_nothing_levitates_and_gravity_across_the_axis_are_told():
     scene = sl.load_scene(HORIZONTAL)
     rows = compared(replace(scene, gravity=np.array([0.0, 0.0, -5e3])), asked)
     assert all(row.found is None and row.stable is None for row in rows)
-    assert compare_words(rows)[0] == "At 110 Hz the floater has no equilibrium by fem + mutual."
+    assert (
+        compare_words(rows)[0]
+        == "At 110 Hz the floater has no equilibrium by finite elements with mutual magnetisation."
+    )
     assert np.isnan(compared_dataset(rows)["branch_distance"]).all()
     rows = compared(replace(scene, gravity=np.array([0.5, 0.0, -9.8])), asked)
     assert all(row.found is not None and row.stable is None for row in rows)
