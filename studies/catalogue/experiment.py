@@ -365,7 +365,7 @@ def unknowns_figure(result: xr.Dataset) -> Figure:
         bars = [median - low, high - median]
         panel.errorbar(median, places - 0.12 * n, xerr=bars, fmt="o", ms=3, color=color, label=name)
     panel.set_yticks(places, _labels(result).values())
-    panel.set_xlabel("middle 68 %, in deviations of the prior")
+    panel.set_xlabel("middle 68 % (deviations of the prior)")
     return figure
 
 

@@ -43,7 +43,7 @@ STYLE: Any = {
 }
 FigureWidth = Literal["column", "page"]
 WIDTHS: Mapping[str, float] = {"column": 85 / 25.4, "page": 170 / 25.4}  # of a journal's column and page, inches
-LOWER = 0.85  # height of a row of panels in a column, in units of that across the page
+LOWER, LOWEST = 0.85, 2.2  # height of a row in a column, of that across the page; inches, or as across the page
 BELOW = 0.6  # of a row's height is taken by what is written above and below its panels, inches
 LETTERS = 16  # of a label along an inch
 LEGEND = 0.4  # height of a legend that a figure's height reckons with, inches
@@ -126,7 +126,8 @@ def panels(
     width, count, turned = "page" if stays else _width.get(), rows * columns, False
     beside = beside or columns
     if width == "column":
-        turned, beside, height = columns > rows > 1, min(beside, 2 if count > 4 else 1), LOWER * height
+        turned, beside = columns > rows > 1, min(beside, 2 if count > 4 else 1)
+        height = min(height, max(LOWER * height, LOWEST))
     shape = (columns, rows) if turned else (-(-count // beside), beside)  # each row becomes a column, or is wrapped
     figure = Figure(figsize=(WIDTHS[width], height * shape[0]))
     axes = figure.subplots(*shape, squeeze=False, **shared)
