@@ -54,6 +54,12 @@ class Magnet:
         return replace(self, recoil_permeability=1.0, transverse_permeability=None)
 
     @property
+    def magnetic(self) -> Magnet:
+        """The magnet without what its field does not depend on: equal fields, equal keys of kept tables."""
+        across = None if self.isotropic else self.transverse_permeability
+        return replace(self, transverse_permeability=across, conductivity=None, coercivity=None)
+
+    @property
     def isotropic(self) -> bool:
         """Whether the permeability is the same along every axis."""
         return self.transverse_permeability in (None, self.recoil_permeability)

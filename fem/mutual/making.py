@@ -14,7 +14,7 @@ from ...geometry.scene.contents import Floater
 from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
-from ..rotor.table import canonical
+from ..rotor.table import alike
 from .response import RotorResponse, enough_degree, rotor_ladder, two_body
 from .samples import (
     NEAR_GAPS,
@@ -243,7 +243,7 @@ MUTUAL = TableKind("mutual", MutualTable, "Energies of the mutual magnetisation 
 
 def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
     """SHA-256 of all that decides a mutual table, and of what computes it."""
-    return MUTUAL.key(*_inputs(magnets, floater))
+    return MUTUAL.key(*_inputs(tuple(magnet.magnetic for magnet in magnets), floater))
 
 
 def _inputs(magnets: tuple[Magnet, ...], floater: Floater) -> tuple[tuple[Magnet, ...], float, float, float]:
@@ -262,10 +262,10 @@ def cached_mutual_table(
     magnets, floater, watch : see `mutual_table`
     report : hears of a damaged cache
     """
-    upright = canonical(magnets)
+    upright = alike(magnets)
     table, found = MUTUAL.cached(_inputs(upright, floater), lambda: mutual_table(upright, floater, watch=watch), report)
     if len(magnets) != 1:
-        return table, found
+        return replace(table, magnets=magnets), found
     (magnet,), (grid,) = magnets, table.grids
     turn = np.kron(np.eye(len(table.coupling) // 3), magnet.box.rotation)
     grids = (replace(grid, box=response_box(magnet.body)),)

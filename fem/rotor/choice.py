@@ -9,7 +9,7 @@ import numpy as np
 from ...geometry.common import Watch, unwatched
 from ...geometry.magnets import Magnet
 from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moments_table
-from .table import ROTOR, RotorTable, canonical
+from .table import ROTOR, RotorTable, alike
 
 # From the cheapest to the dearest in evaluation
 MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
@@ -89,7 +89,7 @@ def rotor_table(
     if not rotor:
         raise ValueError("Input rotor must hold at least one magnet; instead received none.")
     name, _ = resolve_model(rotor, model, rtol, nearest)
-    lone = canonical(rotor)
+    lone = alike(rotor)
     if name == "fem":
         return fem_table(lone, accuracy, watch=watch).posed(rotor)
     return _simple_table(_Asked(ROTOR.key(lone, name, rtol, nearest), lone), name, accuracy).posed(rotor)
@@ -125,7 +125,7 @@ def cached_rotor_table(
     rotor, model, rtol, nearest, watch : as of `rotor_table`
     report : hears of a damaged cache
     """
-    lone = canonical(rotor)
+    lone = alike(rotor)
     make = partial(rotor_table, lone, model, rtol, nearest, watch)
     table, found = ROTOR.cached((lone, model, rtol, nearest), make, report)
     return table.posed(rotor), found

@@ -215,9 +215,9 @@ class RotorTable:
         return replace(self, doubts={cause: parts for cause, parts in self.doubts.items() if cause not in LEFT_OUT})
 
     def posed(self, rotor: tuple[Magnet, ...]) -> "RotorTable":
-        """The table of a rotor from that of `canonical(rotor)`: the same field and errors, moved, but for round-off."""
+        """The table of a rotor from that of `alike(rotor)`: the same field and errors, moved, but for round-off."""
         if len(rotor) != 1:
-            return self
+            return replace(self, magnets=rotor)
         body = rotor[0].body
 
         def there(parts: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
@@ -258,6 +258,11 @@ def canonical(rotor: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
     if len(rotor) != 1:
         return rotor
     return (replace(rotor[0], body=moved(rotor[0].body, np.zeros(3), np.eye(3))),)
+
+
+def alike(rotor: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
+    """The magnets of one field for all rotors that share it but for the pose of a lone magnet."""
+    return canonical(tuple(magnet.magnetic for magnet in rotor))
 
 
 def _off_center(doubt: MultipoleExpansion, points: Array) -> Array:

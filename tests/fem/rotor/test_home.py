@@ -1,8 +1,12 @@
 """A lone magnet's table goes where the magnet goes, and is made once for all places."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from article import FLOATER
 
+from spinlev.fem.mutual.making import mutual_key
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.fem.rotor.models import Accuracy, fem_table, shortened_table
 from spinlev.geometry.magnets import Magnet
@@ -41,6 +45,22 @@ def test_one_table_in_the_cache_serves_every_pose(tmp_path, monkeypatch):
     turned = table.evaluate((POINTS - PLACE) @ TURN + other.box.center)[0] @ TURN.T
     field = rotor_table((MAGNET,), "moments", 1e-4).evaluate(POINTS)[0]
     assert np.abs(turned - field).max() < 1e-13 * np.abs(field).max()
+
+
+def test_what_no_field_depends_on_needs_no_table_of_its_own(tmp_path, monkeypatch):
+    """Conductivity and knee; and a permeability across the easy axis that is equal to that along it."""
+    monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
+    two = MAGNET, replace(MAGNET, body=Box(MAGNET.box.size, (0.03, 0.0, 0.0)))
+    for rotor in ((MAGNET,), two):
+        same = tuple(replace(m, transverse_permeability=1.05, conductivity=6e5, coercivity=1e6) for m in rotor)
+        assert mutual_key(same, FLOATER) == mutual_key(rotor, FLOATER)
+        assert not cached_rotor_table(rotor, "moments", 1e-4, print)[1]
+        table, found = cached_rotor_table(same, "moments", 1e-4, print)
+        assert found
+        assert table.magnets == same
+        other = tuple(replace(m, transverse_permeability=1.1) for m in rotor)
+        assert mutual_key(other, FLOATER) != mutual_key(rotor, FLOATER)
+        assert not cached_rotor_table(other, "moments", 1e-4, print)[1]
 
 
 def test_a_turned_table_is_shortened_along_its_own_axes():
