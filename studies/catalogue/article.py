@@ -95,7 +95,7 @@ def polar_angle(moments: Array) -> Array:
     return np.asarray(np.arctan2(np.hypot(moments[..., 0], moments[..., 1]), moments[..., 2]))
 
 
-def article_scene(
+def rotor_scene(
     configuration: str,
     value: float,
     frequency: float = 100.0,
@@ -127,7 +127,7 @@ def losses(scene: Scene, rotor: bool = True, air: bool = True) -> dict[str, Any]
     return {"rotor": magnets, "floater": floater, "drag": replace(Drag.stokes(floater.radius), air=air)}
 
 
-def article_plate(face: float) -> Plate:
+def plate_with_face(face: float) -> Plate:
     """The article's plate below the rotor, its upper face at this height (m) from the rotor's origin."""
     return Plate(Box(np.array(PLATE_SIZE), np.array([0.0, 0.0, face - PLATE_SIZE[2] / 2])), PLATE_CONDUCTIVITY)
 

@@ -20,23 +20,8 @@ from ..levitation import Levitation
 from ..plan import sources
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, recorded
-from .article import (
-    CONFIGURATIONS,
-    CONTACT,
-    FLOATER,
-    HIGHEST,
-    LOWEST,
-    MODELS,
-    QUICK,
-    WEIGHT,
-    article_scene,
-    label_of,
-    levitation_of,
-    polar_angle,
-    stable_in_flight,
-)
+from . import article, drawing
 from .article_formulas import field, force, side_radius
-from .drawing import by_configuration, by_rotor, configuration_panels, drawn, explain, rotor_panels
 from .tables import span, text_table
 
 # On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
@@ -54,7 +39,7 @@ def field_points(quick: bool) -> list[Point]:
     """Every rotor of the article; `quick` takes the first, the middle and the last of each configuration."""
     return [
         {"configuration": name, "value": value, "model": model}
-        for name, kind in CONFIGURATIONS.items()
+        for name, kind in article.CONFIGURATIONS.items()
         for value in (kind.tested[:: (len(kind.tested) - 1) // 2] if quick else kind.tested)
         for model in FIELD_MODELS
     ]
@@ -66,7 +51,7 @@ def field_components(point: Point) -> xr.Dataset:
     if point["model"] == "article":
         across, along, error = *field(*rotor, DISTANCES), np.zeros_like(DISTANCES)
     else:
-        model = sources(levitation_of(article_scene(*rotor), point["model"]).table)
+        model = sources(article.levitation_of(article.rotor_scene(*rotor), point["model"]).table)
         places = DISTANCES[:, None] * np.array([0.0, 0.0, -1.0])
         b, _ = model.evaluate(places)
         across, along, error = np.hypot(b[:, 0], b[:, 1]), b[:, 2], model.absolute_error(places)[0]
@@ -89,47 +74,47 @@ def deviations(part: xr.Dataset) -> dict[str, Any]:
     return {**found, "fem": true["field_error"] / size}
 
 
-@drawn
+@drawing.drawn
 def component_figure(result: xr.Dataset, quantity: str, ylabel: str) -> Figure:
     """One component of the field below the rotor against the parameter of each configuration."""
     styles = {"fem": DASHES["fem"], "dipole": DASHES["dipole"], "article": "+"}
-    figure, rows = configuration_panels(result, 2.7, ylabel=ylabel)
+    figure, rows = drawing.configuration_panels(result, 2.7, ylabel=ylabel)
     for axes, configuration, part in rows:
         for model, style in styles.items():
             found = _of(part, model)
             for k, color in zip(range(found.sizes["distance"]), PALETTE, strict=False):
                 axes.plot(found["value"], 1e3 * found[quantity][:, k], style, color=color, ms=4)
-        axes.set(xlabel=label_of(configuration), yscale="log")
+        axes.set(xlabel=article.label_of(configuration), yscale="log")
     rows[0][0].yaxis.set_major_formatter(ScalarFormatter())
     names = {**NAMES, "article": "formulas of the article"}
     _explain(rows[0][0], result, {names[model]: style for model, style in styles.items()})
     return figure
 
 
-@drawn
+@drawing.drawn
 def differences_figure(result: xr.Dataset) -> Figure:
     """How far the simpler models are from the finite elements."""
-    figure, rows = configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
+    figure, rows = drawing.configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
     for axes, configuration, part in rows:
         value, off = _of(part, "fem")["value"], deviations(part)
         for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
             for model in ("dipole", "cuboid"):
                 axes.plot(value, 100 * off[model][:, k], DASHES[model], color=color)
         axes.plot(value, 100 * off["fem"].max("distance"), ":", color="0.5", lw=1.6)
-        axes.set(xlabel=label_of(configuration), yscale="log")
+        axes.set(xlabel=article.label_of(configuration), yscale="log")
     names = {NAMES[model]: DASHES[model] for model in ("dipole", "cuboid")}
     _explain(rows[0][0], result, names | {"largest error of the finite elements": ":"})
     return figure
 
 
 def _explain(axes: Axes, result: xr.Dataset, models: dict[str, str]) -> None:
-    explain(axes, {f"{1e3 * distance:g} mm below": f"C{k}-" for k, distance in enumerate(result["distance"].values)})
-    explain(axes, models)
+    places = {f"{1e3 * distance:g} mm below": f"C{k}-" for k, distance in enumerate(result["distance"].values)}
+    drawing.explain(axes, places | models)
 
 
 def components_lines(result: xr.Dataset) -> list[str]:
     rows = []
-    for configuration, part in by_configuration(result):
+    for configuration, part in drawing.by_configuration(result):
         true, off = _of(part, "fem"), deviations(part)
         for k, distance in enumerate(1e3 * result["distance"].values):
             ends = [" to ".join(f"{1e3 * true[q].values[n, k]:.3f}" for n in (0, -1)) for q in ("off_axis", "on_axis")]
@@ -183,13 +168,13 @@ def force_points(quick: bool) -> list[Point]:
 
 def force_curve(point: Point) -> xr.Dataset:
     """Axial force by one formula or in one field, where everything else is balanced, see `FORCE_COLUMNS`."""
-    grid, rotor = np.arange(CONTACT, 0.0451, point["spacing"]), (point["configuration"], point["value"])
+    grid, rotor = np.arange(article.CONTACT, 0.0451, point["spacing"]), (point["configuration"], point["value"])
     frequencies = np.asarray(point["frequencies_hz"], float)
     if point["model"] in FORCE_MODELS[:2]:
         found = [force(*rotor, grid, frequency, point["model"] == "small angles") for frequency in frequencies]
         rows = np.array([[one.attracting, one.repelling, np.zeros_like(grid), one.polar_angle] for one in found])
     else:
-        shared = levitation_of(article_scene(*rotor, frequencies[0]), point["model"])
+        shared = article.levitation_of(article.rotor_scene(*rotor, frequencies[0]), point["model"])
         rows = np.array([_along_curve(shared.elsewhere(frequency=float(f)), grid) for f in frequencies])
     marks = np.array([balance_points(grid, row[0] + row[1], row[3]) for row in rows])
     frequency = variable(ONE, frequencies, "Hz", "frequency of the rotor")
@@ -203,9 +188,9 @@ def _along_curve(levitation: Levitation, grid: Array) -> Array:
     # along the axis the moment comes nearest to upright on the curve that holds the stable equilibrium
     model, curves = sources(levitation.table), levitation.without_plate.curves
     curve = max(curves, key=lambda curve: float(curve.moment[:, 2].max()))
-    parts = FLOATER.moment * curve.moment * model.evaluate(curve.position)[1][:, :, 2]
-    error = FLOATER.moment * model.absolute_error(curve.position)[1]
-    found = np.stack([parts[:, 2], parts[:, 0] + parts[:, 1], error, polar_angle(curve.moment)])
+    parts = article.FLOATER.moment * curve.moment * model.evaluate(curve.position)[1][:, :, 2]
+    error = article.FLOATER.moment * model.absolute_error(curve.position)[1]
+    found = np.stack([parts[:, 2], parts[:, 0] + parts[:, 1], error, article.polar_angle(curve.moment)])
     order = np.argsort(-curve.position[:, 2])
     return np.asarray(CubicSpline(-curve.position[order, 2], found[:, order], axis=1, extrapolate=False)(grid))
 
@@ -216,7 +201,7 @@ def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[floa
     At the near one the force has done as much work up to the far one as is needed to come to rest there.
     """
     known = np.isfinite(magnetic)
-    rest = PchipInterpolator(distance[known], magnetic[known] - WEIGHT)
+    rest = PchipInterpolator(distance[known], magnetic[known] - article.WEIGHT)
     roots = rest.roots(extrapolate=False)
     roots = roots[np.isfinite(roots)]
     if len(roots) < 2:
@@ -238,7 +223,7 @@ STYLES = {
 POINTS = {"near_tipping": ("<", "near tipping point"), "equilibrium": ("o", "stable"), "far_tipping": (">", "far one")}
 
 
-@drawn
+@drawing.drawn
 def parts_figure(result: xr.Dataset) -> Figure:
     """Attraction, repulsion and net force at one frequency by each way of computing, and how far these are apart."""
     figure, ((left, right),) = panels(1, 2, 3.9)
@@ -250,10 +235,10 @@ def parts_figure(result: xr.Dataset) -> Figure:
             _plot(left, found, found[part], style, color=color, lw=1.0)
             if model != "fem":
                 # in units of the weight: the parts themselves cross zero
-                _plot(right, found, 100e-3 * (found[part] - true[part]) / WEIGHT, style, color=color)
+                _plot(right, found, 100e-3 * (found[part] - true[part]) / article.WEIGHT, style, color=color)
         _plot(left, found, _net(found), style, color="k")
-        explain(left, {text: style})
-    explain(left, {"attracting part": "C0-", "repelling part": "C1-", "net force, with gravity": "k-"})
+        drawing.explain(left, {text: style})
+    drawing.explain(left, {"attracting part": "C0-", "repelling part": "C1-", "net force, with gravity": "k-"})
     _mark(left, true, PALETTE[2])
     left.axhline(0.0, color="0.3", lw=0.6)
     left.set(ylabel="force, upwards (mN)", ylim=(-470, 350), title=f"(a) δx = 1 mm, {float(one['frequency']):g} Hz")
@@ -261,7 +246,7 @@ def parts_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@drawn
+@drawing.drawn
 def net_figure(result: xr.Dataset) -> Figure:
     """The net force at every frequency, and the polar angle that goes with it."""
     figure, ((net, angle),) = panels(1, 2, 3.2)
@@ -271,8 +256,8 @@ def net_figure(result: xr.Dataset) -> Figure:
             _plot(net, found, _net(found), STYLES[model][0], color=color)
         _mark(net, found, color)
         _plot(angle, found, 1e-3 * np.degrees(found["polar_angle"].values), "-", color=color)
-        explain(net, {f"{float(found['frequency']):g} Hz": f"C{k}-"})
-    explain(net, {text: style for style, text in list(STYLES.values())[:2]})
+        drawing.explain(net, {f"{float(found['frequency']):g} Hz": f"C{k}-"})
+    drawing.explain(net, {text: style for style, text in list(STYLES.values())[:2]})
     net.axhline(0.0, color="0.3", lw=0.6)
     net.set(ylabel="net force, with gravity (mN)", ylim=(-60, 1.1e3 * float(_net(result).max())))
     angle.axhline(TOLD_ANGLE, color="0.4", lw=0.8, ls="-.", label="near tipping point in the article")
@@ -281,7 +266,7 @@ def net_figure(result: xr.Dataset) -> Figure:
 
 
 def _net(found: xr.Dataset) -> xr.DataArray:
-    return found["attracting"] + found["repelling"] - WEIGHT
+    return found["attracting"] + found["repelling"] - article.WEIGHT
 
 
 def _plot(axes: Axes, found: xr.Dataset, values: ArrayLike, style: str, **more: Any) -> None:
@@ -340,19 +325,19 @@ def side_points(quick: bool) -> list[Point]:
     """Every rotor that levitated in the article's experiment in both fields; `quick` takes three of them."""
     return [
         {"configuration": name, "value": value, "model": model, "step_hz": 10.0 if quick else 2.5}
-        for name, kind in CONFIGURATIONS.items()
-        for value in (QUICK[name] if quick else kind.levitated)
-        for model in MODELS
+        for name, kind in article.CONFIGURATIONS.items()
+        for value in (article.QUICK[name] if quick else kind.levitated)
+        for model in article.MODELS
     ]
 
 
 def side_mode(point: Point) -> xr.Dataset:
     """Radius of the circle of one rotor's floater at all frequencies, and for δx = 1 mm a flight at `FLOWN_HZ`."""
-    grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
-    scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    levitation = levitation_of(scene, point["model"])
+    grid = np.arange(article.LOWEST, article.HIGHEST + 1e-9, point["step_hz"])
+    scene = article.rotor_scene(point["configuration"], point["value"], article.HIGHEST)
+    levitation = article.levitation_of(scene, point["model"])
     field = sources(levitation.table)
-    branch = levitating_branch(scene, field, levitation.rates, HIGHEST)
+    branch = levitating_branch(scene, field, levitation.rates, article.HIGHEST)
     rows = np.full((len(grid), 3), np.nan)
     for row, there in zip(rows, branch.side("near", grid), strict=True):
         if there is not None:
@@ -398,36 +383,38 @@ def orbit_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@drawn
+@drawing.drawn
 def radius_figure(result: xr.Dataset) -> Figure:
     """The radius of the side mode against frequency for every rotor, and the article's formula."""
-    figure, rotors = rotor_panels(result, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")
+    figure, rotors = drawing.rotor_panels(result, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")
     for axes, rotor, color in rotors:
         axes.axhspan(*TYPICAL, color="0.92", lw=0, label="called typical in the article")
         found = case_with(rotor, model="fem")
-        plot_branch(axes, found["frequency"], 1e3 * found["radius"], stable_in_flight(found["growth"]), color=color)
-        axes.plot(found["frequency"], 1e3 * found["article_radius"], ":", lw=1.6, color=color)
+        frequency, stable = found["frequency"], article.stable_in_flight(found["growth"])
+        plot_branch(axes, frequency, 1e3 * found["radius"], stable, color=color)
+        axes.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
         axes.set(xlim=(35, 255), ylim=(0, None))
-    explain(rotors[0][0], {"stable": "-", "unstable": "--", "$\\mathcal{G}/\\mu_f\\omega^2$ of the article": ":"})
+    key = {"stable": "-", "unstable": "--", "$\\mathcal{G}/\\mu_f\\omega^2$ of the article": ":"}
+    drawing.explain(rotors[0][0], key)
     return figure
 
 
 def side_lines(result: xr.Dataset) -> list[str]:
     lines, rows = [], []
-    for simulated in (case_with(result, model=model, **ROTOR) for model in MODELS):
+    for simulated in (case_with(result, model=model, **ROTOR) for model in article.MODELS):
         radius = 1e3 * np.hypot(simulated["flight_x"].values, simulated["flight_y"].values)
         lines.append(
             f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {simulated['model'].item()}: radius {radius.mean():.4f} mm "
             f"({span(radius, '.4f')}) at {-1e3 * float(simulated['flight_z'].mean()):.3f} mm; "
             f"𝒢/(μ_f ω²) = {_predicted(simulated):.4f} mm."
         )
-    for label, rotor in by_rotor(result):
+    for label, rotor in drawing.by_rotor(result):
         cells = []
-        for found in (case_with(rotor, model=model) for model in MODELS):
-            radius = found["radius"].where(stable_in_flight(found["growth"]))
+        for found in (case_with(rotor, model=model) for model in article.MODELS):
+            radius = found["radius"].where(article.stable_in_flight(found["growth"]))
             cells += [span(1e3 * radius, ".3f"), span(100 * (found["article_radius"] / radius - 1), "+.1f")]
         rows.append((label, *cells))
-    head = ("where stable", *(f"{model} {words}" for model in MODELS for words in ("(mm)", "formula off (%)")))
+    head = ("where stable", *(f"{model} {words}" for model in article.MODELS for words in ("(mm)", "formula off (%)")))
     return [*lines, *text_table(head, rows)]
 
 

@@ -22,20 +22,7 @@ from ..figures.style import PALETTE, plot_branch
 from ..levitation import Levitation
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
-from .article import (
-    CONFIGURATIONS,
-    FLIGHT,
-    HIGHEST,
-    LOWEST,
-    QUICK,
-    WEIGHT,
-    article_scene,
-    levitation_of,
-    losses,
-    polar_angle,
-    rotor_label,
-    stable_in_flight,
-)
+from . import article
 from .article_formulas import analytic_distance, balanced
 from .drawing import by_configuration, by_rotor, drawn, explain, rotor_panels, small_multiples
 from .tables import span, text_table
@@ -69,8 +56,8 @@ def distance_points(quick: bool) -> list[Point]:
     more = {"step_hz": step, "flights": flights, "interaction": interaction}
     return [
         {"configuration": name, "value": value, "model": model, **more}
-        for name, kind in CONFIGURATIONS.items()
-        for value in (QUICK[name] if quick else kind.tested)
+        for name, kind in article.CONFIGURATIONS.items()
+        for value in (article.QUICK[name] if quick else kind.tested)
         for model in (*FORMULAS, *FIELDS)
         if (name, model) != ("vertical", "analytic")
     ]
@@ -78,10 +65,10 @@ def distance_points(quick: bool) -> list[Point]:
 
 def levitation_distance(point: Point) -> xr.Dataset:
     """Distances of one rotor by one formula, or in one field, at all frequencies, see `DISTANCE_COLUMNS`."""
-    grid = np.arange(LOWEST, HIGHEST + 1e-9, point["step_hz"])
+    grid = np.arange(article.LOWEST, article.HIGHEST + 1e-9, point["step_hz"])
     rotor = point["configuration"], point["value"]
     if point["model"] == "semi-analytic":
-        found = {"distance": np.array([balanced(*rotor, frequency, WEIGHT) for frequency in grid])}
+        found = {"distance": np.array([balanced(*rotor, frequency, article.WEIGHT) for frequency in grid])}
     elif point["model"] == "analytic":
         near = analytic_distance(*rotor, grid)
         found = {"distance": np.stack([near, np.full(near.shape, np.nan)], axis=1)}
@@ -93,17 +80,17 @@ def levitation_distance(point: Point) -> xr.Dataset:
 
 
 def _in_field(point: Point, grid: Array) -> dict[str, Any]:
-    scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    levitation = levitation_of(scene, point["model"], interaction=point.get("interaction", "rigid"))
+    scene = article.rotor_scene(point["configuration"], point["value"], article.HIGHEST)
+    levitation = article.levitation_of(scene, point["model"], interaction=point.get("interaction", "rigid"))
     field, family = levitation.interaction, by_frequency(scene, levitation.rates)
-    branch = levitating_branch(scene, field, levitation.rates, HIGHEST)
+    branch = levitating_branch(scene, field, levitation.rates, article.HIGHEST)
     rows, flights = np.full((len(SIDES), len(grid), 4), np.nan), np.full((3, point["flights"]), np.nan)
     for side, row in zip(SIDES, rows, strict=True):
         known = [(k, there) for k, there in enumerate(branch.side(side, grid)) if there is not None]
         for k, there in known:
             error = distance_error(scene, field, family, there)
-            row[k] = -there.position[2], error, there.growth_per_s, polar_angle(there.state[6:9])
-        stable = [there for _, there in known if stable_in_flight(there.growth_per_s)]
+            row[k] = -there.position[2], error, there.growth_per_s, article.polar_angle(there.state[6:9])
+        stable = [there for _, there in known if article.stable_in_flight(there.growth_per_s)]
         if side == "near" and point["model"] == FLOWN and stable:
             places = np.unique(np.linspace(0, len(stable) - 1, point["flights"]).astype(int))
             for k, place in enumerate(places):
@@ -176,13 +163,13 @@ def formulas_figure(result: xr.Dataset) -> Figure:
 
 def _levitated(rotor: xr.Dataset) -> bool:
     """Whether the article's experiment levitated with a rotor."""
-    return float(rotor["value"][0]) in CONFIGURATIONS[str(rotor["configuration"].values[0])].levitated
+    return float(rotor["value"][0]) in article.CONFIGURATIONS[str(rotor["configuration"].values[0])].levitated
 
 
 def _side(rotor: xr.Dataset, model: str, side: str) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Frequency (Hz), distance (mm) and whether it is stable on one side, by one model."""
     found = case_with(rotor, model=model).sel(side=side)
-    return found["frequency"].values, 1e3 * found["distance"].values, stable_in_flight(found["growth"])
+    return found["frequency"].values, 1e3 * found["distance"].values, article.stable_in_flight(found["growth"])
 
 
 def distance_lines(result: xr.Dataset) -> list[str]:
@@ -198,9 +185,10 @@ def distance_lines(result: xr.Dataset) -> list[str]:
             off = [span(by[stable], "+.2f") for by in apart] if model == "dipole" else [""] * 3
             rows.append((f"{label}, {model}", lowest, span(frequency[good]), span(distance[good], ".2f"), power, *off))
     for configuration, part in by_configuration(result):
+        levitated = article.CONFIGURATIONS[configuration].levitated
         for model in FIELDS:
             found = cases_with(part, model=model)
-            folds = found["fold_frequency"].values[np.isin(found["value"], CONFIGURATIONS[configuration].levitated)]
+            folds = found["fold_frequency"].values[np.isin(found["value"], levitated)]
             if len(folds) > 1:
                 lines.append(
                     f"{configuration}, {model}: the levitated rotors lower the lowest frequency from {folds.max():.1f} "
@@ -268,16 +256,16 @@ def flight_points(quick: bool) -> list[Point]:
 def trajectories(point: Point) -> xr.Dataset:
     """The flights of one rotor, simulated and averaged, see `FLIGHT_COLUMNS`; and what became of each."""
     complete = point.get("complete", False)
-    scene = article_scene(point["configuration"], point["value"], HIGHEST)
-    scene = replace(scene, **losses(scene, complete, complete))
-    levitation = levitation_of(scene, point["model"], interaction="auto" if complete else "rigid")
-    starts = levitating_branch(scene, levitation.interaction, levitation.rates, HIGHEST).side("near", FREQUENCIES)
+    scene = article.rotor_scene(point["configuration"], point["value"], article.HIGHEST)
+    scene = replace(scene, **article.losses(scene, complete, complete))
+    levitation = article.levitation_of(scene, point["model"], interaction="auto" if complete else "rigid")
+    branch = levitating_branch(scene, levitation.interaction, levitation.rates, article.HIGHEST)
     sizes = {"frequency": len(FREQUENCIES), "part": PARTS, "sample": SAMPLES}
     found = {
         name: np.full([sizes[d] for d in dims], np.nan if unit else NONE, float if unit else "U20")
         for name, (dims, unit, _) in FLIGHT_COLUMNS.items()
     }
-    for k, start in enumerate(starts):
+    for k, start in enumerate(branch.side("near", FREQUENCIES)):
         if start is not None:
             for name, value in _flight_row(scene, levitation, start, point["duration_s"]).items():
                 found[name][k] = value
@@ -287,7 +275,7 @@ def trajectories(point: Point) -> xr.Dataset:
 
 def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, seconds: float) -> dict[str, Any]:
     there, field = replace(scene, frequency=start.parameter), levitation.interaction
-    slow = drift(there, field, 0.0, FLIGHT, levitation.rates, Scales.of(there).unpack(start.state), stokes=True)
+    slow = drift(there, field, 0.0, article.FLIGHT, levitation.rates, Scales.of(there).unpack(start.state), stokes=True)
     times = np.linspace(0.0, slow.time[-1], SAMPLES)
     flight = simulate(kicked(there, start, KICK), field, seconds, [])
     lost_at_once = flight.ended_by != "duration" and flight.levitated_s < SHORTEST
@@ -310,7 +298,7 @@ def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, second
 @drawn
 def flight_figure(result: xr.Dataset) -> Figure:
     """The distance in each flight, one panel for each displacement."""
-    titles = [rotor_label("horizontal", value) for value in result["value"].values]
+    titles = [article.rotor_label("horizontal", value) for value in result["value"].values]
     figure, axes = small_multiples(titles, 3.6, xlabel="time (s)", ylabel="levitation distance (mm)", sharey=True)
     explain(axes[0], {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(result["frequency"].values)})
     for panel, rotor in zip(axes, each_case(result), strict=True):
@@ -341,7 +329,7 @@ def flight_lines(result: xr.Dataset) -> list[str]:
             ends = "–" if not len(mean) else f"{mean[0]:.2f} to {mean[-1]:.2f}"
             numbers = [float(one[key]) for key in ("averaged_levitated", "growth", "energy_error")]
             cells = (one["kind"].item(), float(one["levitated"]), ends, one["averaged_end"].item(), *numbers)
-            name = f"{rotor_label('horizontal', float(rotor['value']))}, {frequency:g} Hz"
+            name = f"{article.rotor_label('horizontal', float(rotor['value']))}, {frequency:g} Hz"
             rows.append((name, *cells, REPORTED.get(float(frequency), "")))
     head = ("rotor", "simulated", "for (s)", "mean distance (mm)", "averaged", "for (s)", "growth (1/s)", "energy")
     return [

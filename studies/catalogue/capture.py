@@ -30,17 +30,7 @@ from ...geometry.scene.contents import Lowering, Scene
 from ..figures.style import PALETTE, colour_bar, panels, styled, titled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
-from .article import (
-    CONFIGURATIONS,
-    QUICK_ROTORS,
-    article_plate,
-    article_scene,
-    label_of,
-    levitation_of,
-    losses,
-    stable_frequencies,
-    within,
-)
+from . import article
 from .drawing import by_rotor, configuration_panels, drawn
 from .tables import text_table
 
@@ -82,13 +72,13 @@ def place_of(configuration: str, measure: float, part: float) -> Place:
     ------
     EquilibriumError : it levitates stably at no frequency
     """
-    scene = article_scene(configuration, measure, permeability=1.0)
-    levitation = levitation_of(scene, "cuboid")
-    stable = stable_frequencies(scene, levitation.rates)
-    frequency = float(within(stable, part))
+    scene = article.rotor_scene(configuration, measure, permeability=1.0)
+    levitation = article.levitation_of(scene, "cuboid")
+    stable = article.stable_frequencies(scene, levitation.rates)
+    frequency = float(article.within(stable, part))
     distance = at_frequency(scene, levitation.rates, stable.near(frequency), frequency).distance
-    plate = article_plate(-distance - BELOW)
-    there = replace(scene, frequency=frequency, plate=plate, **losses(scene, rotor=False))
+    plate = article.plate_with_face(-distance - BELOW)
+    there = replace(scene, frequency=frequency, plate=plate, **article.losses(scene, rotor=False))
     assert isinstance(levitation.table, RotorTable)
     return Place(there, levitation.table, distance, stable.low.parameter, stable.high.parameter)
 
@@ -175,13 +165,13 @@ COLUMNS: Columns = {
 
 def capture_points(quick: bool) -> list[Point]:
     """All rotors and frequencies again and again, a batch of launches each time, so that a stop leaves equal shares."""
-    rotors = [(name, value) for name, kind in CONFIGURATIONS.items() for value in kind.tested]
+    rotors = [(name, value) for name, kind in article.CONFIGURATIONS.items() for value in kind.tested]
     every = [
         (*rotor, part, batch, TOGETHER, 0 if batch else CHECKED)
         for batch, rotor, part in product(range(BATCHES), rotors, PARTS)
     ]
     names = ("configuration", "measure", "part", "batch", "flights", "checked")
-    asked = [(*rotor, 0.5, 0, FEW, 0) for rotor in QUICK_ROTORS] if quick else every
+    asked = [(*rotor, 0.5, 0, FEW, 0) for rotor in article.QUICK_ROTORS] if quick else every
     return [dict(zip(names, values, strict=True)) for values in asked]
 
 
@@ -261,9 +251,9 @@ def share_figure(result: xr.Dataset) -> Figure:
             _shares(
                 axes, [one["measure"].item() for one in some], [one["outcome"] == HELD for one in some], color, label
             )
-        for measure in CONFIGURATIONS[name].levitated:
+        for measure in article.CONFIGURATIONS[name].levitated:
             axes.axvline(measure, color="0.85", lw=4, zorder=0, label="levitated in the article")
-        axes.set(xlabel=label_of(name), ylim=(-2, 102))
+        axes.set(xlabel=article.label_of(name), ylim=(-2, 102))
     return figure
 
 
@@ -327,7 +317,7 @@ def capture_lines(result: xr.Dataset) -> list[str]:
 
 
 def _levitated(one: xr.Dataset) -> bool:
-    return float(one["measure"]) in CONFIGURATIONS[one["configuration"].item()].levitated
+    return float(one["measure"]) in article.CONFIGURATIONS[one["configuration"].item()].levitated
 
 
 def _others(one: xr.Dataset) -> dict[str, float]:

@@ -26,7 +26,7 @@ from ..figures.style import PALETTE, panels
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, recorded, study_of_one
-from .article import article_scene, levitated_rotors, levitation_of, polar_angle
+from .article import levitated_rotors, levitation_of, polar_angle, rotor_scene
 from .drawing import by_configuration, by_rotor, configuration_panels, drawn, explain, rotor_panels, rotor_places
 from .tables import last_crossing, range_text, text_table, uncertain
 
@@ -60,7 +60,7 @@ def dipole_points(quick: bool) -> list[Point]:
 
 def dipole_vs_fem(point: Point) -> xr.Dataset:
     """Distance, polar angle, modes and limits of stability of one rotor, by every model and with errors."""
-    scene = article_scene(point["configuration"], point["measure"], drag=False)
+    scene = rotor_scene(point["configuration"], point["measure"], drag=False)
     bare = replace(scene, floater=replace(scene.floater, recoil_permeability=1.0))
     start, (fine, coarse) = reference_state(scene), point["rtols"]
     dipole, together = levitation_of(scene, "dipole").rates, levitation_of(scene, "fem", fine, "mutual")

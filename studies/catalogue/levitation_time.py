@@ -19,7 +19,7 @@ from ...geometry.scene.contents import Drag, Scene
 from ..figures.style import PALETTE, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
-from .article import FLOATER, PERMEABILITY, REMANENCE, article_scene, levitation_of, losses
+from .article import FLOATER, PERMEABILITY, REMANENCE, levitation_of, losses, rotor_scene
 from .drawing import drawn, small_multiples
 from .tables import span, text_table
 
@@ -87,7 +87,7 @@ def scene_of(case: DriftCase, variant: Variant) -> Scene:
     """The scene of a case at its reference frequency."""
     measure = case.measure + variant.misplaced * TOLERANCES[case.configuration]
     permeability = 1.0 if variant.rotor == "rigid" else PERMEABILITY
-    scene = article_scene(
+    scene = rotor_scene(
         case.configuration, measure, case.reference,
         remanence=variant.remanence, permeability=permeability, floater=replace(FLOATER, remanence=variant.remanence),
     )  # fmt: skip

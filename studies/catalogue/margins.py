@@ -35,28 +35,7 @@ from ..cli.options import FieldModel
 from ..figures.style import PALETTE
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
-from .article import (
-    CONFIGURATIONS,
-    FLOATER,
-    REMANENCE,
-    article_scene,
-    levitated_rotors,
-    levitation_of,
-    polar_angle,
-    stable_frequencies,
-    within,
-)
-from .drawing import (
-    TITLES,
-    by_rotor,
-    configuration_panels,
-    drawn,
-    explain,
-    plain_log,
-    rotor_panels,
-    rotor_places,
-    small_multiples,
-)
+from . import article, drawing
 from .tables import text_table, uncertain
 
 # Which parameter matters: derivatives by each, and what realistic tolerances of all make of a rotor.
@@ -119,7 +98,7 @@ def spreads(configuration: str) -> Array:
 def scene_of(configuration: str, values: Mapping[str, float], frequency: float = 100.0) -> Scene:
     """The scene of a rotor with all parameters given by name (SI; measure: mm or °), at a frequency in Hz."""
     floater = Floater(values["diameter"] / 2, values["floater_remanence"], 1.05, values["density"])
-    scene = article_scene(
+    scene = article.rotor_scene(
         configuration, values["measure"], frequency, drag=False,
         edge=values["edge"], remanence=values["rotor_remanence"], permeability=1.0, floater=floater,
     )  # fmt: skip
@@ -130,15 +109,15 @@ def nominal(configuration: str, measure: float, model: FieldModel = "cuboid") ->
     """The rotor as it should be, its field by `model`. Raises EquilibriumError where it does not levitate."""
     values = {name: known.nominal for name, known in PARAMETERS.items()} | {"measure": measure}
     scene = scene_of(configuration, values)
-    stable = stable_frequencies(scene, levitation_of(scene, model).rates)
-    grid = within(stable, FRACTIONS)
+    stable = article.stable_frequencies(scene, article.levitation_of(scene, model).rates)
+    grid = article.within(stable, FRACTIONS)
     return Nominal(configuration, model, values | {"frequency": float(grid[1])}, stable, grid)
 
 
 def levitation(base: Nominal, off: Mapping[str, float]) -> Array:
     """Lowest and highest frequency (Hz) and the distances (m) with parameters `off` by so much; NaN where none."""
     scene = scene_of(base.configuration, {name: value + off.get(name, 0.0) for name, value in base.values.items()})
-    rates = levitation_of(scene, base.model).rates
+    rates = article.levitation_of(scene, base.model).rates
     middle = base.stable.near(base.grid[1])
     family, row = by_frequency(scene, rates), np.full(len(QUANTITIES), np.nan)
     with suppress(EquilibriumError):
@@ -163,7 +142,7 @@ def sensitivity_points(quick: bool) -> list[Point]:
     One step alone gives derivatives without an estimate of their error, which is then NaN.
     """
     more = {"field": "cuboid", "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]}
-    return [{**rotor, **more} for rotor in levitated_rotors(quick)]
+    return [{**rotor, **more} for rotor in article.levitated_rotors(quick)]
 
 
 def sensitivity(point: Point) -> xr.Dataset:
@@ -190,7 +169,7 @@ def sensitivity(point: Point) -> xr.Dataset:
 def leaning(base: Nominal) -> Array:
     """Distance (m) and largest growth (1/s) in the middle of the range with the axis tilted (2, tilt)."""
     scene = scene_of(base.configuration, base.values, float(base.grid[1]))
-    levitation = levitation_of(scene, base.model)
+    levitation = article.levitation_of(scene, base.model)
     here = at_frequency(scene, levitation.rates, base.stable.near(scene.frequency), scene.frequency)
     found = []
     for tilt in np.radians(TILTS):
@@ -220,36 +199,36 @@ def band(part: xr.Dataset, quantity: str) -> Array:
     return np.asarray(SCALES[quantity][0] * np.nanpercentile(values, [50, *PERCENTILES], axis=-1))
 
 
-@drawn
+@drawing.drawn
 def contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figure:
     """What one standard deviation of each parameter does to distance or lowest frequency; with errors."""
-    figure, rotors = rotor_panels(result, 3.6, words, "")
+    figure, rotors = drawing.rotor_panels(result, 3.6, words, "")
     chosen = [k for k, name in enumerate(PARAMETERS) if name != "gravity"]  # which is known
     for axes, rotor, color in rotors:
         value, error = contributions(rotor.isel(case=0), quantity)[:, chosen]
         axes.errorbar(value, range(len(chosen)), xerr=error, fmt="o", ms=4, color=color)
-        plain_log(axes)
+        drawing.plain_log(axes)
     first = rotors[0][0]
     first.set_yticks(range(len(chosen)), [list(PARAMETERS.values())[k].words for k in chosen])
     first.invert_yaxis()
     return figure
 
 
-@drawn
+@drawing.drawn
 def bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> Figure:
     """Quantities of the rotors within all tolerances together."""
-    figure, rows = configuration_panels(result, 2.6, ylabel=words)
+    figure, rows = drawing.configuration_panels(result, 2.6, ylabel=words)
     for axes, configuration, part in rows:
         for name, color in zip(quantities, PALETTE, strict=False):
             middle, low, high = band(part, name)
-            places, bars = rotor_places(axes, configuration, part), [middle - low, high - middle]
+            places, bars = drawing.rotor_places(axes, configuration, part), [middle - low, high - middle]
             axes.errorbar(places, middle, bars, fmt="s", ms=4, capsize=3, color=color, label=name)
-    explain(rows[0][0], {f"median, and {BANDS}": "s"}, ms=4)
+    drawing.explain(rows[0][0], {f"median, and {BANDS}": "s"}, ms=4)
     return figure
 
 
 def sensitivity_lines(result: xr.Dataset) -> list[str]:
-    rotors = [(head, rotor.isel(case=0)) for head, rotor in by_rotor(result)]
+    rotors = [(head, rotor.isel(case=0)) for head, rotor in drawing.by_rotor(result)]
     names = [known.words for known in PARAMETERS.values()]
     slopes, bands, leading, leans = [], [], [], []
     for head, one in rotors:
@@ -311,11 +290,11 @@ def _first_guess(configuration: str, edge: float, distance: float, frequency: fl
 
     Balance of the axial force of point dipoles to first order in the polar angle, solved for the measure; gravity kept.
     """
-    rate, strength = 2 * np.pi * frequency, FLOATER.moment * REMANENCE * edge**3 / (4 * np.pi)
+    rate, strength = 2 * np.pi * frequency, article.FLOATER.moment * article.REMANENCE * edge**3 / (4 * np.pi)
     force = 3 * strength / distance**4
-    angle = strength / (distance**3 * FLOATER.inertia * rate**2)
-    radius = force / (FLOATER.mass * rate**2)
-    pull = angle + 9.81 * FLOATER.mass / force
+    angle = strength / (distance**3 * article.FLOATER.inertia * rate**2)
+    radius = force / (article.FLOATER.mass * rate**2)
+    pull = angle + 9.81 * article.FLOATER.mass / force
     ratio = max(2 / (pull + 4 * radius / distance), 1.0)
     measure = {
         "horizontal": 1e3 * (radius + distance * pull / 4),
@@ -342,8 +321,8 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
     for _ in range(30):
         if not least <= measure < most or measure == 0:
             raise EquilibriumError(f"The rotor would need a measure of {measure:.3g}.")
-        scene = article_scene(configuration, measure, frequency, drag=False, edge=edge, permeability=1.0)
-        rates, length = levitation_of(scene, "cuboid").rates, scene.floater.radius
+        scene = article.rotor_scene(configuration, measure, frequency, drag=False, edge=edge, permeability=1.0)
+        rates, length = article.levitation_of(scene, "cuboid").rates, scene.floater.radius
         balance = Balance(rates, parameters(scene, Scales.of(scene), frozen_spin=True), 0.0)
         start = place * distance / np.linalg.norm(place) / length
         place, moment, step = solve(balance, start, moment, LATERAL)
@@ -398,7 +377,11 @@ def design_points(quick: bool) -> list[Point]:
     """Wanted distances (mm) and frequencies (Hz) for each configuration."""
     wanted = [(20.0, 120.0)] if quick else [(d, f) for d in (20.0, 25.0, 30.0) for f in (80.0, 120.0)]
     more = {"edges_mm": [10.0] if quick else EDGES}
-    return [{"configuration": c, "distance_mm": d, "frequency": f, **more} for d, f in wanted for c in CONFIGURATIONS]
+    return [
+        {"configuration": c, "distance_mm": d, "frequency": f, **more}
+        for d, f in wanted
+        for c in article.CONFIGURATIONS
+    ]
 
 
 def _checked_by_elements(
@@ -412,8 +395,8 @@ def _checked_by_elements(
     measure, step = first, 1e-5
     slope = step / (designed(configuration, edge, distance + step, frequency).measure - first)  # by the closed form
     for _ in range(5):
-        scene = article_scene(configuration, measure, frequency, drag=False, edge=edge)
-        found = levitation_of(scene, "fem", rtol).equilibria
+        scene = article.rotor_scene(configuration, measure, frequency, drag=False, edge=edge)
+        found = article.levitation_of(scene, "fem", rtol).equilibria
         if not found:
             raise EquilibriumError("The true field has no equilibrium there.")
         best = min(found, key=lambda e: abs(e.distance - distance))
@@ -431,7 +414,7 @@ def design(point: Point, rtol: float = RTOL, close: float = CLOSE_ENOUGH) -> xr.
     for row, edge in zip(rows, edges, strict=True):
         with suppress(EquilibriumError):
             found = designed(name, edge, distance, frequency)
-            angle = np.degrees(polar_angle(found.here.state[6:9]))
+            angle = np.degrees(article.polar_angle(found.here.state[6:9]))
             ends = found.low.parameter, found.high.parameter
             row[:] = found.measure, found.margin, *ends, found.here.growth_per_s, angle
     measure, margin = rows.T[:2]
@@ -455,16 +438,16 @@ def wishes(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     ]
 
 
-@drawn
+@drawing.drawn
 def design_figure(result: xr.Dataset) -> Figure:
     """Stability margin against the cubes' edge for every configuration and wish."""
     asked = dict(wishes(result))
     across, words = len(np.unique(result["wanted_frequency"])), ("edge of the cubes (mm)", "margin in frequency")
-    figure, axes = small_multiples(list(asked), 2.3, across, *words, sharex=True)
+    figure, axes = drawing.small_multiples(list(asked), 2.3, across, *words, sharex=True)
     for panel, answers in zip(axes, asked.values(), strict=True):
-        for configuration, color in zip(CONFIGURATIONS, PALETTE, strict=False):
+        for configuration, color in zip(article.CONFIGURATIONS, PALETTE, strict=False):
             one = case_with(answers, configuration=configuration)
-            panel.plot(1e3 * one["edge"], one["margin"], "o", ms=4, color=color, label=TITLES[configuration])
+            panel.plot(1e3 * one["edge"], one["margin"], "o", ms=4, color=color, label=drawing.TITLES[configuration])
         panel.yaxis.set_major_formatter(PercentFormatter(1.0))
         panel.margins(y=0.15)
         panel.set_ylim(-0.02, None)
@@ -480,7 +463,7 @@ def design_lines(result: xr.Dataset) -> list[str]:
             if best < 0 or not float(one["margin"][best]) > 0:
                 rows.append((head, "none is stable", *[""] * 6))
                 continue
-            at, kind = one.isel(edge=best), CONFIGURATIONS[name]
+            at, kind = one.isel(edge=best), article.CONFIGURATIONS[name]
             found = [f"{kind.symbol} = {float(at[key]):.3f} {kind.unit}" for key in ("measure", "true_measure")]
             ends = f"{float(at['lowest']):.1f} to {float(at['highest']):.1f}"
             cells = [f"{1e3 * float(at['edge']):g} mm", found[0], f"{100 * float(at['margin']):.1f} %", ends]

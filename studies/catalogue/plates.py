@@ -26,20 +26,7 @@ from ..figures.style import PALETTE, panels
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with, each_case, study_of_one
-from .article import (
-    PLATE_CONDUCTIVITY,
-    PLATE_SIZE,
-    article_scene,
-    equilibrium_at,
-    levitated_rotors,
-    levitation_of,
-    losses,
-    over_plate,
-    rotor_label,
-    stable_frequencies,
-    within,
-)
-from .drawing import drawn, explain, mode_label, plain_log, small_multiples
+from . import article, drawing
 from .tables import range_text, text_table, uncertain
 
 # What a plate does to each mode of the floater, against its place, conductivity, thickness, and the rotor.
@@ -59,8 +46,8 @@ class PlateCase:
     model: PlateModel = "slab"  # slab or reduced
     upright: bool = False  # beside the floater instead of below it
     distance: float = DISTANCE  # of the face from the floater's centre, m
-    thickness: float = PLATE_SIZE[2]  # m
-    conductivity: float = PLATE_CONDUCTIVITY  # S/m
+    thickness: float = article.PLATE_SIZE[2]  # m
+    conductivity: float = article.PLATE_CONDUCTIVITY  # S/m
     configuration: str = "tilt"  # of the rotor
     measure: float = 10.0
     # place of the rotor's frequency in its range of stable frequencies, 0 to 1; None: `FREQUENCY`
@@ -70,7 +57,7 @@ class PlateCase:
 
     def plate(self, place: Array) -> Plate:
         """The plate for a floater at `place` (3,) m."""
-        size, away = np.array([*PLATE_SIZE[:2], self.thickness]), self.distance + self.thickness / 2
+        size, away = np.array([*article.PLATE_SIZE[:2], self.thickness]), self.distance + self.thickness / 2
         if self.upright:
             center = np.array([away, 0.0, place[2]])
             return Plate(Box(size, center, rotation_matrix((0.0, 90.0, 0.0))), self.conductivity)
@@ -88,7 +75,7 @@ def cases(quick: bool) -> list[PlateCase]:
     found += [PlateCase("thickness", t, thickness=t) for t in np.geomspace(1e-3, 5e-2, few).tolist()]
     found += [PlateCase("frequency", p, part=p) for p in np.linspace(0.02, 0.98, 2 if quick else 9).tolist()]
     for sweep, upright in zip(ROTORS, (False, True), strict=True):
-        rotors = levitated_rotors(quick)
+        rotors = article.levitated_rotors(quick)
         found += [PlateCase(sweep, rotor["measure"], upright=upright, part=0.5, **rotor) for rotor in rotors]
     for place, upright in zip(PLACES, (False, True), strict=True):
         found += [PlateCase(place + REAL_PLATE, d, "reduced", upright, d) for d in real]
@@ -98,9 +85,9 @@ def cases(quick: bool) -> list[PlateCase]:
 @cache
 def _in_air(configuration: str, measure: float, complete: bool) -> tuple[Levitation, StableRange]:
     """A rotor, its field and compiled motion, once for all points that a process computes; without currents."""
-    scene = article_scene(configuration, measure, FREQUENCY)
-    alone = levitation_of(scene, "fem", FIELD_RTOL, "auto" if complete else "rigid")
-    return alone, stable_frequencies(scene, alone.rates)
+    scene = article.rotor_scene(configuration, measure, FREQUENCY)
+    alone = article.levitation_of(scene, "fem", FIELD_RTOL, "auto" if complete else "rigid")
+    return alone, article.stable_frequencies(scene, alone.rates)
 
 
 @cache
@@ -112,10 +99,10 @@ def without_plate(
     Parameters are those of a `PlateCase`. Raises EquilibriumError where nothing levitates.
     """
     alone, stable = _in_air(configuration, measure, complete)
-    frequency = FREQUENCY if part is None else float(within(stable, part))
+    frequency = FREQUENCY if part is None else float(article.within(stable, part))
     near = at_frequency(alone.scene, alone.rates, stable.near(frequency), frequency).distance
-    levitation = alone.elsewhere(frequency=frequency, **(losses(alone.scene) if complete else {}))
-    found = equilibrium_at(levitation, near)
+    levitation = alone.elsewhere(frequency=frequency, **(article.losses(alone.scene) if complete else {}))
+    found = article.equilibrium_at(levitation, near)
     if found is None:
         raise EquilibriumError("There is no stable levitation without the plate.")
     return levitation, found
@@ -153,7 +140,7 @@ def plate_damping(point: Point) -> xr.Dataset:
     alone, start = without_plate(case.configuration, case.measure, case.part, case.complete)
     row: dict[str, Any] = {name: point[name] for name in ("value", "sweep", "configuration")}
     row |= {"growth_without": [mode.growth_per_s for mode in start.modes], "rotor_frequency": alone.scene.frequency}
-    found = over_plate(alone, start, case.plate(start.position), case.model, RTOL)
+    found = article.over_plate(alone, start, case.plate(start.position), case.model, RTOL)
     if found:
         beside, there, error = found
         assert beside.plate is not None
@@ -204,11 +191,11 @@ def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
     }
 
 
-@drawn
+@drawing.drawn
 def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
     """Damping rate of each mode against what is varied; crosses: it grows; bars: error of the plate's table."""
     titles, ylabel = [SWEEPS[sweep][0] for sweep in sweeps], "damping rate (1/s)"
-    figure, axes = small_multiples(titles, 3.0, 3, "", ylabel, sharey=True)
+    figure, axes = drawing.small_multiples(titles, 3.0, 3, "", ylabel, sharey=True)
     for panel, sweep in zip(axes, sweeps, strict=True):
         for ending, (words, style, fill) in ENDINGS.items():
             part = part_of(result, sweep + ending)
@@ -217,11 +204,11 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
             varied = part["rotor_frequency"] if sweep == "frequency" else part["value"] * SWEEPS[sweep][2]
             for mode, color in zip(result["mode"].values, PALETTE, strict=False):
                 _damped(panel, varied, part["growth"].sel(mode=mode), part["error"], style, color, fill)
-                explain(panel, {mode_label(mode): "-"}, color=color)
-            explain(panel, {words: style}, mfc=fill, ms=4)
+                drawing.explain(panel, {drawing.mode_label(mode): "-"}, color=color)
+            drawing.explain(panel, {words: style}, mfc=fill, ms=4)
         panel.set_xlabel(SWEEPS[sweep][1])
         if sweep in PLACES:
-            plain_log(panel, DISTANCES)
+            drawing.plain_log(panel, DISTANCES)
         elif sweep != "frequency":
             panel.set_xscale("log")
     return figure
@@ -235,10 +222,10 @@ def _damped(
     axes.plot(x, growth.where(growth >= 0), "x", color=color, ms=5)
     axes.set_yscale("log")
     if (growth >= 0).any():
-        explain(axes, {"growth rate (unstable)": "x"}, ms=5)
+        drawing.explain(axes, {"growth rate (unstable)": "x"}, ms=5)
 
 
-@drawn
+@drawing.drawn
 def rotors_figure(result: xr.Dataset) -> Figure:
     """Damping rate of the least stable mode of every rotor of the article, plate below and beside, face at 18 mm."""
     figure, ((axes,),) = panels(1, 1, 3.4)
@@ -246,8 +233,8 @@ def rotors_figure(result: xr.Dataset) -> Figure:
         part = part_of(result, sweep)
         places = np.arange(part.sizes["case"])
         _damped(axes, places, part["growth"].max("mode"), part["error"], marker, color, None)
-        explain(axes, {f"plate {place}": marker}, color=color, ms=4)
-        axes.set_xticks(places, [rotor_label(c, v) for c, v in _rotors(part)], rotation=90)
+        drawing.explain(axes, {f"plate {place}": marker}, color=color, ms=4)
+        axes.set_xticks(places, [article.rotor_label(c, v) for c, v in _rotors(part)], rotation=90)
     axes.set(xlabel="rotor; face of the plate at 18 mm", ylabel="damping rate of the\nleast stable mode (1/s)")
     return figure
 
@@ -256,11 +243,11 @@ def _rotors(part: xr.Dataset) -> list[tuple[str, float]]:
     return list(zip(part["configuration"].values.tolist(), part["value"].values.tolist(), strict=True))
 
 
-@drawn
+@drawing.drawn
 def means_figure(result: xr.Dataset) -> Figure:
     """What the plate does on average: it moves the floater, pushes it, brakes it and is warmed."""
     titles = [title for title, _ in MEANS.values()]
-    figure, axes = small_multiples(titles, 2.2, 2, "distance of the face (mm)", sharex=True)
+    figure, axes = drawing.small_multiples(titles, 2.2, 2, "distance of the face (mm)", sharex=True)
     for panel, name in zip(axes, MEANS, strict=True):
         for place, line, color in zip(PLACES, ("-", "--"), PALETTE, strict=False):
             for ending, (words, style, fill) in ENDINGS.items():
@@ -270,7 +257,7 @@ def means_figure(result: xr.Dataset) -> Figure:
                     more: Any = {"ms": 4, "color": color, "mfc": fill, "label": f"{place}, {words}"}
                     panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
         panel.set(ylabel=MEANS[name][1], yscale="linear" if name == "lift" else "log")
-        plain_log(panel, DISTANCES)
+        drawing.plain_log(panel, DISTANCES)
     return figure
 
 
@@ -286,12 +273,13 @@ def damping_lines(result: xr.Dataset) -> list[str]:
         for one in each_case(part_of(result, sweep)):
             where = f"plate {sweep}, face at {1e3 * float(one['value']):.1f} mm"
             if sweep in ROTORS:
-                where = f"{rotor_label(one['configuration'].item(), float(one['value']))}, plate {sweep.split(', ')[1]}"
+                rotor = article.rotor_label(one["configuration"].item(), float(one["value"]))
+                where = f"{rotor}, plate {sweep.split(', ')[1]}"
             elif sweep == "frequency":
                 where = f"plate {1e3 * DISTANCE:g} mm below"
             cells, worst = ["no equilibrium", "", *[""] * len(MEANS)], float(one["growth"].max("mode"))
             if np.isfinite(worst):
-                mode = mode_label(one["mode"].values[int(one["growth"].argmax("mode"))])
+                mode = drawing.mode_label(one["mode"].values[int(one["growth"].argmax("mode"))])
                 rate = uncertain(worst, abs(worst) * one["error"])
                 cells = [mode, rate, *(f"{float(v):.3g}" for v in means(one).values())]
             before = f"{float(one['growth_without'].max()):+.1g}"
@@ -451,7 +439,7 @@ def team7_lines(result: xr.Dataset) -> list[str]:
     return lines
 
 
-@drawn
+@drawing.drawn
 def team7_figure(result: xr.Dataset) -> Figure:
     """The four curves with what is measured, and their deviation."""
     figure, ((left, right),) = panels(1, 2, 3.2)
@@ -461,7 +449,7 @@ def team7_figure(result: xr.Dataset) -> Figure:
         left.plot(x, 1e3 * here["computed"], color=color, label=curve)
         left.plot(x, 1e3 * here["measured"], "o", ms=3.5, color=color)
         right.plot(x, 100 * here["deviation"], "o-", ms=3, color=color, label=curve)
-    explain(left, {"computed, at the same places": "-", "measured (COMPEL 1990)": "o"}, ms=3.5)
+    drawing.explain(left, {"computed, at the same places": "-", "measured (COMPEL 1990)": "o"}, ms=3.5)
     right.axhspan(-5, 5, color="0.93", zorder=0)
     left.set(xlabel="x (mm)", ylabel="$B_z$ (mT)")
     right.set(xlabel="x (mm)", ylabel="computed less measured (% of the peak)")

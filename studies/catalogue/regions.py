@@ -21,24 +21,7 @@ from ..figures.style import COLORS, NAMES, PALETTE
 from ..levitation import Levitation
 from ..result import Columns
 from ..study import Point, Study, cases_with, each_case, recorded
-from .article import (
-    CONFIGURATIONS,
-    EDGE,
-    FLIGHT,
-    MODELS,
-    QUICK_ROTORS,
-    article_plate,
-    article_scene,
-    equilibrium_at,
-    label_of,
-    levitated_rotors,
-    levitation_of,
-    losses,
-    over_plate,
-    stable_frequencies,
-    within,
-)
-from .drawing import by_rotor, configuration_panels, drawn, explain, small_multiples
+from . import article, drawing
 from .tables import text_table
 
 # Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
@@ -82,21 +65,21 @@ def map_points(quick: bool) -> list[Point]:
 
     `quick` leaves out the mutual magnetisation and the flights.
     """
-    rotors = {name: (value,) for name, value in QUICK_ROTORS} if quick else MEASURES
+    rotors = {name: (value,) for name, value in article.QUICK_ROTORS} if quick else MEASURES
     return [
         {
             "configuration": c, "measure": m, "model": model, "with_plate": (2 if quick else 5) if known else 0,
             **({} if quick else {"flights": known, "interaction": "auto"}),
         }
-        for c, measures in rotors.items() for m in measures for model in MODELS
-        for known in [model == "fem" and m in CONFIGURATIONS[c].levitated]
+        for c, measures in rotors.items() for m in measures for model in article.MODELS
+        for known in [model == "fem" and m in article.CONFIGURATIONS[c].levitated]
     ]  # fmt: skip
 
 
 def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
-    scene = article_scene(point["configuration"], point["measure"], drag=False)
-    levitation = levitation_of(scene, point["model"], rtol, point.get("interaction", "rigid"))
+    scene = article.rotor_scene(point["configuration"], point["measure"], drag=False)
+    levitation = article.levitation_of(scene, point["model"], rtol, point.get("interaction", "rigid"))
     try:
         ranges = levitating_ranges(scene, levitation.interaction, levitation.rates)
     except EquilibriumError as error:
@@ -122,9 +105,9 @@ def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
 
 def _lasting(alone: Levitation, stable: StableRange, conducts: bool) -> Lasting:
     """Where flights of `FLIGHT` last from spin 0, with all effects."""
-    whole = alone.elsewhere(**losses(alone.scene, conducts))
-    middle = stable.near(float(within(stable, 0.5)))
-    return lasting_frequencies(whole.scene, whole.table, whole.rates, middle.state, middle.parameter, FLIGHT)
+    whole = alone.elsewhere(**article.losses(alone.scene, conducts))
+    middle = stable.near(float(article.within(stable, 0.5)))
+    return lasting_frequencies(whole.scene, whole.table, whole.rates, middle.state, middle.parameter, article.FLIGHT)
 
 
 def _with_plate(alone: Levitation, stable: StableRange, number: int) -> Array:
@@ -137,8 +120,8 @@ def _with_plate(alone: Levitation, stable: StableRange, number: int) -> Array:
             near = at_frequency(alone.scene, alone.rates, stable.near(row[0]), float(row[0]))
         except EquilibriumError:
             continue
-        known = equilibrium_at(there, near.distance)
-        found = known and over_plate(there, known, article_plate(FACE), "slab", PLATE_RTOL)
+        known = article.equilibrium_at(there, near.distance)
+        found = known and article.over_plate(there, known, article.plate_with_face(FACE), "slab", PLATE_RTOL)
         if found:
             row[1:] = found[1].growth_per_s, found[1].distance, found[2]
     return rows
@@ -157,19 +140,19 @@ VERDICTS = (
     ("1", "0.2", "plate: no equilibrium"),
 )
 MARKS = {
-    "insulating": ("<", f"trajectories last {FLIGHT:g} s up to here"),
+    "insulating": ("<", f"trajectories last {article.FLIGHT:g} s up to here"),
     "conducting": ("*", "… with currents in the rotor"),
 }
 
 
-@drawn
+@drawing.drawn
 def map_figure(result: xr.Dataset) -> Figure:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
-    figure, rows = configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)")
+    figure, rows = drawing.configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)")
     for axes, configuration, rotors in rows:
-        for model in MODELS:
+        for model in article.MODELS:
             _region(axes, cases_with(rotors, model=model), COLORS[model])
-            explain(axes, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
+            drawing.explain(axes, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
         true = cases_with(rotors, model="fem")
         growth, frequency = true["plate_growth"].values, true["plate_frequency"].values
         measure = np.broadcast_to(true["measure"].values[:, None], growth.shape)
@@ -180,7 +163,7 @@ def map_figure(result: xr.Dataset) -> Figure:
                 axes.plot(measure[here], frequency[here], marker, color=color, ms=4, mew=0.8, label=label)
         for metal, (marker, words) in MARKS.items() if "high" in true else ():
             axes.plot(true["measure"], true["high"].sel(metal=metal), marker, color="k", ms=5, label=words)
-        axes.set(xlabel=label_of(configuration), ylim=(20, 410))
+        axes.set(xlabel=article.label_of(configuration), ylim=(20, 410))
         axes.margins(x=0.08)
     return figure
 
@@ -198,12 +181,12 @@ def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
                 here = part[name].values[:, k] == kind
                 if here.any():
                     axes.plot(measure[here], values[here], marker, color=color, mfc="white", ms=4)
-                    explain(axes, {words: marker}, mfc="white", ms=4)
+                    drawing.explain(axes, {words: marker}, mfc="white", ms=4)
 
 
 def map_lines(result: xr.Dataset) -> list[str]:
     rows = []
-    for label, rotor in by_rotor(result):
+    for label, rotor in drawing.by_rotor(result):
         for one in each_case(rotor):
             ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
             stable = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
@@ -219,7 +202,7 @@ def map_lines(result: xr.Dataset) -> list[str]:
             ]
             cells = (" and ".join(stable) or "never", ", ".join(plate), " and ".join(lasting))
             rows.append((f"{label}, {one['model'].item()}", *cells))
-    head = ("rotor, model", "stable", "growth with the plate (1/s)", f"trajectories last {FLIGHT:g} s")
+    head = ("rotor, model", "stable", "growth with the plate (1/s)", f"trajectories last {article.FLIGHT:g} s")
     return text_table(head, rows)
 
 
@@ -260,7 +243,7 @@ ENDS = tuple(COLUMNS)[:4]
 
 def limit_points(quick: bool) -> list[Point]:
     """Every rotor that levitated, without and with its metal; `quick` only δx = 2 mm."""
-    rotors = levitated_rotors(False) if not quick else [{"configuration": "horizontal", "measure": 2.0}]
+    rotors = article.levitated_rotors(False) if not quick else [{"configuration": "horizontal", "measure": 2.0}]
     return [
         {**rotor, "variant": variant}
         for rotor in rotors
@@ -273,28 +256,28 @@ def spacer(displacement: float) -> Conductor:
 
     With a displacement x and half an edge a the balance is ρ_m 2a x = ρ_s t (a - x + t/2) for its thickness t.
     """
-    gap, load = EDGE / 2 - displacement, MAGNET_DENSITY / STEEL_DENSITY * EDGE * displacement
+    gap, load = article.EDGE / 2 - displacement, MAGNET_DENSITY / STEEL_DENSITY * article.EDGE * displacement
     thickness = np.sqrt(gap**2 + 2 * load) - gap
     center = np.array([-gap - thickness / 2, 0.0, 0.0])
-    return Conductor(Box(np.array([thickness, EDGE, EDGE]), center), STEEL_CONDUCTIVITY)
+    return Conductor(Box(np.array([thickness, article.EDGE, article.EDGE]), center), STEEL_CONDUCTIVITY)
 
 
 def scene_of(point: Point) -> Scene:
     """The rotor of a point in real air, with the currents that its variant has."""
-    bare, variant = article_scene(point["configuration"], point["measure"], permeability=1.0), point["variant"]
+    bare, variant = article.rotor_scene(point["configuration"], point["measure"], permeability=1.0), point["variant"]
     blocks = (spacer(1e-3 * point["measure"]),) if variant == VARIANTS[2] else ()
-    return replace(bare, conductors=blocks, **losses(bare, variant != VARIANTS[0]))
+    return replace(bare, conductors=blocks, **article.losses(bare, variant != VARIANTS[0]))
 
 
 def upper_limit(point: Point) -> xr.Dataset:
     """How long flights last at each frequency (`step`), and between which they last for the article's 250 s."""
     scene = scene_of(point)
-    bare = article_scene(point["configuration"], point["measure"], permeability=1.0, drag=False)
-    alone, whole = levitation_of(bare, "cuboid"), levitation_of(scene, "cuboid")
-    stable = stable_frequencies(bare, alone.rates)
+    bare = article.rotor_scene(point["configuration"], point["measure"], permeability=1.0, drag=False)
+    alone, whole = article.levitation_of(bare, "cuboid"), article.levitation_of(scene, "cuboid")
+    stable = article.stable_frequencies(bare, alone.rates)
     low, high = stable.low.parameter, stable.high.parameter
     middle = stable.near((low + high) / 2)
-    lasts = lasting_frequencies(scene, whole.interaction, whole.rates, middle.state, middle.parameter, FLIGHT)
+    lasts = lasting_frequencies(scene, whole.interaction, whole.rates, middle.state, middle.parameter, article.FLIGHT)
     grid = np.linspace(low, high, STEPS + 2)[1:-1]
     flights = []
     for frequency in grid:
@@ -306,23 +289,25 @@ def upper_limit(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, found, {})
 
 
-@drawn
+@drawing.drawn
 def limit_figure(result: xr.Dataset) -> Figure:
     """Levitation time against frequency of each rotor, one line for each variant."""
-    rotors = dict(by_rotor(result))
-    figure, axes = small_multiples(list(rotors), 1.9, 4, "frequency (Hz)", "levitation time (s)", sharey=True)
+    rotors = dict(drawing.by_rotor(result))
+    figure, axes = drawing.small_multiples(list(rotors), 1.9, 4, "frequency (Hz)", "levitation time (s)", sharey=True)
     for panel, rotor in zip(axes, rotors.values(), strict=True):
         for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
             frequency, time = one["rotor_frequency"], one["levitated"]
             panel.semilogy(frequency, time, style, ms=3, color=color, label=one["variant"].item())
-        panel.axhline(FLIGHT, color="0.6", lw=0.8, zorder=0, label=f"longest of the experiment, {FLIGHT:g} s")
+        panel.axhline(
+            article.FLIGHT, color="0.6", lw=0.8, zorder=0, label=f"longest of the experiment, {article.FLIGHT:g} s"
+        )
         panel.axhline(LONGEST, color="0.6", lw=0.8, ls=":", zorder=0, label=f"followed no longer, {LONGEST:g} s")
     return figure
 
 
 def limit_lines(result: xr.Dataset) -> list[str]:
     rows, lines = [], []
-    for label, rotor in by_rotor(result):
+    for label, rotor in drawing.by_rotor(result):
         for one in each_case(rotor):
             low, high, start, end = (f"{float(one[name]):.1f}" for name in ENDS)
             lasts = "none" if np.isnan(one["lasts_to"]) else f"{start} to {end} ± 0.5"
@@ -339,7 +324,7 @@ def limit_lines(result: xr.Dataset) -> list[str]:
             f"{label}: a rotor that does not conduct levitates up to {less:.1f} Hz more; at "
             f"{float(first['rotor_frequency'][k]):.1f} Hz its floater stays for {times[0]:g} instead of {times[1]:g} s."
         )
-    head = ("rotor", "stable without losses (Hz)", f"trajectories last {FLIGHT:g} s (Hz)", "then")
+    head = ("rotor", "stable without losses (Hz)", f"trajectories last {article.FLIGHT:g} s (Hz)", "then")
     return [*text_table(head, rows), *lines]
 
 

@@ -18,7 +18,7 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import rotor_ladder, two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
-from spinlev.studies.catalogue.article import FLOATER, article_scene
+from spinlev.studies.catalogue.article import FLOATER, rotor_scene
 from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem
 from spinlev.studies.catalogue.margins import PARAMETERS, QUANTITIES, designed, levitation, nominal, scene_of, slope_by
 from spinlev.studies.catalogue.regions import stability_map
@@ -27,7 +27,7 @@ from spinlev.studies.catalogue.regions import stability_map
 @pytest.fixture(scope="module")
 def tilted():
     """Scene, rates and stable range of the cube tilted by 10° in the field of point dipoles."""
-    scene = article_scene("tilt", 10.0, drag=False)
+    scene = rotor_scene("tilt", 10.0, drag=False)
     rates = Rates(rotor_table(scene.rotor, "dipole"))
     return scene, rates, stable_range(scene, rates, *reference_state(scene))
 
@@ -60,7 +60,7 @@ def test_a_range_ends_where_a_survey_says_so(tilted):
 
 def test_a_narrow_range_is_found_and_a_survey_confirms_it():
     """δx = 5 mm levitates over 4 Hz only, which a search at a few frequencies would miss."""
-    scene = article_scene("horizontal", 5.0, drag=False)
+    scene = rotor_scene("horizontal", 5.0, drag=False)
     table = rotor_table(scene.rotor, "dipole")
     rates = Rates(table)
     (found,) = levitating_ranges(scene, table, rates)
@@ -103,7 +103,7 @@ def test_distance_of_a_sample_is_that_of_a_survey(horizontal):
 @pytest.mark.slow
 def test_a_design_holds_the_floater_where_it_was_wanted():
     found = designed("tilt", 12.7e-3, 25e-3, 100.0)
-    scene = article_scene("tilt", found.measure, drag=False, edge=12.7e-3, permeability=1.0)
+    scene = rotor_scene("tilt", found.measure, drag=False, edge=12.7e-3, permeability=1.0)
     stable = next(e for e in find_equilibria(scene, rotor_table(scene.rotor, "cuboid")) if e.stable)
     assert stable.distance == pytest.approx(25e-3, abs=1e-9)
     assert found.margin == pytest.approx(min(100 - found.low.parameter, found.high.parameter - 100) / 100)

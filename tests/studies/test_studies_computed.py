@@ -18,7 +18,7 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.studies.catalogue import regions
-from spinlev.studies.catalogue.article import article_scene
+from spinlev.studies.catalogue.article import rotor_scene
 from spinlev.studies.catalogue.finite_magnets import dipole_vs_fem
 from spinlev.studies.catalogue.margins import design, designed, sensitivity
 from spinlev.studies.catalogue.regions import stability_map
@@ -102,7 +102,7 @@ def test_a_design_is_stable_up_to_its_margin():
     assert int(found["best"]) == 1
     for end, beyond in (("lowest", -0.5), ("highest", 0.5)):
         measure, frequency = float(chosen["measure"]), float(chosen[end]) + beyond
-        outside = article_scene("tilt", measure, frequency, drag=False, edge=12.7e-3, permeability=1.0)
+        outside = rotor_scene("tilt", measure, frequency, drag=False, edge=12.7e-3, permeability=1.0)
         assert not [e for e in find_equilibria(outside, rotor_table(outside.rotor, "cuboid")) if e.stable]
     margin = min(100 - float(chosen["lowest"]), float(chosen["highest"]) - 100) / 100
     assert float(chosen["margin"]) == pytest.approx(margin)
@@ -127,7 +127,7 @@ def test_a_design_that_cannot_be_built_says_why(rotor, said):
 def test_an_unstable_design_has_no_margin():
     """A search confirms the place and that small motions grow there."""
     found = designed("vertical", 10e-3, 25e-3, 100.0)
-    scene = article_scene("vertical", found.measure, drag=False, permeability=1.0)
+    scene = rotor_scene("vertical", found.measure, drag=False, permeability=1.0)
     there = nearest(scene, "cuboid", 25e-3)
     assert there.distance == pytest.approx(25e-3, abs=1e-9)
     assert not there.stable
@@ -147,7 +147,7 @@ def compared():
 def test_each_model_s_levitation_is_that_of_a_search(compared, model):
     frequency = float(compared["frequency"])
     there = nearest(
-        article_scene("horizontal", 2.0, frequency, drag=False), model, float(compared["distance"].sel(model=model))
+        rotor_scene("horizontal", 2.0, frequency, drag=False), model, float(compared["distance"].sel(model=model))
     )
     here = compared.sel(model=model)
     assert float(here["distance"]) == pytest.approx(there.distance, abs=1e-10)
@@ -171,7 +171,7 @@ def test_causes_go_the_way_that_physics_says(compared):
 @pytest.mark.slow
 def test_with_mutual_magnetisation_a_fold_is_where_the_balance_has_a_double_root():
     """Force and torque vanish, and so does their change along one direction; it lies below the rigid dipole's."""
-    scene = article_scene("tilt", 10.0, drag=False)
+    scene = rotor_scene("tilt", 10.0, drag=False)
     table, start = rotor_table(scene.rotor, "dipole"), reference_state(scene)
     answers = cached_mutual_table(scene.rotor, scene.floater, print)[0]
     rates = Rates(Interaction(table, (Mutual(answers, scene.floater.moment),)))
@@ -194,7 +194,7 @@ def test_a_plate_below_damps_what_is_neutral_without_it():
     assert 60 < float(found["lowest"][0]) < 65
     assert found["high_kind"].values[0] == "oscillatory"
     tried = found.isel(tried=0)
-    alone = article_scene("vertical", 14.0, float(tried["plate_frequency"]), drag=False)
+    alone = rotor_scene("vertical", 14.0, float(tried["plate_frequency"]), drag=False)
     there = min(find_equilibria(alone, rotor_table(alone.rotor, "fem", 1e-2)), key=lambda each: each.growth_per_s)
     assert there.stable
     assert abs(there.growth_per_s) < 1e-6
@@ -206,9 +206,9 @@ def test_a_plate_below_damps_what_is_neutral_without_it():
 
 def test_a_rotor_without_levitation_has_an_empty_row(monkeypatch):
     """Where attraction nowhere carries the weight there is no branch, and a search finds nothing."""
-    scene = article_scene("horizontal", 2.0, drag=False)
+    scene = rotor_scene("horizontal", 2.0, drag=False)
     weak = replace(scene, floater=replace(scene.floater, remanence=1e-3))
-    monkeypatch.setattr(regions, "article_scene", lambda *rotor, **changes: weak)
+    monkeypatch.setattr(regions.article, "rotor_scene", lambda *rotor, **changes: weak)
     asked = {"configuration": "horizontal", "measure": 2.0, "model": "dipole", "with_plate": 2}
     found = stability_map(asked)
     assert np.isnan(found["lowest"]).all()

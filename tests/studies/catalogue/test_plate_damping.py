@@ -8,7 +8,7 @@ import pytest
 from spinlev.dynamics.continuation.frequencies import reference_state, stable_range
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.studies.catalogue.article import article_scene
+from spinlev.studies.catalogue.article import rotor_scene
 from spinlev.studies.catalogue.entries import CATALOGUE
 from spinlev.studies.catalogue.plates import ROTORS, PlateCase, cases, gather_damping, plate_damping
 
@@ -41,7 +41,7 @@ def test_weak_currents_act_in_proportion_to_the_conductivity(weak):
 @pytest.mark.slow
 def test_a_part_of_the_range_is_a_frequency_of_stable_levitation():
     """Half way between the ends, which the closed form knows to some per cent; weak currents damp more than air."""
-    scene = article_scene("tilt", 10.0)
+    scene = rotor_scene("tilt", 10.0)
     rough = stable_range(scene, Rates(rotor_table(scene.rotor, "cuboid")), *reference_state(scene))
     row = plate_damping(asdict(PlateCase("frequency", 0.5, conductivity=WEAK, part=0.5))).isel(case=0)
     middle = (rough.low.parameter + rough.high.parameter) / 2

@@ -8,7 +8,7 @@ from spinlev.fem.elements.second_opinion import coulomb_field
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Scene
 from spinlev.studies.catalogue import article_formulas as formulas
-from spinlev.studies.catalogue.article import CONFIGURATIONS, FLOATER, WEIGHT, article_scene, stable_in_flight
+from spinlev.studies.catalogue.article import CONFIGURATIONS, FLOATER, WEIGHT, rotor_scene, stable_in_flight
 from spinlev.studies.catalogue.article_figures import (
     FIELD_MODELS,
     FORCE_MODELS,
@@ -30,7 +30,7 @@ def test_semi_analytic_force_is_the_dipoles_to_second_order(configuration, value
     """At 60 mm (a, δx)/d is 3e-2, and r ≈ d leaves its square, times at most 8 (from 5 and 3 of the expansion)."""
     distance, frequency = 0.06, 30.0
     found = formulas.force(configuration, value, distance, frequency)
-    scene = article_scene(configuration, value, frequency)
+    scene = rotor_scene(configuration, value, frequency)
     field, gradient = rotor_table(scene.rotor, "dipole").evaluate([[float(found.side), 0.0, -distance]])
     angle = float(found.polar_angle)
     moment = FLOATER.moment * np.array([np.sin(angle), 0.0, np.cos(angle)])
@@ -66,7 +66,7 @@ def test_field_components(configuration, value):
     asked = {"configuration": configuration, "value": value}
     closed = field_components({**asked, "model": "cuboid"}).isel(case=0)
     places = np.array([[0.0, 0.0, -d] for d in closed["distance"].values])
-    expected = sum(coulomb_field(magnet, places) for magnet in article_scene(configuration, value, 100.0).rotor)
+    expected = sum(coulomb_field(magnet, places) for magnet in rotor_scene(configuration, value, 100.0).rotor)
     np.testing.assert_allclose(closed["off_axis"], np.hypot(*expected.T[:2]), rtol=1e-11)
     np.testing.assert_allclose(closed["on_axis"], expected[:, 2], rtol=1e-11)
     dipole = field_components({**asked, "model": "dipole"}).isel(case=0)
@@ -85,7 +85,7 @@ def distances():
 def test_levitation_distance_is_that_of_the_survey(distances):
     found = distances.isel(case=list(distances["model"].values).index("dipole"))
     frequency = 180.0
-    scene = article_scene("horizontal", 1.0, frequency)
+    scene = rotor_scene("horizontal", 1.0, frequency)
     known = find_equilibria(scene, rotor_table(scene.rotor, "dipole"))
     for side, equilibrium in zip(("near", "far"), known[:2], strict=True):
         here = found.sel(side=side, frequency=frequency)
@@ -118,7 +118,7 @@ def test_distance_error_bounds_what_the_permeability_changes(distances):
 
 def test_the_side_mode_balances_the_lateral_force():
     found = side_mode({**ONE, "model": "dipole", "step_hz": 105.0}).isel(case=0).sel(frequency=250.0)
-    scene: Scene = article_scene("horizontal", 1.0, 250.0)
+    scene: Scene = rotor_scene("horizontal", 1.0, 250.0)
     table = rotor_table(scene.rotor, "dipole")
     (state,) = [e.state for e in find_equilibria(scene, table) if e.stable]
     _, gradient = table.evaluate(state.position)
@@ -149,7 +149,7 @@ def test_tipping_points(forces):
 
 
 def test_force_curve_passes_the_equilibrium(forces, distances):
-    scene = article_scene("horizontal", 1.0, 170.0)
+    scene = rotor_scene("horizontal", 1.0, 170.0)
     (known,) = [e for e in find_equilibria(scene, rotor_table(scene.rotor, "dipole")) if e.stable]
     found = forces.isel(case=FORCE_MODELS.index("dipole"), frequency=0)
     assert float(found["equilibrium"]) == pytest.approx(-known.position[2], rel=1e-4)

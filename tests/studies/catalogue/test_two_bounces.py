@@ -7,7 +7,7 @@ import pytest
 
 import spinlev as sl
 from spinlev.dynamics.flights.trajectory import flight_kind
-from spinlev.studies.catalogue.article import article_scene
+from spinlev.studies.catalogue.article import rotor_scene
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 
@@ -54,7 +54,7 @@ def test_two_bounces_in_one_precession_lose_the_floater():
 )
 def test_where_two_bounces_take_as_long_as_a_precession(configuration, measure, spin, frequency):
     """The table of docs/learned.md: within 1 Hz the precession comes down to twice the bounce."""
-    scene, ratios = article_scene(configuration, measure, permeability=1.0, drag=False), []
+    scene, ratios = rotor_scene(configuration, measure, permeability=1.0, drag=False), []
     for beside in (-1.0, 1.0):
         levitation = Levitation(
             replace(scene, frequency=frequency + beside), Models("cuboid", "none", interaction="rigid"), spin

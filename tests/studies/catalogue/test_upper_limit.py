@@ -11,7 +11,7 @@ from spinlev.dynamics.continuation.slow_drift import drift
 from spinlev.dynamics.flights.flight import simulate
 from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.scene.contents import AbsoluteStart
-from spinlev.studies.catalogue.article import article_scene, levitation_of
+from spinlev.studies.catalogue.article import levitation_of, rotor_scene
 from spinlev.studies.catalogue.regions import (
     MAGNET_DENSITY,
     STEEL_DENSITY,
@@ -87,7 +87,7 @@ def test_full_flights_are_lost_when_averaged_ones_are(configuration, measure, va
     """From 3 mm/e⁷ off; which motion that begins is worth an e-fold or two of seven."""
     point = {"configuration": configuration, "measure": measure, "variant": VARIANTS[variant]}
     scene = replace(scene_of(point), frequency=frequency)
-    bare = article_scene(configuration, measure, permeability=1.0, drag=False)
+    bare = rotor_scene(configuration, measure, permeability=1.0, drag=False)
     alone, whole = levitation_of(bare, "cuboid"), levitation_of(scene, "cuboid")
     stable = stable_range(bare, alone.rates, *reference_state(bare))
     start = Scales.of(scene).unpack(at_frequency(bare, alone.rates, stable.near(frequency), frequency).state)
