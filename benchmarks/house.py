@@ -1,7 +1,7 @@
 """How large the house is: lines, files, rooms, imports, comments, and documented arguments. `make house` prints it.
 
 Blank lines and docstrings count as lines. A public function documents its arguments if its docstring, or its class's
-for `__init__`, names each of them.
+for `__init__`, names each of them, or `documented` writes in what is left out.
 """
 
 import ast
@@ -55,7 +55,8 @@ def _arguments_named(tree: ast.Module) -> list[bool]:
                 arguments = [name for name in arguments if name not in ("self", "cls")]
                 text = ast.get_docstring(owner if node.name == "__init__" else node) or ""
                 if len(arguments) >= MANY_ARGUMENTS:
-                    found.append(all(name in text for name in arguments))
+                    written = "documented" in map(ast.unparse, node.decorator_list)
+                    found.append(written or all(name in text for name in arguments))
     return found
 
 

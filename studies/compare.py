@@ -21,12 +21,11 @@ from ..geometry.common import Array, InputError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from .cli.console import note, to_json
-from .cli.options import FieldModel, Models
+from .cli.options import Answer, FieldModel, Models
 from .figures.style import PALETTE, legend_below, panels, save_figures, styled
 from .levitation import Levitation
 from .plan import sources
 from .result import variable, write_dataset
-from .run import Job
 from .words import bracketed, worth_a_row
 
 TRUE_MOMENT, MUTUAL = "dipole, true moment", "{} + mutual"
@@ -279,7 +278,7 @@ def compare_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def compare_job(scene: Scene, asked: Models, spin: float, frequencies: Array | None, out: Path) -> Job:
+def compare_job(scene: Scene, asked: Models, spin: float, frequencies: Array | None, out: Path) -> Answer:
     """Every model's answers about a `scene`; writes compare.nc, compare.json and the figure to `out`."""
     rows = compared(scene, asked, spin)
     best = rows[-1]

@@ -14,6 +14,7 @@ from ..fem.files import write_whole
 from ..fem.rotor.working_point import EasyField, easy_axis, working_points
 from ..geometry.common import InputError
 from .cli.console import note, to_json
+from .cli.options import Answer
 from .figures.run import working_point_figure
 from .figures.style import save_figures
 from .levitation import Levitation
@@ -143,7 +144,7 @@ def write_working_point(levitation: Levitation, out: Path) -> tuple[dict[str, An
     return answer, working_point_lines(answer), files
 
 
-def working_point_job(levitation: Levitation, out: Path) -> tuple[Mapping[str, Any], list[str]]:
+def working_point_job(levitation: Levitation, out: Path) -> Answer:
     """The working point of every magnet; writes working-point.nc, .json and the picture."""
     answer, lines, files = write_working_point(levitation, out)
     error = max(one["error_T"] / abs(one["lowest_mu0H_T"]) for one in answer["working_points"])

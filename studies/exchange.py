@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ from ..fem.rotor.near_field import near_field
 from ..geometry.common import MU_0, Array, InputError
 from ..geometry.scene.contents import AbsoluteStart, Scene
 from .cli.console import note
-from .cli.options import Models
+from .cli.options import Answer, Models
 from .figures.pictures import plate_currents
 from .figures.style import NAMES, colour_bar, panels, save_figures, styled, titled
 from .levitation import Levitation
@@ -94,7 +93,7 @@ CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0
 AIR, ROTOR, FLOATER, PLATE = range(4)
 
 
-def export_job(scene: Scene, asked: Models, path: Path) -> tuple[Mapping[str, Any], list[str]]:
+def export_job(scene: Scene, asked: Models, path: Path) -> Answer:
     """Write B (T), H and M (A/m), J (A/m²) and the body's number of a `scene` with `asked` models to `path`.
 
     Raises
@@ -191,9 +190,7 @@ OFF_EDGE = 1e-6  # points nearer to an edge or to a dipole than this (m) have no
 HIGHEST = 5  # order of the elements in a map; its error is part of it
 
 
-def field_map_job(
-    scene: Scene, plane: str, extent: Array | None, offset: float, steps: int, out: Path
-) -> tuple[Mapping[str, Any], list[str]]:
+def field_map_job(scene: Scene, plane: str, extent: Array | None, offset: float, steps: int, out: Path) -> Answer:
     """Write field-map.nc, .png, .pdf and .vtu of a `scene`'s rotor field on a plane to `out`.
 
     Parameters

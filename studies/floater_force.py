@@ -37,7 +37,6 @@ def floater_force(
 
     Parameters
     ----------
-    scene, model, rtol, progress
     position : array_like
         (n, 3) or (3,) of the floater's centre, m, rotor's frame.
     moment : array_like

@@ -63,10 +63,6 @@ def equilibria(
 ) -> xr.Dataset:
     """All synchronous equilibria, the stable ones first, with errors, growth rate and frequency of each mode.
 
-    Parameters
-    ----------
-    scene, model, plate_model, spin, progress, **asked
-
     Returns
     -------
     xarray.Dataset
@@ -77,8 +73,6 @@ def equilibria(
     ------
     EquilibriumError
         The rotor is at rest and the floater does not spin about its moment.
-    InputError
-        A model, a tolerance or a file that cannot be used.
     """
     levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
     found = Result(levitation, levitation.survey).dataset()
@@ -99,10 +93,8 @@ def compare(
 
     Parameters
     ----------
-    scene
     frequencies : sequence of float, optional
         (n,) of the rotor, Hz, for the branches; left out: about the stable ones.
-    plate_model, spin, rtol, plate_rtol, progress
 
     Returns
     -------
@@ -145,10 +137,6 @@ def stability(
 ) -> xr.Dataset:
     """The five modes of the equilibrium at which a trajectory begins, the nearest stable one if there is one.
 
-    Parameters
-    ----------
-    scene, model, plate_model, spin, progress, **asked
-
     Returns
     -------
     xarray.Dataset
@@ -160,8 +148,6 @@ def stability(
     ------
     EquilibriumError
         There is no equilibrium to begin at.
-    InputError
-        A model, a tolerance or a file that cannot be used.
     """
     levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
     found = found_dataset((levitation.stability,)).isel(equilibrium=0, drop=True).drop_vars("number")
@@ -181,7 +167,6 @@ def simulate(
 
     Parameters
     ----------
-    scene, model, plate_model, progress, **asked
     duration : float
         Simulated time, s.
 
@@ -194,8 +179,6 @@ def simulate(
     ------
     EquilibriumError
         The scene starts from an equilibrium and has none.
-    InputError
-        A model, a tolerance or a file that cannot be used.
     """
     levitation = Levitation(scene, Models(model, plate_model, **asked))
     flown = Result(levitation, flight=levitation.flight(duration)).dataset()
@@ -207,10 +190,6 @@ def rotor_table(
     scene: SceneLike, model: FieldModel = "auto", rtol: float = Models.rtol, progress: bool = False
 ) -> FieldTable:
     """The rotor's field as a table, accurate to `rtol` wherever the floater can be.
-
-    Parameters
-    ----------
-    scene, model, rtol, progress
 
     Returns
     -------
@@ -243,7 +222,6 @@ def field_map(
 
     Parameters
     ----------
-    scene
     plane : {"xz", "xy", "yz"}
         Across and up, in the rotor's frame at t = 0.
     extent : sequence of 4 floats, optional
@@ -252,7 +230,6 @@ def field_map(
         Third coordinate, m.
     steps : int
         Points along the longer side, 5 to 1001.
-    progress
 
     Returns
     -------
@@ -285,20 +262,11 @@ def plate_table(
 ) -> PlateMemory | None:
     """The plate's currents around the place where the floater levitates.
 
-    Parameters
-    ----------
-    scene, model, plate_model, progress, **asked
-
     Returns
     -------
     PlateMemory or None
         Its `table` holds the network, `share` what the rotor drives, `error` the estimated relative error; None where
         no currents are modelled.
-
-    Raises
-    ------
-    InputError
-        A model, a tolerance or a file that cannot be used.
     """
     return Levitation(scene, Models(model, plate_model, **asked)).plate
 
@@ -317,10 +285,6 @@ def working_point(
     lowest if the floater lags by up to a whole turn. No hysteresis: parts below the knee are reported, not followed.
     The models place the floater; in the magnets the field is of finite elements, mutual magnetisation included.
     On an edge it can be infinite; `lowest` keeps 2 % of the edge of a cube of the magnet's volume off all edges.
-
-    Parameters
-    ----------
-    scene, model, rtol, interaction, progress
 
     Returns
     -------
@@ -355,7 +319,6 @@ def ensemble(
 
     Parameters
     ----------
-    scene, model, rtol, interaction, workers, progress
     starts : dict or xarray.Dataset, optional
         By key of the scene file's `[start]`, three numbers for each trajectory (n, 3), or three for all: "offset_mm"
         from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
@@ -443,7 +406,6 @@ def sweep(
 
     Parameters
     ----------
-    scene, model, plate_model, spin, workers, scheduler, progress, **asked
     values : dict of str to list
         By key, numbers for keys of the scene file (`frequency_hz`, `rotor.angle_deg`, `plate.center_mm.2`) and for
         `spin`, names for `model`, `plate_model` and `interaction`.
@@ -453,8 +415,6 @@ def sweep(
         Duration of a trajectory, s.
     place : sequence of 3 floats
         Where the field is asked for, m, rotor's frame.
-    out : str or Path
-        Folder in which finished points are kept until all are done; the same sweep goes on there.
 
     Returns
     -------
@@ -491,13 +451,10 @@ def run_study(
 
     Parameters
     ----------
-    workers, scheduler, progress
     name : str
         Name of the study, as `spinlev study --list` has it.
     quick : bool
         Coarser, in less than a minute.
-    out : str or Path
-        Folder in which finished points are kept until all are done.
 
     Returns
     -------

@@ -29,7 +29,7 @@ from ..geometry.common import MU_0, Array, InputError
 from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
 from .cli.console import note, to_json
-from .cli.options import COLUMNS, Models
+from .cli.options import COLUMNS, Answer, Models
 from .demagnetising import write_working_point
 from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
@@ -40,13 +40,12 @@ from .plan import sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
 from .words import flight_words, headline, left_out_words, tell_details
 
-Job = tuple[Mapping[str, Any], list[str]]  # numbers for a program, lines for a person
 MODELS = ("dipole", "cuboid", "fem")
 SHOWN = 20  # points whose field is printed, at most
 DEEPEST = 0.05  # the field figure reaches this far below the rotor's origin, m
 
 
-def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Job:
+def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Answer:
     """B and its gradient of a `scene` at `points` (n, 3) m by `asked` models; writes field.csv to `out`."""
     levitation = Levitation(scene, asked)
     table = levitation.table
@@ -105,7 +104,7 @@ TIGHTEST = 1e-5  # smallest tolerance that the finite elements reach in minutes
 LOWEST, HIGHEST = 0.5, 250.0  # frequencies for which a reduced table is made at least, Hz
 
 
-def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: float, out: Path) -> Job:
+def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: float, out: Path) -> Answer:
     """B = G m at a dipole's own `place` (3,), m, laboratory frame, and `frequency`, Hz; writes plate.json to `out`.
 
     By a `model` of the `scene`'s plate, to a relative accuracy `rtol`.
@@ -171,7 +170,7 @@ def response(
     return model, tensor, edge_error(plate, place), []
 
 
-def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
+def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Answer:
     """All equilibria of a `scene` with body `spin` by `asked` models, with stability; writes to `out`."""
     levitation = Levitation(scene, asked, spin)
     result = Result(levitation, levitation.survey)
@@ -180,7 +179,7 @@ def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Job:
     return values, result.text()
 
 
-def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Job:
+def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Answer:
     """Trajectory of a `scene` for `duration` (s) by `asked` models; writes trajectory.nc and its figure to `out`.
 
     A checkpoint is kept while it lasts; `resume` goes on from there.
@@ -221,7 +220,7 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
     return values, [*result.text(), f"Trajectory in {path}, figure in {out / 'trajectory.png'}"]
 
 
-def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path) -> Job:
+def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path) -> Answer:
     """Compute everything of a `scene` by `asked` models for a body `spin` and a trajectory of `duration` (s).
 
     Writes result.nc, summary.json and the figures to `out`.

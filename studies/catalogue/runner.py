@@ -19,7 +19,7 @@ from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import check_files, parse_scene
 from ...geometry.solids import moved
 from ..cli.console import note, progress
-from ..cli.options import NAMES, Models, Workers, combinations
+from ..cli.options import NAMES, Answer, Models, Workers, combinations
 from ..compare import compare_figure
 from ..exchange import field_map_figure
 from ..figures.pictures import flight_frames, last_view, plate_currents
@@ -40,7 +40,6 @@ from ..levitation import Levitation
 from ..plan import sources
 from ..question import Question
 from ..result import write_dataset
-from ..run import Job
 from ..study import Point, Study
 from ..sweep import forget, swept
 from .entries import CATALOGUE
@@ -92,13 +91,13 @@ def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
     return found
 
 
-def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Job:
+def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Answer:
     """Compute a study of the catalogue; writes NAME.nc and its figures. Errors: those of `swept`."""
     study = CATALOGUE[name]
     return _studied(study, study.points(quick), engine, out)
 
 
-def question_job(question: Question, values: dict[str, list[Any]], engine: Workers, out: Path) -> Job:
+def question_job(question: Question, values: dict[str, list[Any]], engine: Workers, out: Path) -> Answer:
     """Answer one's own question over a grid; writes question.nc and its figure.
 
     Raises
@@ -130,7 +129,7 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
     )
 
 
-def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> Job:
+def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> Answer:
     name = study.name
     path = out / f"{name}.nc"
     with owned(out):

@@ -1,13 +1,14 @@
-"""The commands; their docstrings are the help.
+"""The commands; their docstrings are the help, and they return numbers for a program and lines for a person.
 
 The numeric libraries are imported in them, once the input has been found good: a wrong scene is answered at once.
 """
 
 import html
 import tempfile
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -93,7 +94,7 @@ def run(
     with owned(output.folder):
         values, lines = main_job(loaded, asked, spin, duration_s, output.folder)
     said = f"Quick: field to {asked.rtol:.1%}, plate's response to {asked.plate_rtol:.0%}; without --quick: to the end."
-    return Answer(values, [*lines, said] if quick else lines, output.json)
+    return values, [*lines, said] if quick else lines
 
 
 def field(
@@ -142,19 +143,18 @@ def field(
         from ..demagnetising import working_point_job
         from ..levitation import Levitation
 
-        return Answer(*working_point_job(Levitation(_loaded(scene), asked), output.folder), output.json)
+        return working_point_job(Levitation(_loaded(scene), asked), output.folder)
     if plane is not None:
         extent = None if extent_mm is None else map_extent(extent_mm)
         check_steps("--steps", steps)
         from ..exchange import field_map_job
 
-        made = field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)
-        return Answer(*made, output.json)
+        return field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)
     assert points is not None
     loaded, places = _loaded(scene), read_points(points)
     from ..run import field_job
 
-    return Answer(*field_job(loaded, places, asked, output.folder), output.json)
+    return field_job(loaded, places, asked, output.folder)
 
 
 def equilibria(scene: SceneFile, *, asked: Models = Models(), spin: Spin = 0.0, output: Output = Output()) -> Answer:
@@ -163,7 +163,7 @@ def equilibria(scene: SceneFile, *, asked: Models = Models(), spin: Spin = 0.0, 
     loaded = _loaded(scene)
     from ..run import equilibria_job
 
-    return Answer(*equilibria_job(loaded, asked.checked(), spin, output.folder), output.json)
+    return equilibria_job(loaded, asked.checked(), spin, output.folder)
 
 
 def compare(
@@ -198,7 +198,7 @@ def compare(
     loaded = _loaded(scene)
     from ..compare import compare_job
 
-    return Answer(*compare_job(loaded, asked, spin, frequencies, output.folder), output.json)
+    return compare_job(loaded, asked, spin, frequencies, output.folder)
 
 
 def simulate(
@@ -219,7 +219,7 @@ def simulate(
     from ..run import simulate_job
 
     with owned(output.folder):
-        return Answer(*simulate_job(loaded, asked.checked(), duration_s, output.folder, resume), output.json)
+        return simulate_job(loaded, asked.checked(), duration_s, output.folder, resume)
 
 
 def plate(
@@ -253,7 +253,7 @@ def plate(
     loaded = _loaded(scene)
     from ..run import plate_job
 
-    return Answer(*plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.folder), output.json)
+    return plate_job(loaded, place * 1e-3, frequency_hz, model, rtol, output.folder)
 
 
 def study(
@@ -311,18 +311,18 @@ def study(
         from ..question import Question
 
         question = Question(loaded, name, ask, asked.checked(), spin, duration_s, tuple(1e-3 * place))
-        return Answer(*question_job(question, values, engine.checked(), output.folder), output.json)
+        return question_job(question, values, engine.checked(), output.folder)
     from ..catalogue.entries import CATALOGUE
 
     if list:
         summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
-        return Answer({"studies": summaries}, [f"{k:22} {v}" for k, v in summaries.items()], output.json)
+        return {"studies": summaries}, [f"{k:22} {v}" for k, v in summaries.items()]
     if name not in CATALOGUE:
         more = " A scene needs --vary." if name and name.endswith(".toml") else ""
         raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.{more}")
     from ..catalogue.runner import study_job
 
-    return Answer(*study_job(name, quick, engine.checked(), output.folder), output.json)
+    return study_job(name, quick, engine.checked(), output.folder)
 
 
 def figure(result: Path, *, output: Output = Output()) -> Answer:
@@ -336,7 +336,7 @@ def figure(result: Path, *, output: Output = Output()) -> Answer:
     from ..catalogue.runner import draw_result
 
     files = draw_result(result, output.out or result.parent)
-    return Answer({"figures": files}, [f"Figure in {file}" for file in files], output.json)
+    return {"figures": files}, [f"Figure in {file}" for file in files]
 
 
 def show(result: Path, *, html: Flag = False, output: Output = Output()) -> Answer:
@@ -352,7 +352,7 @@ def show(result: Path, *, html: Flag = False, output: Output = Output()) -> Answ
     from ..catalogue.runner import show_job
 
     files = show_job(result, output.out or result.parent, html)
-    return Answer({"pictures": files}, [f"Picture in {file}" for file in files], output.json)
+    return {"pictures": files}, [f"Picture in {file}" for file in files]
 
 
 def report(folder: Path, *, output: Output = Output()) -> Answer:
@@ -366,7 +366,7 @@ def report(folder: Path, *, output: Output = Output()) -> Answer:
     from ..catalogue.report import report_job
 
     page, names = report_job(folder, output.out or folder)
-    return Answer({"report": str(page), "results": names}, [f"Report in {page}"], output.json)
+    return {"report": str(page), "results": names}, [f"Report in {page}"]
 
 
 def cite(result: Path, *, output: Output = Output()) -> Answer:
@@ -380,7 +380,7 @@ def cite(result: Path, *, output: Output = Output()) -> Answer:
     from ..catalogue.report import cite_job
 
     references = cite_job(result)
-    return Answer({"references": references}, references, output.json)
+    return {"references": references}, references
 
 
 def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
@@ -394,7 +394,7 @@ def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
         Where to write it; an existing file is left alone.
     """
     path = new_scene(name, file)
-    return Answer({"file": str(path)}, [f"Written: {path}. Next: spinlev run {path}"], output.json)
+    return {"file": str(path)}, [f"Written: {path}. Next: spinlev run {path}"]
 
 
 def export(scene: SceneFile, file: Path, *, asked: Models = Models(), output: Output = Output()) -> Answer:
@@ -408,7 +408,7 @@ def export(scene: SceneFile, file: Path, *, asked: Models = Models(), output: Ou
     loaded = _loaded(scene)
     from ..exchange import export_job
 
-    return Answer(*export_job(loaded, asked.checked(), file), output.json)
+    return export_job(loaded, asked.checked(), file)
 
 
 # A page that leads to another.
@@ -424,7 +424,7 @@ def explore(
     port: int = 0,
     no_browser: Flag = False,
     output: Output = Output(),
-) -> Answer:
+) -> tuple[Mapping[str, Any], list[str], Callable[[], None]]:
     """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, live motion.
 
     It serves until Ctrl-C. The address is the first line of standard output; only who has its token sees the page.
@@ -467,4 +467,4 @@ def explore(
             webbrowser.open(Path(leading.name).as_uri())
             pages.run()
 
-    return Answer({"address": pages.address}, [pages.address], output.json, serving)
+    return {"address": pages.address}, [pages.address], serving

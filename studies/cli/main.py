@@ -20,7 +20,7 @@ from ...geometry.common import SpinlevError, printable
 from ..figures.style import figures_across
 from . import commands
 from .console import FORTRAN, answers_only, heard, is_missing_library, missing_extra, note, to_json, way_out
-from .options import Answer, Output
+from .options import Output
 from .start import STOPPED, TOO_MANY_FILES
 
 LONGEST = 1000  # characters of a line of a message
@@ -97,12 +97,13 @@ def _answer(arguments: list[str], out: Any) -> None:
     began = time.perf_counter()
     said_of_itself = Console(file=out)  # help and version
     command, bound, _ = app.parse_args(arguments, console=said_of_itself, exit_on_error=False, print_error=False)
-    with figures_across(bound.arguments.get("output", Output()).width):
+    output = bound.arguments.get("output", Output())
+    with figures_across(output.width):
         answer = command(*bound.args, **bound.kwargs)
-    if isinstance(answer, Answer):
-        values = {**answer.values, "seconds": time.perf_counter() - began}
-        lines = printable("\n".join(answer.lines))
-        said = to_json(values, getattr(out, "encoding", None)) if answer.json else lines
+    if isinstance(answer, tuple):  # help and version have said theirs
+        values, lines, *then = answer
+        timed = {**values, "seconds": time.perf_counter() - began}
+        said = to_json(timed, getattr(out, "encoding", None)) if output.json else printable("\n".join(lines))
         print(said, file=out, flush=True)
-        if answer.then:
-            answer.then()
+        for follows in then:
+            follows()

@@ -24,6 +24,7 @@ from ...geometry.files import file_content
 from ..figures.style import FigureWidth
 from .console import heard
 
+Answer = tuple[Mapping[str, Any], list[str]]  # of a command: numbers for a program, lines for a person
 COLUMNS = ("x_mm", "y_mm", "z_mm")
 MOST = 50_000_000  # bytes of a file of points: a million of them
 FARTHEST = 1e9  # largest coordinate, mm: beyond, powers of it overflow
@@ -230,16 +231,6 @@ class Output:
         return self.out or Path("out")
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Answer of a command: numbers for a program, lines for a person."""
-
-    values: Mapping[str, Any]
-    lines: Sequence[str]
-    json: bool
-    then: Callable[[], None] | None = None  # what is done once it is said
-
-
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Workers:
@@ -286,24 +277,31 @@ scene : Scene, str or Path
     The scene, or the path of its file.
 spin : float
     Body spin S = Ω·m̂/ω of the floater about its own moment.
+out : str or Path
+    Folder in which finished points are kept until all are done; the same sweep goes on there.
 progress : bool
     Whether messages and a progress bar go to standard error.
 """
-SHARED = {
-    entry[1]: entry[0]
-    for text in (COMMON, Models.__doc__ or "", Workers.__doc__ or "")
-    for entry in re.finditer(r"(?m)^(\w+) : .*(?:\n    .*)*", inspect.cleandoc(text))
-}
+UNUSABLE = "InputError\n    A model, a tolerance or a file that cannot be used."
+SECTIONS = ("Parameters", "Returns", "Raises", "Examples")
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
+def _entries(text: str) -> dict[str, str]:
+    """What a docstring says of each argument."""
+    return {entry[1]: entry[0] for entry in re.finditer(r"(?m)^(\w+) : .*(?:\n    .*)*", text)}
+
+
+SHARED = _entries("\n".join([COMMON, inspect.getdoc(Models) or "", inspect.getdoc(Workers) or ""]))
+
+
 def documented(function: Callable[P, T]) -> Callable[P, T]:
-    """A function whose docstring says in full what the shared arguments are that it only names in a line.
+    """A function whose docstring says what the shared arguments and errors are that it leaves out.
 
     Messages are printed where `progress` is true; of an unknown keyword it says which one it resembles.
     """
-    signature, doc = inspect.signature(function), inspect.cleandoc(function.__doc__ or "")
+    signature = inspect.signature(function)
     known = [*signature.parameters, *Asked.__annotations__]
 
     @wraps(function)
@@ -313,25 +311,20 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
         with heard(bool(signature.bind(*args, **kwargs).arguments.get("progress"))):
             return function(*args, **kwargs)
 
-    def entries(line: re.Match[str]) -> str:
-        names = line[0].replace("**asked", ", ".join(Asked.__annotations__))
-        return "\n".join(SHARED[name] for name in names.split(", "))
-
     own = [parameter for parameter in signature.parameters.values() if parameter.kind != parameter.VAR_KEYWORD]
     if len(own) < len(signature.parameters):  # `**asked`, one by one
         hints = {name: getattr(hint, "__forward_arg__", hint) for name, hint in Asked.__annotations__.items()}
         only = inspect.Parameter.KEYWORD_ONLY
         own += [inspect.Parameter(name, only, default=getattr(Models, name), annotation=hints[name]) for name in hints]
     called.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
-    places = [parameter.name for parameter in own]
-
-    def in_order(section: re.Match[str]) -> str:
-        each = re.findall(r"(?m)^\w.*(?:\n    .*)*", section[2])
-        ordered = sorted(each, key=lambda entry: places.index(re.split(r"\W", entry)[0]))
-        return "\n".join([section[1].rstrip(), *ordered, ""])
-
-    whole = re.sub(rf"(?m)^(?:(?:{'|'.join(SHARED)}|\*\*asked)(?:, |$))+$", entries, doc)
-    called.__doc__ = re.sub(r"(Parameters\n-+\n)((?:.+(?:\n|$))+)", in_order, whole, count=1)
+    summary, *parts = re.split(r"(?m)^(\w+)\n-+\n", inspect.cleandoc(function.__doc__ or ""))
+    sections = {name: text.strip() for name, text in zip(parts[::2], parts[1::2], strict=True)}
+    entries = SHARED | _entries(sections.get("Parameters", ""))
+    sections["Parameters"] = "\n".join(entries[parameter.name] for parameter in own)
+    if "InputError" not in (raised := sections.get("Raises", "")):
+        sections["Raises"] = f"{raised}\n{UNUSABLE}".strip()
+    shown = [f"{name}\n{'-' * len(name)}\n{sections[name]}" for name in SECTIONS if name in sections]
+    called.__doc__ = "\n\n".join([summary.strip(), *shown])
     return called
 
 
