@@ -225,10 +225,19 @@ def label_of_key(key: str) -> dict[str, str]:
     return {"units": ENDS.get(end, "1"), "long_name": name}
 
 
-def columns(table: Columns, found: Mapping[str, Any], **sizes: int) -> dict[str, xr.Variable]:
-    """Variables by name as a table of columns has them; NaN, in these sizes, where nothing was found."""
+def columns(table: Columns, found: Mapping[str, Any] | Sequence[Any], **sizes: int) -> dict[str, xr.Variable]:
+    """Variables by name as a table of columns has them.
+
+    Parameters
+    ----------
+    table : dimensions, unit and label of each quantity
+    found : the quantities by name, or all of them in the table's order
+    sizes : of the dimensions of what was not found, which is NaN
+    """
+    known = found if isinstance(found, Mapping) else dict(zip(table, found, strict=True))
     return {
-        name: variable(dims, found[name] if name in found else np.full([sizes[d] for d in dims], np.nan), unit, label)
+        # an array, as xarray takes a tuple for one value
+        name: variable(dims, np.asarray(known.get(name, np.full([sizes.get(d, 0) for d in dims], np.nan))), unit, label)
         for name, (dims, unit, label) in table.items()
     }
 

@@ -50,14 +50,10 @@ def recorded(
     Parameters
     ----------
     point : that it is of
-    table : dimensions, unit and label of each quantity
-    found : the quantities by name, or all of them in the table's order
+    table, found, sizes : see `columns`
     axes : coordinates
-    sizes : of the dimensions of what was not found, which is NaN
     """
-    pairs = found.items() if isinstance(found, Mapping) else zip(table, found, strict=True)
-    named = {name: np.asarray(values) for name, values in pairs}  # xarray takes a tuple for one value
-    return one_case(point, xr.Dataset(columns(table, named, **sizes), axes))
+    return one_case(point, xr.Dataset(columns(table, found, **sizes), axes))
 
 
 def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:

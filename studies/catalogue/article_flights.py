@@ -298,10 +298,10 @@ def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, second
 @drawn
 def flight_figure(result: xr.Dataset) -> Figure:
     """The distance in each flight, one panel for each displacement."""
-    titles = [article.rotor_label("horizontal", value) for value in result["value"].values]
-    figure, axes = small_multiples(titles, 3.6, xlabel="time (s)", ylabel="levitation distance (mm)", sharey=True)
-    explain(axes[0], {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(result["frequency"].values)})
-    for panel, rotor in zip(axes, each_case(result), strict=True):
+    rotors = {article.rotor_label("horizontal", float(rotor["value"])): rotor for rotor in each_case(result)}
+    figure, rows = small_multiples(rotors, 3.6, 3, "time (s)", "levitation distance (mm)", sharey=True)
+    explain(rows[0][0], {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(result["frequency"].values)})
+    for panel, rotor in rows:
         for k, color in zip(range(rotor.sizes["frequency"]), PALETTE, strict=False):
             one = rotor.isel(frequency=k)
             if one["kind"] == NONE:
@@ -316,7 +316,7 @@ def flight_figure(result: xr.Dataset) -> Figure:
                 mark = "v" if one["averaged_end"] == "fold" else "x"
                 panel.plot(time[last], np.clip(mean[last], 12, 34), mark, color=color, ms=5)
         panel.set_ylim(11, 40)
-    explain(axes[0], {"averaged flight": "--", "lost in a fall": "v", "lost in oscillations": "x"}, ms=4)
+    explain(rows[0][0], {"averaged flight": "--", "lost in a fall": "v", "lost in oscillations": "x"}, ms=4)
     return figure
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
-from typing import Any, ParamSpec
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -35,29 +35,32 @@ def drawn(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
     return inside
 
 
+Shown = TypeVar("Shown")
+
+
 def small_multiples(
-    titles: Sequence[str], height: float, columns: int = 3, xlabel: str = "", ylabel: str = "", **shared: Any
-) -> tuple[Figure, list[Axes]]:
-    """A panel for each title.
+    parts: Mapping[str, Shown], height: float, columns: int = 3, xlabel: str = "", ylabel: str = "", **shared: Any
+) -> tuple[Figure, list[tuple[Axes, Shown]]]:
+    """A panel for each part, beside it.
 
     Parameters
     ----------
-    titles : of the panels, behind their letters
+    parts : what the panels show, by their titles, which stand behind their letters
     height : of a row, inches
     columns : panels side by side, at most
     xlabel, ylabel : of the lowest panel of each column, and of the first of each row
     shared : as of `Figure.subplots`
     """
-    count = len(titles)
+    count = len(parts)
     figure, ((*axes,),) = panels(1, count, height + 0.3, min(columns, count), **shared)
-    for k, (panel, title) in enumerate(zip(axes, titles, strict=True)):
+    for k, (panel, title) in enumerate(zip(axes, parts, strict=True)):
         titled(panel, title)
         if (place := panel.get_subplotspec()).is_first_col():
             panel.set_ylabel(ylabel)
         if k + place.get_gridspec().ncols >= count:
             panel.set_xlabel(xlabel)
             panel.tick_params(labelbottom=True)  # the last in its column, though another row may follow
-    return figure, axes
+    return figure, list(zip(axes, parts.values(), strict=True))
 
 
 def by_configuration(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
@@ -84,10 +87,9 @@ def configuration_panels(
     result: xr.Dataset, height: float, xlabel: str = "", ylabel: str = "", **shared: Any
 ) -> tuple[Figure, list[tuple[Axes, str, xr.Dataset]]]:
     """A panel for each configuration of a joined result, with its name and its cases; options of `small_multiples`."""
-    parts = list(by_configuration(result))
-    titles = [TITLES[name] for name, _ in parts]
-    figure, axes = small_multiples(titles, height, 3, xlabel, ylabel, sharey=True, **shared)
-    return figure, [(panel, *part) for panel, part in zip(axes, parts, strict=True)]
+    parts = {TITLES[name]: (name, part) for name, part in by_configuration(result)}
+    figure, rows = small_multiples(parts, height, 3, xlabel, ylabel, sharey=True, **shared)
+    return figure, [(panel, *part) for panel, part in rows]
 
 
 def rotor_panels(

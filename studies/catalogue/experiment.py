@@ -44,7 +44,7 @@ from .experiment_model import (
     prior_values,
     quantile,
 )
-from .tables import text_table, uncertain
+from .tables import records, text_table, uncertain
 
 KEPT = 1000  # Draws of the posterior that are kept
 TOGETHER = 500  # Draws that are evaluated in one call
@@ -454,24 +454,15 @@ def experiment_numbers(result: xr.Dataset) -> dict[str, Any]:
     """Posterior, facts and evidences as numbers: `unknowns`, `facts`, `evidences`."""
     if "variant" not in result.dims:
         return {"unknowns": [], "facts": [], "evidences": []}
-    one = result.isel(variant=0)
-    chances = facts_weighed(one)[0][["probability", "given_others", "in_fit"]]
-    known = zip(result["unknown"].values, result["unit"].values, quantiles(one).tolist(), strict=True)
-    keys = {"log_evidence": "log_evidence", "error": "log_evidence_error"}
-    keys |= {"by_draws": "log_evidence_drawn", "by_draws_error": "log_evidence_drawn_error"}
+    one, ends = result.isel(variant=0), ("low", "middle", "high")
+    unknowns = one[["unit"]].assign({end: ("unknown", q) for end, q in zip(ends, quantiles(one).T, strict=True)})
+    chances = ("fact", "probability", "given_others", "in_fit")
+    evidence = {"log_evidence": "log_evidence", "error": "log_evidence_error"}
+    evidence |= {"by_draws": "log_evidence_drawn", "by_draws_error": "log_evidence_drawn_error"}
     return {
-        "unknowns": [
-            {"name": str(n), "unit": str(u), "low": low, "middle": middle, "high": high}
-            for n, u, (low, middle, high) in known
-        ],
-        "facts": [
-            {"fact": str(name), **{key: float(value) for key, value in chances.sel(fact=name).items()}}
-            for name in chances["fact"].values
-        ],
-        "evidences": [
-            {"variant": str(name), **{key: float(result[of][k]) for key, of in keys.items()}}
-            for k, name in enumerate(result["variant"].values)
-        ],
+        "unknowns": records(unknowns, {"name": "unknown", "unit": "unit"} | {end: end for end in ends}),
+        "facts": records(facts_weighed(one)[0], {name: name for name in chances}),
+        "evidences": records(result, {"variant": "variant"} | evidence),
     }
 
 

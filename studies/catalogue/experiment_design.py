@@ -265,8 +265,8 @@ def design_row(point: Point, cached: bool = True) -> xr.Dataset:
         return floater.nodes(CONTACT + part * (hanging - CONTACT), spins), hanging
 
     nodes, hanging = NODES.cached((point,), make, lambda _: None)[0] if cached else make()
-    found = dict(zip(DESIGN, (nodes, hanging, part, list(inputs.values())), strict=True))
-    return xr.Dataset(columns(DESIGN, found), {"body_spin": spins, "quantity": list(QUANTITIES), "name": list(inputs)})
+    found = columns(DESIGN, (nodes, hanging, part, list(inputs.values())))
+    return xr.Dataset(found, {"body_spin": spins, "quantity": list(QUANTITIES), "name": list(inputs)})
 
 
 def losses_of(scene: Scene, steel: bool) -> tuple[Dissipation, Dissipation | None]:

@@ -79,7 +79,7 @@ def dipole_validity(quick: bool, rotors: Mapping[str, tuple[Magnet, ...]] = ROTO
         "distance": variable(("distance",), distance, "m", "distance below the lower magnet's centre"),
         "offset": variable(("offset",), offset, "m", "distance from the axis"),
     }
-    return xr.Dataset(columns(VALIDITY, dict(zip(VALIDITY, (errors, gradients, own), strict=True))), coords)
+    return xr.Dataset(columns(VALIDITY, (errors, gradients, own)), coords)
 
 
 def models(magnets: tuple[Magnet, ...], factor: float) -> dict[str, RotorTable]:
@@ -123,17 +123,18 @@ def validity_lines(result: xr.Dataset) -> list[str]:
 @drawn
 def validity_figure(result: xr.Dataset) -> Figure:
     """Error of each model against the distance, on the axis and at the largest lateral offset, rotor by rotor."""
-    names, distance = result["rotor"].values.tolist(), 1e3 * result["distance"].values
-    figure, axes = small_multiples(names, 3.0, xlabel="distance (mm)", ylabel="relative error of B", sharey=True)
-    for panel, rotor in zip(axes, names, strict=True):
+    distance, words = 1e3 * result["distance"].values, ("distance (mm)", "relative error of B")
+    rotors = {rotor: result.sel(rotor=rotor) for rotor in result["rotor"].values.tolist()}
+    figure, rows = small_multiples(rotors, 3.0, 3, *words, sharey=True)
+    for panel, rotor in rows:
         for model, color in zip(result["model"].values, PALETTE, strict=False):
-            error = result["field_error"].sel(rotor=rotor, model=model)
+            error = rotor["field_error"].sel(model=model)
             panel.semilogy(distance, error.isel(offset=0), color=color, label=str(model))
             panel.semilogy(distance, error.isel(offset=-1), ":", color=color)
-        own = result["truth_error"].sel(rotor=rotor)
-        panel.semilogy(distance, own.max("offset"), color="0.6", lw=2.5, label="error of the finite elements")
+        own = rotor["truth_error"].max("offset")
+        panel.semilogy(distance, own, color="0.6", lw=2.5, label="error of the finite elements")
     widest = 1e3 * float(result["offset"][-1])
-    explain(axes[0], {"on the axis": "-", f"{widest:g} mm off the axis, worst azimuth": ":"})
+    explain(rows[0][0], {"on the axis": "-", f"{widest:g} mm off the axis, worst azimuth": ":"})
     return figure
 
 
@@ -337,10 +338,9 @@ LINES = {
 def hard_case_figure(result: xr.Dataset) -> Figure:
     """True and stated error over the distance, a panel for each case with a field."""
     names = [name for name in result["case"].values if float(result["true_error"].sel(case=name).max()) > 0]
-    words = "distance (mm)", "error of B"
-    figure, axes = small_multiples([fill(name, 24) for name in names], 1.5, 4, *words, sharex=True)
-    for panel, name in zip(axes, names, strict=True):
-        row = result.sel(case=name)
+    cases, words = {fill(name, 24): result.sel(case=name) for name in names}, ("distance (mm)", "error of B")
+    figure, rows = small_multiples(cases, 1.5, 4, *words, sharex=True)
+    for panel, row in rows:
         for key, (label, style, color) in LINES.items():
             values = np.where(row[key] > 0, np.maximum(row[key], 1e-17), np.nan)
             panel.loglog(1e3 * row["distance"], values, style, color=color, ms=3, label=label)

@@ -356,7 +356,7 @@ def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, sta
     )
     extra, doubt = both.total - both.rigid, np.abs(fine - coarse) + stable.position_error
     found = (place, extra.force, error.force, extra.torque, linear, fine - place, doubt)
-    return xr.Dataset(columns(SHIFTED, dict(zip(SHIFTED, found, strict=True))), {"axis": list(AXIS)})
+    return xr.Dataset(columns(SHIFTED, found), {"axis": list(AXIS)})
 
 
 def in_the_horizontal_scene(quick: bool) -> xr.Dataset:

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...dynamics.continuation.branch import Family, follow_branch, frequencies, spins
@@ -212,9 +211,9 @@ ENDS = {"linear fall": ":", "stable": "-", "oscillating loss": "--", "24 hours":
 @drawn
 def times_figure(result: xr.Dataset) -> Figure:
     """Levitation time of each rotor against frequency, with the bands of what is not known well."""
-    figure, rows = _rotors(result, "frequency (Hz)", "levitation time (s)")
+    figure, rows = small_multiples(_rotors(result), 2.2, 3, "frequency (Hz)", "levitation time (s)")
     variants = result["variant"].values.tolist()
-    for panel, case, rotor in rows:
+    for panel, rotor in rows:
         frequency, time = rotor["frequency"].values, rotor["levitation_time"]
         for (start, label), color in zip(BANDS.items(), ("0.6", *PALETTE[1:]), strict=False):
             names = ["nominal", *(v for v in variants if v.startswith(start))]
@@ -229,7 +228,7 @@ def times_figure(result: xr.Dataset) -> Figure:
         panel.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
         for number, (mark, words) in enumerate(zip(MARKS.values(), MEANINGS, strict=True)):
             panel.plot(frequency, nominal.where(outcome == number), mark, color=PALETTE[0], ms=3.5, label=words)
-        for there, end in REPORTED.get(case, {}).items():
+        for there, end in REPORTED.get(rotor["case"].item(), {}).items():
             panel.axvline(there, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
         panel.set(ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
     return figure
@@ -238,8 +237,8 @@ def times_figure(result: xr.Dataset) -> Figure:
 @styled
 def flights_figure(result: xr.Dataset) -> Figure:
     """Distance against time in some nominal flights of each rotor, their frequencies by colour."""
-    figure, rows = _rotors(result, "time (s)", "distance (mm)")
-    for panel, _, rotor in rows:
+    figure, rows = small_multiples(_rotors(result), 2.2, 3, "time (s)", "distance (mm)")
+    for panel, rotor in rows:
         nominal, frequency = rotor.sel(variant="nominal"), rotor["frequency"].values
         counted = np.flatnonzero(nominal["levitation_time"].values >= float(result.attrs["shortest_s"]))
         shown = counted[np.unique(np.linspace(0, max(len(counted) - 1, 0), 6).astype(int))] if len(counted) else []
@@ -254,11 +253,10 @@ def flights_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def _rotors(result: xr.Dataset, xlabel: str, ylabel: str) -> tuple[Figure, list[tuple[Axes, str, xr.Dataset]]]:
-    """A panel for each rotor, in the order of its displacement or tilt, with its name and its part of the result."""
+def _rotors(result: xr.Dataset) -> dict[str, xr.Dataset]:
+    """The part of each rotor, in the order of displacement or tilt, by the title of its panel."""
     cases = sorted(result["case"].values.tolist(), key=lambda name: CASES[name][:2])
-    figure, axes = small_multiples([case.replace(" deg", "°") for case in cases], 2.2, 3, xlabel, ylabel)
-    return figure, [(panel, case, result.sel(case=case)) for panel, case in zip(axes, cases, strict=True)]
+    return {case.replace(" deg", "°"): result.sel(case=case) for case in cases}
 
 
 def time_lines(result: xr.Dataset) -> list[str]:

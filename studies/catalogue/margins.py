@@ -441,10 +441,9 @@ def wishes(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
 @drawing.drawn
 def design_figure(result: xr.Dataset) -> Figure:
     """Stability margin against the cubes' edge for every configuration and wish."""
-    asked = dict(wishes(result))
     across, words = len(np.unique(result["wanted_frequency"])), ("edge of the cubes (mm)", "margin in frequency")
-    figure, axes = drawing.small_multiples(list(asked), 2.3, across, *words, sharex=True)
-    for panel, answers in zip(axes, asked.values(), strict=True):
+    figure, rows = drawing.small_multiples(dict(wishes(result)), 2.3, across, *words, sharex=True)
+    for panel, answers in rows:
         for configuration, color in zip(article.CONFIGURATIONS, PALETTE, strict=False):
             one = case_with(answers, configuration=configuration)
             panel.plot(1e3 * one["edge"], one["margin"], "o", ms=4, color=color, label=drawing.TITLES[configuration])

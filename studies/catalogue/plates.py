@@ -194,9 +194,9 @@ def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
 @drawing.drawn
 def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
     """Damping rate of each mode against what is varied; crosses: it grows; bars: error of the plate's table."""
-    titles, ylabel = [SWEEPS[sweep][0] for sweep in sweeps], "damping rate (1/s)"
-    figure, axes = drawing.small_multiples(titles, 3.0, 3, "", ylabel, sharey=True)
-    for panel, sweep in zip(axes, sweeps, strict=True):
+    titles = {SWEEPS[sweep][0]: sweep for sweep in sweeps}
+    figure, rows = drawing.small_multiples(titles, 3.0, 3, ylabel="damping rate (1/s)", sharey=True)
+    for panel, sweep in rows:
         for ending, (words, style, fill) in ENDINGS.items():
             part = part_of(result, sweep + ending)
             if not part.sizes["case"]:
@@ -234,21 +234,18 @@ def rotors_figure(result: xr.Dataset) -> Figure:
         places = np.arange(part.sizes["case"])
         _damped(axes, places, part["growth"].max("mode"), part["error"], marker, color, None)
         drawing.explain(axes, {f"plate {place}": marker}, color=color, ms=4)
-        axes.set_xticks(places, [article.rotor_label(c, v) for c, v in _rotors(part)], rotation=90)
+        rotors = zip(part["configuration"].values.tolist(), part["value"].values.tolist(), strict=True)
+        axes.set_xticks(places, [article.rotor_label(*rotor) for rotor in rotors], rotation=90)
     axes.set(xlabel="rotor; face of the plate at 18 mm", ylabel="damping rate of the\nleast stable mode (1/s)")
     return figure
-
-
-def _rotors(part: xr.Dataset) -> list[tuple[str, float]]:
-    return list(zip(part["configuration"].values.tolist(), part["value"].values.tolist(), strict=True))
 
 
 @drawing.drawn
 def means_figure(result: xr.Dataset) -> Figure:
     """What the plate does on average: it moves the floater, pushes it, brakes it and is warmed."""
-    titles = [title for title, _ in MEANS.values()]
-    figure, axes = drawing.small_multiples(titles, 2.2, 2, "distance of the face (mm)", sharex=True)
-    for panel, name in zip(axes, MEANS, strict=True):
+    titles = {title: (name, label) for name, (title, label) in MEANS.items()}
+    figure, rows = drawing.small_multiples(titles, 2.2, 2, "distance of the face (mm)", sharex=True)
+    for panel, (name, label) in rows:
         for place, line, color in zip(PLACES, ("-", "--"), PALETTE, strict=False):
             for ending, (words, style, fill) in ENDINGS.items():
                 part = part_of(result, place + ending)
@@ -256,7 +253,7 @@ def means_figure(result: xr.Dataset) -> Figure:
                     values, marks = means(part)[name], style[0] if ending else f"{style[0]}{line}"
                     more: Any = {"ms": 4, "color": color, "mfc": fill, "label": f"{place}, {words}"}
                     panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
-        panel.set(ylabel=MEANS[name][1], yscale="linear" if name == "lift" else "log")
+        panel.set(ylabel=label, yscale="linear" if name == "lift" else "log")
         drawing.plain_log(panel, DISTANCES)
     return figure
 
@@ -386,15 +383,11 @@ def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3
     return np.column_stack([total.real, -total.imag])
 
 
-def team7(order: int = 3) -> xr.Dataset:
-    """Measured and computed B_z on the line, in T, and their deviation in units of the line's peak."""
+def team7(quick: bool = False, order: int = 0) -> xr.Dataset:
+    """B_z on the line, measured and computed by elements of an order, else the third or `quick` the second."""
     x, measured = measured_line()
-    return compared(x, measured, np.hstack([compute_line(f, x, team7_mesh(f), order) for f in FREQUENCIES]))
-
-
-def team7_study(quick: bool) -> xr.Dataset:
-    """`team7` by elements of second or third order."""
-    return team7(order=2 if quick else 3)
+    lines = [compute_line(f, x, team7_mesh(f), order or (2 if quick else 3)) for f in FREQUENCIES]
+    return compared(x, measured, np.hstack(lines))
 
 
 LINE: Columns = {
@@ -413,8 +406,7 @@ def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
     measured, computed : B_z (17, 4) T
     """
     amplitude = np.hypot(measured[:, 0::2], measured[:, 1::2]).max(axis=0)
-    found = (measured, computed, (computed - measured) / np.repeat(amplitude, 2))
-    data = columns(LINE, dict(zip(LINE, found, strict=True)))
+    data = columns(LINE, (measured, computed, (computed - measured) / np.repeat(amplitude, 2)))
     return xr.Dataset(data, {"x": variable(("x",), x, "m", "x"), "curve": list(CURVES)})
 
 
@@ -459,7 +451,7 @@ def team7_figure(result: xr.Dataset) -> Figure:
 TEAM7 = study_of_one(
     name="team7",
     summary="eddy currents against the measurement of TEAM workshop problem 7",
-    compute=team7_study,
+    compute=team7,
     figures={"team7": team7_figure},
     report=team7_lines,
 )

@@ -22,7 +22,7 @@ from ..levitation import Levitation
 from ..result import Columns
 from ..study import Point, Study, cases_with, each_case, recorded
 from . import article, drawing
-from .tables import text_table
+from .tables import records, text_table
 
 # Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
 #
@@ -292,9 +292,9 @@ def upper_limit(point: Point) -> xr.Dataset:
 @drawing.drawn
 def limit_figure(result: xr.Dataset) -> Figure:
     """Levitation time against frequency of each rotor, one line for each variant."""
-    rotors = dict(drawing.by_rotor(result))
-    figure, axes = drawing.small_multiples(list(rotors), 1.9, 4, "frequency (Hz)", "levitation time (s)", sharey=True)
-    for panel, rotor in zip(axes, rotors.values(), strict=True):
+    rotors, words = dict(drawing.by_rotor(result)), ("frequency (Hz)", "levitation time (s)")
+    figure, rows = drawing.small_multiples(rotors, 1.9, 4, *words, sharey=True)
+    for panel, rotor in rows:
         for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
             frequency, time = one["rotor_frequency"], one["levitated"]
             panel.semilogy(frequency, time, style, ms=3, color=color, label=one["variant"].item())
@@ -330,16 +330,8 @@ def limit_lines(result: xr.Dataset) -> list[str]:
 
 def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
     """Ends of lasting flights by rotor and variant as numbers: `limits`."""
-    rows = [
-        {
-            "configuration": one["configuration"].item(),
-            "value": float(one["measure"]),
-            "variant": one["variant"].item(),
-            **{f"{name}_hz": None if np.isnan(one[name]) else float(one[name]) for name in ENDS},
-        }
-        for one in each_case(result)
-    ]
-    return {"limits": rows}
+    names = {"configuration": "configuration", "value": "measure", "variant": "variant"}
+    return {"limits": records(result, names | {f"{name}_hz": name for name in ENDS})}
 
 
 UPPER_LIMIT = Study(

@@ -272,9 +272,7 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
         row, (b, g, own) = apart(name, quick), truths[method.problem]
         errors.append([_largest(row.field, b, 1), _largest(row.gradient, g, 2), row.stated, own])
         costs.append(list(row.costs.values()))
-    found = (*np.array(errors).swapaxes(0, 1), *np.array(costs, float).T)
-    both = {**ERRORS, **COSTS}
-    data = columns(both, dict(zip(both, found, strict=True)))
+    data = columns({**ERRORS, **COSTS}, (*np.array(errors).swapaxes(0, 1), *np.array(costs, float).T))
     coords = {
         "approach": list(catalogue),
         "family": ("approach", [method.family for method in catalogue.values()]),
@@ -312,12 +310,12 @@ def speed_lines(result: xr.Dataset) -> list[str]:
 @drawn
 def speed_figure(result: xr.Dataset) -> Figure:
     """Error of B at 20 mm against the time from nothing, for both problems; open: the error that is stated."""
-    titles = {"exact": "μr = 1 (closed form known)", "permeable": "μr = 1.05"}
+    titles = {"μr = 1 (closed form known)": "exact", "μr = 1.05": "permeable"}
     words = "processor time from nothing (s)", "relative error of B at 20 mm"
-    figure, axes = small_multiples(list(titles.values()), 3.4, 2, *words, sharey=True)
+    figure, panels = small_multiples(titles, 3.4, 2, *words, sharey=True)
     at = result.sel(distance=0.02)
     families = dict.fromkeys(result["family"].values.tolist())
-    for panel, problem in zip(axes, titles, strict=True):
+    for panel, problem in panels:
         for family, color in zip(families, [*PALETTE, "0.4"], strict=False):
             rows = at.isel(approach=np.flatnonzero((at["family"] == family) & (at["problem"] == problem)))
             panel.loglog(rows["cpu_seconds"], np.maximum(rows["field_error"], 1e-16), "o-", ms=4, color=color)
@@ -327,7 +325,7 @@ def speed_figure(result: xr.Dataset) -> Figure:
         own = float(at["truth_error"].where(at["problem"] == problem).max())
         panel.axhspan(1e-17, max(own, 1e-16), facecolor="0.9", edgecolor="0.6", label="error of the reference")
         panel.set_ylim(1e-16, None)
-    explain(axes[0], {"error that the table states": "o"}, mfc="none", ms=4)
+    explain(panels[0][0], {"error that the table states": "o"}, mfc="none", ms=4)
     return figure
 
 

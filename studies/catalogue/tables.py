@@ -1,6 +1,6 @@
 """Tables and numbers of reports as text."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, SupportsFloat
 
 import numpy as np
@@ -22,6 +22,18 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[st
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     sides = ["<"] + [">"] * (len(widths) - 1)
     return ["  ".join(f"{c:{s}{w}}" for c, s, w in zip(row, sides, widths, strict=True)).rstrip() for row in cells]
+
+
+def records(dataset: xr.Dataset, keys: Mapping[str, str]) -> list[dict[str, Any]]:
+    """What each place along the dimension of some variables has, for JSON: their values by key, None for NaN.
+
+    Parameters
+    ----------
+    dataset : with the variables
+    keys : the variable of each key, all over the same single dimension
+    """
+    found = zip(*(dataset[name].values.tolist() for name in keys.values()), strict=True)
+    return [{key: None if each != each else each for key, each in zip(keys, row, strict=True)} for row in found]
 
 
 def span(values: ArrayLike, digits: str = ".3g") -> str:
