@@ -43,10 +43,7 @@ ROTORS = {
 }
 VALIDITY: Columns = {
     "field_error": (("rotor", "model", "distance", "offset"), "1", "largest relative error of B over the azimuth"),
-    "gradient_error": (
-        *(("rotor", "model", "distance", "offset"), "1"),
-        "largest relative error of the gradient of B",
-    ),
+    "gradient_error": (("rotor", "model", "distance", "offset"), "1", "largest relative error of grad B over it"),
     "truth_error": (("rotor", "distance", "offset"), "1", "stated relative error of the truth"),
 }
 AZIMUTHS = np.radians(np.arange(0.0, 360.0, 30.0))

@@ -263,11 +263,15 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     """
     rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
     alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))
-    depths = np.array(distances if distances is not None else _depths(scene, 8 if quick else 24))
+    if distances is None:  # from contact on the axis, evenly in their logarithm
+        step = 1e-5
+        depths = np.arange(0.0, FARTHEST, step)
+        gap = np.min([m.body.distance(_on_axis(depths)) for m in scene.rotor], axis=0) - scene.floater.radius
+        distances = np.geomspace(depths[gap < 0].max(initial=0.0) + step, FARTHEST, 8 if quick else 24).tolist()
+    places = _on_axis(np.array(distances))
     stable = next((e for e in alone.equilibria if e.stable), None)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
     balance = Balance(Rates(with_effects(scene, alone.table)), values, 0.0)
-    places = _on_axis(depths)
     start, guess = (stable.distance, stable.state.moment) if stable else (FARTHEST, np.array([-1.0, 0.0, 0.0]))
     dataset = missed(rotors, scene.floater, places, balanced_directions(scene, balance, places, start, guess))
     weight = scene.floater.mass * float(np.linalg.norm(scene.gravity))
@@ -277,14 +281,6 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
 
 def _on_axis(depths: Array) -> Array:
     return np.stack([0 * depths, 0 * depths, -depths], axis=1)
-
-
-def _depths(scene: Scene, number: int) -> Array:
-    """From contact on the axis to `FARTHEST`, evenly in their logarithm."""
-    step = 1e-5
-    heights = np.arange(0.0, FARTHEST, step)
-    gap = np.min([magnet.body.distance(_on_axis(heights)) for magnet in scene.rotor], axis=0) - scene.floater.radius
-    return np.geomspace(heights[gap < 0].max(initial=0.0) + step, FARTHEST, number)
 
 
 def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:

@@ -158,11 +158,6 @@ def plate_damping(point: Point) -> xr.Dataset:
     ).expand_dims("case")
 
 
-def gather_damping(parts: Sequence[xr.Dataset]) -> xr.Dataset:
-    """The plates one after the other."""
-    return xr.concat(parts, "case", data_vars="minimal", coords="minimal", compat="override", join="exact")
-
-
 SWEEPS = {
     "below": ("plate below", "distance of the face (mm)", 1e3),
     "beside": ("plate standing beside", "distance of the face (mm)", 1e3),
@@ -311,7 +306,6 @@ PLATE_DAMPING = Study(
     summary="what a plate does to each mode, against its place, conductivity and thickness",
     points=lambda quick: [asdict(case) for case in cases(quick)],
     compute=plate_damping,
-    gather=gather_damping,
     figures={
         "plate-damping-distance": partial(growth_figure, sweeps=PLACES),
         "plate-damping-material": partial(growth_figure, sweeps=("frequency", "conductivity", "thickness")),

@@ -96,18 +96,14 @@ def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
     table, axes, found = INTERVAL, {}, [*rows, *kinds, *plate.T]
     if "flights" in point:
         lasting = [Lasting()] * len(METAL)
-        if ranges and point["flights"]:
-            lasting = [_lasting(levitation, ranges[0], conducts) for conducts in METAL.values()]
+        if ranges and point["flights"]:  # from spin 0, with all effects
+            middle = ranges[0].near(float(article.within(ranges[0], 0.5)))
+            there = [levitation.elsewhere(**article.losses(scene, conducts)) for conducts in METAL.values()]
+            start = middle.state, middle.parameter, article.FLIGHT
+            lasting = [lasting_frequencies(each.scene, each.table, each.rates, *start) for each in there]
         found += [np.array([getattr(one, name) for one in lasting]) for name in LASTING]
         table, axes = {**INTERVAL, **LASTING}, {"metal": list(METAL)}
     return recorded(point, table, found, axes)
-
-
-def _lasting(alone: Levitation, stable: StableRange, conducts: bool) -> Lasting:
-    """Where flights of `FLIGHT` last from spin 0, with all effects."""
-    whole = alone.elsewhere(**article.losses(alone.scene, conducts))
-    middle = stable.near(float(article.within(stable, 0.5)))
-    return lasting_frequencies(whole.scene, whole.table, whole.rates, middle.state, middle.parameter, article.FLIGHT)
 
 
 def _with_plate(alone: Levitation, stable: StableRange, number: int) -> Array:

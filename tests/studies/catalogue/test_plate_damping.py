@@ -10,7 +10,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.studies.catalogue.article import rotor_scene
 from spinlev.studies.catalogue.entries import CATALOGUE
-from spinlev.studies.catalogue.plates import ROTORS, PlateCase, cases, gather_damping, plate_damping
+from spinlev.studies.catalogue.plates import ROTORS, PlateCase, cases, plate_damping
 
 STUDY = CATALOGUE["plate-damping"]
 WEAK = 2e4
@@ -23,7 +23,7 @@ def weak():
     below = PlateCase("below", 0.018, conductivity=WEAK)
     poor = [below, replace(below, conductivity=2 * WEAK), PlateCase("beside", 0.018, upright=True, conductivity=WEAK)]
     rotors = [replace(case, sweep=sweep, value=10.0) for case, sweep in zip(poor[::2], ROTORS, strict=True)]
-    return gather_damping([plate_damping(asdict(case)) for case in (*poor, *rotors)])
+    return STUDY.gather([plate_damping(asdict(case)) for case in (*poor, *rotors)])
 
 
 @pytest.mark.slow
