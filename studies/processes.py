@@ -50,7 +50,9 @@ def program() -> str:
     return program_digest()
 
 
-def results(number: int, function: Function, items: deque[Any]) -> Generator[tuple[Any, Any], None, None]:
+def results(
+    number: int, function: Function, items: deque[Any], quiet: bool = False
+) -> Generator[tuple[Any, Any], None, None]:
     """Results of a function for each item as they come, with their item; a `Death` in place of what is missing.
 
     Parameters
@@ -58,6 +60,7 @@ def results(number: int, function: Function, items: deque[Any]) -> Generator[tup
     number : of processes, at most
     function : gives an iterable
     items : who iterates may append others
+    quiet : whether nobody hears what libraries print there
 
     Raises
     ------
@@ -70,7 +73,7 @@ def results(number: int, function: Function, items: deque[Any]) -> Generator[tup
         while items or busy:
             while items and (free or len(busy) < number):
                 try:
-                    process = free.pop() if free else _Process(function)
+                    process = free.pop() if free else _Process(function, quiet)
                 except OSError as error:  # too many open files or processes, too little memory
                     number = _fewer(len(busy), str(error))
                     break
@@ -147,7 +150,7 @@ def safe_path() -> Iterator[None]:
 
 
 class _Process:
-    def __init__(self, function: Function) -> None:
+    def __init__(self, function: Function, quiet: bool) -> None:
         self.ready = False
         self.connection, other = Pipe()
         one_thread = dict.fromkeys(THREADS, "1") | {"MALLOC_TRIM_THRESHOLD_": "65536"}
@@ -157,6 +160,8 @@ class _Process:
                     [sys.executable, "-P", "-c", BEGIN.format(module=__name__), str(other.fileno())],
                     pass_fds=(other.fileno(),),
                     stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL if quiet else None,
+                    stderr=subprocess.DEVNULL if quiet else None,
                     env=one_thread | dict(os.environ),
                     process_group=0,  # Ctrl-C at the terminal is for this process, which then ends the other
                 )

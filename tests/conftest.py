@@ -74,7 +74,7 @@ def unprinted(monkeypatch):
 def undrawn(monkeypatch, unprinted):
     """The same, and without the process that draws in three dimensions, two seconds each time."""
 
-    def written(pictures, progress, command):
-        return iter([b"not drawn"] * len(pictures))
+    def written(pictures, progress=None):
+        yield from [b"not drawn"] * len(pictures)
 
-    monkeypatch.setattr("spinlev.studies.figures.renderer._rendered", written)
+    monkeypatch.setattr("spinlev.studies.figures.renderer.drawn", written)

@@ -6,7 +6,6 @@ import importlib.util
 import io
 import json
 import logging
-import math
 import os
 import platform
 import sys
@@ -278,20 +277,10 @@ def answers_only() -> Iterator[TextIO]:
         os.close(kept)
 
 
-def plain(value: Any) -> Any:
-    """A value in types that JSON knows; what is not finite becomes null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if hasattr(value, "tolist"):  # of NumPy
-        return plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
-
-
 def to_json(answer: Mapping[str, Any], encoding: str | None = "utf-8") -> str:
-    """One JSON object; escapes stand for the characters that `encoding` may not have."""
+    """One JSON object, null for what is not finite; escapes stand for the characters that `encoding` may not have."""
+    from pydantic_core import to_jsonable_python
+
     escaped = encoding is not None and not encoding.lower().startswith("utf")
-    return json.dumps(plain(answer), allow_nan=False, ensure_ascii=escaped)
+    plain = to_jsonable_python(answer, inf_nan_mode="null", fallback=lambda array: array.tolist())
+    return json.dumps(plain, allow_nan=False, ensure_ascii=escaped)

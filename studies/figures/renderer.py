@@ -1,25 +1,24 @@
-"""Pictures in three dimensions, drawn by a process of its own: `python -m` this module.
+"""Pictures in three dimensions, drawn by a process of its own.
 
 VTK ends the process that calls it, without a word, where it finds no graphics library: a computation must survive that.
-Pictures go to the process pickled, through its standard input; its answers come back the same way: a finished picture
-(bytes), the part of all that is done (float), or the reason why there is no more (str).
 """
 
 import io
 import os
-import pickle
-import signal
-import subprocess
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
+from ...fem.files import write_whole
 from ...geometry.common import ComputationError
+from ..cli.console import DRAWING, is_missing_library, missing_extra, way_out
+from ..processes import Death, results
 from .view import Sample
 
-COMMAND = (sys.executable, "-P", "-m", f"{__package__}.renderer")
+Told = Callable[[float], None]  # hears of the finished part of all
 
 
 class RenderError(ComputationError):
@@ -29,46 +28,42 @@ class RenderError(ComputationError):
 class Picture(Protocol):
     """What can be drawn: numbers that can be pickled."""
 
-    def draw(self, progress: Callable[[float], None]) -> bytes:
-        """The file's content; called in the other process."""
+    def draw(self) -> Iterator[float | bytes]:
+        """The finished part, now and then, and last the file's content; iterated in the other process."""
 
 
-def render(
-    pictures: Mapping[Path, Picture],
-    progress: Callable[[float], None] = lambda fraction: None,
-    command: Sequence[str] = COMMAND,
-) -> None:
+def render(pictures: Mapping[Path, Picture], progress: Told = lambda fraction: None) -> None:
     """Draw pictures, all in one process, and write each as soon as it is finished.
 
     Parameters
     ----------
     pictures : by the file that each becomes
     progress : is told the part of all that is done
-    command : begins the process
 
     Raises
     ------
     RenderError : the process died or found no way to draw; no older picture is left where one could not be drawn
     OSError : a file cannot be written
     """
-    from ...fem.files import write_whole
-
     for path in pictures:
         path.unlink(missing_ok=True)
     left = list(pictures)
-    for answer in _rendered(list(pictures.values()), progress, command):
-        if isinstance(answer, str):
-            names = ", ".join(path.name for path in left)
-            raise RenderError(f"The 3-D pictures are left out ({names}): {answer}")
-        write_whole(left.pop(0), answer)
+    try:
+        with closing(drawn(list(pictures.values()), progress)) as contents:
+            for content in contents:
+                write_whole(left.pop(0), content)
+    except RenderError as error:
+        names = ", ".join(path.name for path in left)
+        raise RenderError(f"The 3-D pictures are left out ({names}): {error}") from None
 
 
 def rendered(picture: Picture) -> bytes:
     """One picture as the content of a file. Raises RenderError where it cannot be drawn."""
-    (answer,) = _rendered([picture], lambda fraction: None, COMMAND)
-    if isinstance(answer, str):
-        raise RenderError(f"The view in three dimensions is left out: {answer}")
-    return answer
+    try:
+        (content,) = drawn([picture])
+    except RenderError as error:
+        raise RenderError(f"The view in three dimensions is left out: {error}") from None
+    return content
 
 
 def turnable_page(scene: bytes) -> bytes:
@@ -81,80 +76,43 @@ def turnable_page(scene: bytes) -> bytes:
 
 
 @cache
-def unavailable(command: Sequence[str] = COMMAND) -> str | None:
+def unavailable() -> str | None:
     """Why nothing can be drawn in three dimensions on this machine; None where a small picture can."""
-    (answer,) = _rendered([Sample()], lambda fraction: None, command)
-    return f"No 3-D pictures can be drawn: {answer}" if isinstance(answer, str) else None
+    try:
+        list(drawn([Sample()]))
+    except RenderError as error:
+        return f"No 3-D pictures can be drawn: {error}"
+    return None
 
 
-def _rendered(
-    pictures: Sequence[Picture], progress: Callable[[float], None], command: Sequence[str]
-) -> Iterator[bytes | str]:
-    """The files' contents, one after the other; where that fails, last the reason."""
-    messages = None if "SPINLEV_TRACEBACK" in os.environ else subprocess.DEVNULL
-    pipe = subprocess.PIPE
-    # Ctrl-C at the terminal is for this process, which then ends the other: hence a group of its own.
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=messages, process_group=0) as process:
-        try:
-            unfinished = len(pictures)
-            for answer in _answers(process, pickle.dumps(pictures)):
+def drawn(pictures: Sequence[Picture], progress: Told = lambda fraction: None) -> Generator[bytes, None, None]:
+    """The files' contents, one after the other. Raises RenderError, the end of a sentence: why there are no more."""
+    try:
+        with closing(results(1, _drawing, deque([pictures]), quiet="SPINLEV_TRACEBACK" not in os.environ)) as answers:
+            for _, answer in answers:
                 if isinstance(answer, float):
                     progress(answer)
+                elif isinstance(answer, Death):
+                    said = f"the process that draws them {answer.how}, as it does without graphics libraries."
+                    raise RenderError(f"{said} {way_out(DRAWING)}")
+                elif isinstance(answer, str):
+                    raise RenderError(answer)
                 else:
                     yield answer
-                    unfinished = 0 if isinstance(answer, str) else unfinished - 1
-            if unfinished:
-                yield _death(process.wait())
-        except BaseException:
-            process.kill()
-            process.wait()  # leaving the block would not, after Ctrl-C
-            raise
+    except RenderError:
+        raise
+    except ComputationError as error:  # no process can begin, or it is of another version
+        raise RenderError(str(error)) from None
 
 
-def _answers(process: subprocess.Popen[bytes], question: bytes) -> Iterator[bytes | float | str]:
-    """What the process says until it ends."""
-    assert process.stdin
-    assert process.stdout
+def _drawing(pictures: Sequence[Picture]) -> Iterator[float | bytes | str]:
+    """What the process that draws answers: finished parts, contents, and the reason where there is no more."""
     try:
-        with process.stdin as stream:
-            stream.write(question)
-        while True:
-            yield pickle.load(process.stdout)
-    except (BrokenPipeError, EOFError, pickle.UnpicklingError):  # it has ended, perhaps in the middle of a word
-        return
-
-
-def _death(status: int) -> str:
-    """How the process ended too early, and what would help."""
-    from ..cli.console import DRAWING, way_out
-
-    if status == -signal.SIGKILL:
-        return "the process that draws them was killed; too little memory may be the reason."
-    how = signal.strsignal(-status) if status < 0 else f"exit status {status}"
-    return f"the process that draws them died ({how}), as it does without graphics libraries. {way_out(DRAWING)}"
-
-
-def _main() -> None:
-    """The life of the process that draws."""
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print is no answer
-
-    def send(answer: Any) -> None:
-        pickle.dump(answer, answers)
-        answers.flush()
-
-    try:
-        pictures = pickle.load(sys.stdin.buffer)
         for number, picture in enumerate(pictures):
-            send(picture.draw(lambda fraction, number=number: send((number + fraction) / len(pictures))))
+            for told in picture.draw():
+                yield (number + told) / len(pictures) if isinstance(told, float) else told
     except Exception as error:  # whatever it is, the other process says it in a line
-        from ..cli.console import DRAWING, is_missing_library, missing_extra, way_out
-
         reason = missing_extra(error) or " ".join(f"{type(error).__name__}: {error}.".split())
-        send(f"{reason} {way_out(DRAWING)}" if is_missing_library(error) else reason)
+        yield f"{reason} {way_out(DRAWING)}" if is_missing_library(error) else reason
         if "SPINLEV_TRACEBACK" in os.environ:
             raise
-
-
-if __name__ == "__main__":
-    _main()

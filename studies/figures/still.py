@@ -6,7 +6,7 @@ Lengths are mm here. Only the process that draws loads this module.
 import io
 import json
 import zipfile
-from collections.abc import Callable
+from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
@@ -61,8 +61,8 @@ def sample_picture() -> bytes:
     return _png(plotter)
 
 
-def flight_animation(frames: Frames, progress: Callable[[float], None]) -> bytes:
-    """A GIF of the frames, one after the other."""
+def flight_animation(frames: Frames) -> Iterator[float | bytes]:
+    """The finished part after each frame, and last a GIF of them, one after the other."""
     plotter, file = new_plotter((800, 640)), io.BytesIO()
     magnets = _add_rotor(plotter, frames.scene)
     add_plate(plotter, frames.scene)
@@ -80,9 +80,9 @@ def flight_animation(frames: Frames, progress: Callable[[float], None]) -> bytes
             floater = add_floater(plotter, frames.scene, frames.position[number], frames.moment[number])
             plotter.add_text(f"t = {instant:.4f} s", color="black", font_size=10, name="time")
             gif.append_data(plotter.screenshot(return_img=True))
-            progress((number + 1) / len(frames.time))
+            yield (number + 1) / len(frames.time)
     plotter.close()
-    return file.getvalue()
+    yield file.getvalue()
 
 
 def turnable_scene(view: View) -> bytes:

@@ -1,6 +1,6 @@
 """What is shown in three dimensions: numbers only, which go to the process that draws them, and to the live page."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -65,11 +65,11 @@ class View:
     frame: str = "rotor's frame"  # or "laboratory" where the floater does not turn with the rotor
     turnable: bool = False  # whether it is for a page that lets its reader turn it
 
-    def draw(self, progress: Callable[[float], None]) -> bytes:
+    def draw(self) -> Iterator[bytes]:
         """A PNG, or the scene for `renderer.turnable_page`."""
         from .still import scene_picture, turnable_scene
 
-        return turnable_scene(self) if self.turnable else scene_picture(self)
+        yield turnable_scene(self) if self.turnable else scene_picture(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,22 +81,22 @@ class Frames:
     position: Array
     moment: Array
 
-    def draw(self, progress: Callable[[float], None]) -> bytes:
-        """A GIF."""
+    def draw(self) -> Iterator[float | bytes]:
+        """The finished part after each frame, and last a GIF."""
         from .still import flight_animation
 
-        return flight_animation(self, progress)
+        yield from flight_animation(self)
 
 
 @dataclass(frozen=True)
 class Sample:
     """A sphere on 64 × 64 pixels: tells whether anything can be drawn at all."""
 
-    def draw(self, progress: Callable[[float], None]) -> bytes:
+    def draw(self) -> Iterator[bytes]:
         """A PNG."""
         from .still import sample_picture
 
-        return sample_picture()
+        yield sample_picture()
 
 
 def current_places(box: Solid, floater: Array) -> Array:

@@ -663,13 +663,13 @@ def test_a_renderer_that_dies_takes_no_result_with_it(spinlev, monkeypatch, tmp_
     Path("out").mkdir()
     Path("out/scene.png").write_text("of an older result")
     with monkeypatch.context() as patch:
-        crashing(patch, tmp_path / "dies", "draw_process")
+        crashing(patch, tmp_path / "dies", "spinlev.studies.processes")
         patch.setattr("spinlev.studies.catalogue.runner.plate_currents", lambda *given: np.zeros_like(given[-1]))
         status, answer, said = spinlev(*arguments)
         shown = spinlev("show", "out/result.nc")
     assert status == 0
     (line,) = [line for line in said.splitlines() if "3-D" in line]
-    assert line.startswith("The 3-D pictures are left out (scene.png): the process that draws them died (Segmentation")
+    assert line.startswith("The 3-D pictures are left out (scene.png): No process can begin: it died (Segmentation")
     assert sorted(path.name for path in Path("out").glob("*.png")) == ["field.png", "force.png", "trajectory.png"]
     assert len(read_checked("out/result.nc")["time"]) > 10
     summary = json.loads(Path("out/summary.json").read_text())

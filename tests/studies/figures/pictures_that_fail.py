@@ -9,30 +9,32 @@ from dataclasses import dataclass
 class Group:
     """Tells the group of the process that draws; prints past Python."""
 
-    def draw(self, progress):
+    def draw(self):
         os.write(1, b"printed by a library")
-        progress(1.0)
-        return str(os.getpgrp()).encode()
+        yield 1.0
+        yield str(os.getpgrp()).encode()
 
 
 @dataclass(frozen=True)
 class Dies:
     how: int
 
-    def draw(self, progress):
+    def draw(self):
         os.kill(os.getpid(), self.how)
+        yield 1.0
 
 
 @dataclass(frozen=True)
 class Fails:
     error: Exception
 
-    def draw(self, progress):
+    def draw(self):
+        yield 0.0
         raise self.error
 
 
 @dataclass(frozen=True)
 class Endless:
-    def draw(self, progress):
-        progress(float(os.getpid()))
+    def draw(self):
+        yield float(os.getpid())
         threading.Event().wait(60)
