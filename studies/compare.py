@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ..dynamics.continuation.branch import BranchPoint
-from ..dynamics.continuation.frequencies import at_frequency, branch_through, levitates, stable_ranges
+from ..dynamics.continuation.frequencies import branch_through, levitates, on_branch, stable_ranges
 from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
 from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.state import Scales
@@ -138,8 +138,10 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
         ends = [f for row in rows for f in row.stable or ()] or [scene.frequency * (1 - BESIDE)]
         low, high = min(*ends, scene.frequency), max(*ends, scene.frequency)
         frequencies = np.linspace(low * (1 - BESIDE), high * (1 + BESIDE), GRID)
-    points = [[_on_branch(row, float(f)) for f in frequencies] for row in rows]
-
+    points = [
+        on_branch(replace(row.levitation.scene, plate=None), row.levitation.rates, row.branch, frequencies)
+        for row in rows
+    ]
     distances = [[-p.position[2] if p else math.nan for p in row] for row in points]
     growths = [[p.growth_per_s if p else math.nan for p in row] for row in points]
 
@@ -184,20 +186,6 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
             "scene": scene_text(scene),
         },
     )  # fmt: skip
-
-
-def _on_branch(row: Compared, frequency: float) -> BranchPoint | None:
-    """The equilibrium on a row's branch at a frequency, Hz; None beyond its ends."""
-    ordinary = [point for point in row.branch if not point.kind]
-    ends = [point.parameter for point in row.branch]
-    if not ordinary or not min(ends) <= frequency <= max(ends):
-        return None
-    near = min(ordinary, key=lambda point: abs(point.parameter - frequency))
-    levitation = row.levitation
-    try:
-        return at_frequency(replace(levitation.scene, plate=None), levitation.rates, near, frequency)
-    except EquilibriumError:  # between the last ordinary point and a fold
-        return None
 
 
 def compare_words(rows: Sequence[Compared]) -> list[str]:

@@ -51,7 +51,7 @@ def program() -> str:
 
 
 def results(
-    number: int, function: Function, items: deque[Any], quiet: bool = False
+    number: int, function: Function, items: deque[Any], showing: bool = False
 ) -> Generator[tuple[Any, Any], None, None]:
     """Results of a function for each item as they come, with their item; a `Death` in place of what is missing.
 
@@ -60,7 +60,7 @@ def results(
     number : of processes, at most
     function : gives an iterable
     items : who iterates may append others
-    quiet : whether nobody hears what libraries print there
+    showing : whether they only draw, by whichever version of the program, and nobody hears what libraries print there
 
     Raises
     ------
@@ -73,7 +73,7 @@ def results(
         while items or busy:
             while items and (free or len(busy) < number):
                 try:
-                    process = free.pop() if free else _Process(function, quiet)
+                    process = free.pop() if free else _Process(function, showing)
                 except OSError as error:  # too many open files or processes, too little memory
                     number = _fewer(len(busy), str(error))
                     break
@@ -86,7 +86,7 @@ def results(
                     del busy[process.connection]
                 if kind == "ready":
                     process.ready = True
-                    if content != program():
+                    if not showing and content != program():
                         raise ComputationError(
                             "The program was changed while it computed: what is finished is kept; begin again."
                         )
@@ -150,9 +150,10 @@ def safe_path() -> Iterator[None]:
 
 
 class _Process:
-    def __init__(self, function: Function, quiet: bool) -> None:
+    def __init__(self, function: Function, showing: bool) -> None:
         self.ready = False
         self.connection, other = Pipe()
+        silent = subprocess.DEVNULL if showing and "SPINLEV_TRACEBACK" not in os.environ else None
         one_thread = dict.fromkeys(THREADS, "1") | {"MALLOC_TRIM_THRESHOLD_": "65536"}
         try:
             with other:
@@ -160,8 +161,8 @@ class _Process:
                     [sys.executable, "-P", "-c", BEGIN.format(module=__name__), str(other.fileno())],
                     pass_fds=(other.fileno(),),
                     stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL if quiet else None,
-                    stderr=subprocess.DEVNULL if quiet else None,
+                    stdout=silent,
+                    stderr=silent,
                     env=one_thread | dict(os.environ),
                     process_group=0,  # Ctrl-C at the terminal is for this process, which then ends the other
                 )

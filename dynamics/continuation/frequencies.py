@@ -6,6 +6,7 @@ equilibrium meets the near one, and up again along the near one until floater an
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -59,14 +60,7 @@ class Branch:
 
     def side(self, name: str, grid: Array) -> list[BranchPoint | None]:
         """The equilibrium on a side ("near", "far") at each frequency of `grid`, to round-off; None beyond its end."""
-        points = {"near": self.near, "far": self.far}[name]
-        ordinary = [point for point in points if point.kind != FOLD]  # a fold has no way towards other frequencies
-        found: list[BranchPoint | None] = []
-        for frequency in map(float, grid):
-            near = min(ordinary, key=lambda point: abs(point.parameter - frequency))
-            known = points[0].parameter <= frequency <= points[-1].parameter
-            found.append(at_frequency(self.scene, self.rates, near, frequency, LONG_STEPS) if known else None)
-        return found
+        return on_branch(self.scene, self.rates, {"near": self.near, "far": self.far}[name], grid, LONG_STEPS)
 
 
 def by_frequency(scene: Scene, rates: Rates, spin: float = 0.0) -> Family:
@@ -249,6 +243,26 @@ def at_frequency(
     if last.parameter != frequency:
         raise EquilibriumError(f"The branch of equilibria ends before {frequency:g} Hz.")
     return last
+
+
+def on_branch(
+    scene: Scene, rates: Rates, points: Sequence[BranchPoint], grid: Array, steps: Steps = STEPS
+) -> list[BranchPoint | None]:
+    """The equilibrium at each frequency (n,) Hz of a `grid`, to round-off; None beyond the ends of the branch.
+
+    The `points` of the branch are those of a `scene` with its `rates`; `steps` lead from the nearest of them.
+    """
+    ordinary = [point for point in points if point.kind != FOLD]  # a fold has no way towards other frequencies
+    ends = [point.parameter for point in points]
+    found: list[BranchPoint | None] = []
+    for frequency in map(float, grid):
+        known = None
+        if ordinary and min(ends) <= frequency <= max(ends):
+            near = min(ordinary, key=lambda point: abs(point.parameter - frequency))
+            with suppress(EquilibriumError):  # between the last ordinary point and a fold
+                known = at_frequency(scene, rates, near, frequency, steps)
+        found.append(known)
+    return found
 
 
 def stability_end(

@@ -88,7 +88,7 @@ def unavailable() -> str | None:
 def drawn(pictures: Sequence[Picture], progress: Told = lambda fraction: None) -> Generator[bytes, None, None]:
     """The files' contents, one after the other. Raises RenderError, the end of a sentence: why there are no more."""
     try:
-        with closing(results(1, _drawing, deque([pictures]), quiet="SPINLEV_TRACEBACK" not in os.environ)) as answers:
+        with closing(results(1, _drawing, deque([pictures]), showing=True)) as answers:
             for _, answer in answers:
                 if isinstance(answer, float):
                     progress(answer)
