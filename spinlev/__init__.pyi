@@ -14,13 +14,13 @@ from .geometry.scene.making import (
 )
 from .geometry.scene.messages import SceneError as SceneError
 from .studies.cli.options import Models as Models
-from .studies.explore import explore as explore
 from .studies.floater_force import floater_force as floater_force
 from .studies.interface import (
     compare as compare,
     draw as draw,
     ensemble as ensemble,
     equilibria as equilibria,
+    explore as explore,
     field_map as field_map,
     plate_table as plate_table,
     rotor_table as rotor_table,

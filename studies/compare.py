@@ -24,7 +24,7 @@ from .cli.console import note, to_json
 from .cli.options import Answer, FieldModel, Models
 from .figures.style import PALETTE, legend_below, panels, save_figures, styled
 from .levitation import Levitation
-from .plan import sources
+from .plan import PlatePlan, sources
 from .result import variable, write_dataset
 from .words import bracketed, worth_a_row
 
@@ -95,7 +95,9 @@ def compared(scene: Scene, asked: Models, spin: float = 0.0) -> list[Compared]:
     for name, levitation in reversed(made):  # the best first: the others' equilibria are those nearest to its own
         note(f"Model: {name}")
         if found:
-            levitation.use_plate_of(found[0].levitation)
+            plate = found[0].levitation.plate  # its model and region: all have one network of the currents
+            plan = plate and PlatePlan(plate.model, plate.neglected, asked.plate_rtol, plate.table.region)
+            levitation.plate = plan and levitation.plate_about(np.zeros(3), plan)
         chosen = _nearest(worth_a_row(levitation.equilibria), found[0].found if found else None)
         found.append(_with_branch(Compared(name, levitation, chosen)))
     return found[::-1]
@@ -199,9 +201,11 @@ def compare_words(rows: Sequence[Compared]) -> list[str]:
         share = abs(apart) / (1e3 * best.found.distance)
         error = 1e3 * best.found.position_error
         more = "more" if apart > 0 else "less"
+        one, other = dipole.found.stability, best.found.stability
+        verdict = f"both are {one}" if one == other else f"the dipole is {one}, {best.name} {other}"
         said = [
             f"Levitation distance by the point dipole: {bracketed(abs(apart), error, 2)} mm {more} "
-            f"({share:.1%}) than by {name}; {_verdict(dipole, best)}."
+            f"({share:.1%}) than by {name}; {verdict}."
         ]
     elif best.found is not None:
         said = [f"At {scene.frequency:g} Hz there is no equilibrium by the point dipole, but one by {name}."]
@@ -217,13 +221,6 @@ def compare_words(rows: Sequence[Compared]) -> list[str]:
         conditions = f"with eddy currents in the plate ({plate.model})"
     ranges = f"Stable: growth rate below {MARGINAL:g} s⁻¹ (e-folding time above 250 s)"
     return [*said, *lines, f"Equilibria: {conditions}. {ranges}; ranges are those without eddy currents in the plate."]
-
-
-def _verdict(dipole: Compared, best: Compared) -> str:
-    assert dipole.found is not None
-    assert best.found is not None
-    one, other = dipole.found.stability, best.found.stability
-    return f"both are {one}" if one == other else f"the dipole is {one}, {best.name} {other}"
 
 
 def _cells(row: Compared) -> tuple[str, ...]:

@@ -126,7 +126,8 @@ def export_job(scene: Scene, asked: Models, path: Path) -> Answer:
     starts = np.cumsum([0, *(len(points) for points, _, _ in parts)])
     joined = np.concatenate([part + start for start, (_, part, _) in zip(starts, parts, strict=False)])
     data = {name: np.concatenate([part[name] for _, _, part in parts]) for name in parts[0][2]}
-    _write_grid(path, meshio.Mesh(points, [("hexahedron", joined)], point_data=data))
+    with replacing(path) as temporary:
+        meshio.Mesh(points, [("hexahedron", joined)], point_data=data).write(temporary)
     values = {
         "model": levitation.table.model,
         "error_estimate": closed_form_error(scene.rotor),
@@ -176,12 +177,6 @@ def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[
         h, magnetization = h + own, magnetization + inside
         body[inside.any(axis=1)] = FLOATER
     return {"B": MU_0 * (h + magnetization), "H": h, "M": magnetization, "J": np.zeros_like(points), "body": body}
-
-
-def _write_grid(path: Path, mesh: meshio.Mesh) -> None:
-    """Write a mesh as VTU; the file is whole or absent."""
-    with replacing(path) as temporary:
-        mesh.write(temporary)
 
 
 PLANES = {"xy": (0, 1, 2), "xz": (0, 2, 1), "yz": (1, 2, 0)}
@@ -289,4 +284,5 @@ def _write_vtu(found: xr.Dataset, path: Path, plane: str, offset: float) -> None
         chosen = found.sel(model=model)
         data |= {f"{name}_{model}": chosen[name].values.reshape(-1, 3) for name in "BHM"}
         data[f"difference_{model}"] = chosen["difference"].values.ravel()
-    _write_grid(path, meshio.Mesh(points, [("quad", cells)], point_data=data))
+    with replacing(path) as temporary:
+        meshio.Mesh(points, [("quad", cells)], point_data=data).write(temporary)

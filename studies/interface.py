@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 import xarray as xr
@@ -16,10 +16,12 @@ from ..dynamics.motion.plate import PlateMemory
 from ..fem.cache import owned
 from ..fem.rotor.near_field import NEAR_RTOL, complete
 from ..fem.rotor.table import FieldTable, RotorTable
-from ..geometry.common import InputError
+from ..geometry.common import ComputationError, InputError
+from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from .catalogue.entries import CATALOGUE
 from .catalogue.runner import figures_of, question_study
+from .cli.console import missing_extra
 from .cli.options import (
     Asked,
     FieldModel,
@@ -48,6 +50,9 @@ from .result import AXIS, Result, found_dataset, state_columns, variable
 from .starts import drawn_starts, given_starts
 from .study import Point, Study
 from .sweep import forget, swept
+
+if TYPE_CHECKING:
+    from .page.server import LivePage
 
 TOGETHER = 512  # trajectories that a worker gets at once, at most
 
@@ -504,3 +509,35 @@ def draw(result: xr.Dataset | SceneLike, width: FigureWidth = "page") -> Mapping
     """
     with figures_across(width):
         return figures_of(result) if isinstance(result, xr.Dataset) else {"scene": scene_figure(given_scene(result))}
+
+
+def explore(scene: SceneLike, port: int = 0) -> LivePage:
+    """A page in the browser to play with a scene: sliders, equilibria at once, where it levitates, live motion.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        Where the page begins, or the path of its file.
+    port : int
+        Port on 127.0.0.1; 0 takes one that is free.
+
+    Returns
+    -------
+    LivePage
+        Shows itself in a notebook; has an `address` for a browser, and `stop`.
+
+    Raises
+    ------
+    SceneError
+        The scene cannot be used.
+    ComputationError
+        The libraries of the page are missing, or the port is taken.
+    """
+    try:
+        from .page.server import serve
+    except ModuleNotFoundError as error:
+        if needed := missing_extra(error):
+            raise ComputationError(needed) from None
+        raise
+    source = "scene" if isinstance(scene, Scene) else str(scene)
+    return serve(given_scene(scene), source, port=port, framed=True).begin()

@@ -84,7 +84,7 @@ class Levitation:
         self.wider: PlateMemory | None = None
         self.no_wider = ""  # why they could not be known, if so
         self._nearest: Array | None = None  # to the plate, of a flight that had begun without its currents
-        self._flown: dict[float, Trajectory] = {}
+        self.flown: dict[float, Trajectory] = {}  # by duration, s: flights that were simulated together with others
         self._ahead = 0.0  # duration of the flight that is asked for, s
 
     # Sharing with other scenes
@@ -102,10 +102,6 @@ class Levitation:
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
         self.without_plate, self.searched = known, searched
-
-    def adopt_flight(self, duration: float, flown: Trajectory) -> None:
-        """Take over a flight of this duration (s) that was flown together with others."""
-        self._flown[duration] = flown
 
     # What a result says of its models
 
@@ -159,11 +155,9 @@ class Levitation:
         known, why = mutual_choice(scene, self.table, self.models.interaction, self.models.rtol)
         if not known:
             return None, why
-        key, make = (
-            mutual_key(scene.rotor, scene.floater),
-            partial(cached_mutual_table, scene.rotor, scene.floater, note),
-        )
-        return self._tables.table(key, "mutual", "Mutual magnetisation of rotor and floater", make), why
+        bodies = scene.rotor, scene.floater
+        make = partial(cached_mutual_table, *bodies, note)
+        return self._tables.table(mutual_key(*bodies), "mutual", "Mutual magnetisation of rotor and floater", make), why
 
     def _has_metal(self) -> bool:
         """Whether metal turns with the rotor, once it and the floater are found fit for a table of losses."""
@@ -309,14 +303,6 @@ class Levitation:
                 return far
         return self.plate_about(place, plan)
 
-    def use_plate_of(self, other: Levitation) -> None:
-        """Take the model and the region of another's plate, so that both have one network of its currents."""
-        known, rtol = other.plate, self.models.plate_rtol
-        if known is not None:
-            region = known.table.region
-            known = self.plate_about(np.zeros(3), PlatePlan(known.model, known.neglected, rtol, region))
-        self.plate = known
-
     def plate_about(self, place: Array, plan: PlatePlan) -> PlateMemory:
         """The plate's currents as planned, for a floater about a place (3,) m that turns with the rotor.
 
@@ -418,8 +404,8 @@ class Levitation:
         FlightStopped : the user stopped it; the error holds what was flown
         """
         positive("duration", duration)
-        if duration in self._flown:
-            return self._flown[duration]
+        if duration in self.flown:
+            return self.flown[duration]
         self._ahead = duration
         kept = checkpoint.read() if checkpoint else None
         if kept is not None and self.plate is not None:

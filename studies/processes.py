@@ -182,7 +182,10 @@ class _Process:
         try:
             kind, content = pickle.loads(self.connection.recv_bytes())
         except (EOFError, OSError):
-            return "death", Death(_way_to_end(self._process.wait()))
+            status = self._process.wait()
+            if status == -signal.SIGKILL:
+                return "death", Death("was killed (out of memory?)")
+            return "death", Death(f"died ({signal.strsignal(-status) if status < 0 else f'exit status {status}'})")
         return kind, content
 
     def terminate(self) -> None:
@@ -198,16 +201,10 @@ class _Process:
             self._process.wait()
 
 
-def _way_to_end(status: int) -> str:
-    if status == -signal.SIGKILL:
-        return "was killed (out of memory?)"
-    return f"died ({signal.strsignal(-status) if status < 0 else f'exit status {status}'})"
-
-
 def serve(connection: Connection) -> None:
     """The life of such a process: items come, results go, until the other end is closed."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # unfinished files are removed on the way out
-    threading.Thread(target=_end_with, args=(connection.fileno(),), daemon=True).start()
+    threading.Thread(target=end_with, args=(connection.fileno(),), daemon=True).start()
 
     def say(kind: str, content: Any = None) -> None:
         connection.send_bytes(cloudpickle.dumps((kind, content)))
@@ -228,7 +225,7 @@ def serve(connection: Connection) -> None:
         return
 
 
-def _end_with(descriptor: int) -> None:
+def end_with(descriptor: int) -> None:
     """End when the other process has: it closes its end of the sockets, or is killed."""
     poll = select.poll()
     poll.register(descriptor, select.POLLHUP)

@@ -95,7 +95,7 @@ def _fly_together(levitations: Sequence[Levitation], duration: float) -> None:
             flown = fly_together([one.scene for one, _ in ready], alike[0].interaction, starts, duration)
             for (one, _), flight in zip(ready, flown, strict=True):
                 if flight is not None:
-                    one.adopt_flight(duration, flight)
+                    one.flown[duration] = flight
 
 
 CHOICES = (*NAMES, "spin")  # what can be varied beside the keys of the scene file

@@ -36,16 +36,10 @@ LABELS = {
 }
 
 
-def one_case(point: Point, dataset: xr.Dataset) -> xr.Dataset:
-    """A point's result with those of `LABELS` that the point has, ready to be joined along `case`."""
-    labels = {name: xr.Variable((), point[name], attrs) for name, attrs in LABELS.items() if name in point}
-    return dataset.assign(labels).expand_dims("case")
-
-
 def recorded(
     point: Point, table: Columns, found: Mapping[str, Any] | Sequence[Any], axes: Mapping[str, Any], **sizes: int
 ) -> xr.Dataset:
-    """A point's result from numbers.
+    """A point's result from numbers, with those of `LABELS` that it has, ready to be joined along `case`.
 
     Parameters
     ----------
@@ -53,7 +47,8 @@ def recorded(
     table, found, sizes : see `columns`
     axes : coordinates
     """
-    return one_case(point, xr.Dataset(columns(table, found, **sizes), axes))
+    labels = {name: xr.Variable((), point[name], attrs) for name, attrs in LABELS.items() if name in point}
+    return xr.Dataset(columns(table, found, **sizes), axes).assign(labels).expand_dims("case")
 
 
 def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
@@ -101,11 +96,9 @@ class Study:
 
 def study_of_one(compute: Callable[[bool], xr.Dataset], **more: Any) -> Study:
     """A study that is computed as a whole: its only point says whether it is quick; `more` as of a `Study`."""
-    return Study(points=_settings, compute=partial(_whole, compute), gather=itemgetter(0), **more)
-
-
-def _settings(quick: bool) -> list[Point]:
-    return [{"quick": quick}]
+    return Study(
+        points=lambda quick: [{"quick": quick}], compute=partial(_whole, compute), gather=itemgetter(0), **more
+    )
 
 
 def _whole(compute: Callable[[bool], xr.Dataset], point: Point) -> xr.Dataset:

@@ -105,7 +105,14 @@ class Journal:
     """
 
     def __init__(self, study: Study, points: Sequence[Point], out: Path) -> None:
-        asked = {"study": study.name, "settings": study.settings, "points": points, "program": _program(study)}
+        function = study.compute
+        if isinstance(function, partial):  # of a study that is computed as a whole
+            (function,) = function.args
+        path = Path(getattr(sys.modules.get(function.__module__), "__file__", None) or "")
+        # what computes a study's points: the program without the rooms that draw and say, and its own file
+        own = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+        computing = f"{program_digest(*SHOWING)} {own}"
+        asked = {"study": study.name, "settings": study.settings, "points": points, "program": computing}
         self.folder = out / f"{study.name}.points"
         self._sweep = hashlib.sha256(to_json(asked).encode()).hexdigest()[:16]
 
@@ -141,16 +148,6 @@ class Journal:
         path = self.folder / f"{number:06}-{self._sweep}.json"
         text = json.dumps(_packed(result), default=lambda value: value.tolist())
         write_whole(path, seal(f"{path.name}\n{text}".encode()))
-
-
-def _program(study: Study) -> str:
-    """Digest of what computes a study's points: the program without the rooms that draw and say, and its own file."""
-    function = study.compute
-    if isinstance(function, partial):  # of a study that is computed as a whole
-        (function,) = function.args
-    module = sys.modules.get(function.__module__)
-    path = Path(getattr(module, "__file__", None) or "")
-    return f"{program_digest(*SHOWING)} {hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ''}"
 
 
 def _packed(result: xr.Dataset) -> dict[str, Any]:

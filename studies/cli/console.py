@@ -67,7 +67,11 @@ QUADMATH = "libquadmath.so.0"
 
 def way_out(need: str) -> str:
     """A sentence: what to install for FORTRAN or DRAWING, on this system or, where it is not known here, on each."""
-    system = _system()
+    system = "macOS" if sys.platform == "darwin" else None
+    with suppress(OSError):  # no such file
+        release = platform.freedesktop_os_release()
+        words = [release.get("ID", ""), *release.get("ID_LIKE", "").split()]
+        system = next((FAMILIES[word] for word in words if word in FAMILIES), system)
     ways = [f"{name}: {needs[need]}" for name, needs in PACKAGES.items() if system in (name, None)]
     return f"{'; '.join(ways)}."
 
@@ -83,18 +87,6 @@ def missing_extra(error: BaseException) -> str | None:
     extra = next((extra for extra, modules in EXTRAS.items() if top in modules), None)
     way = f"pip install 'spinlev[{extra}]', or `make develop` in a checkout"
     return extra and f"{top} is needed for this and is not installed: {way}."
-
-
-def _system() -> str | None:
-    """The key of PACKAGES that names this system."""
-    if sys.platform == "darwin":
-        return "macOS"
-    try:
-        release = platform.freedesktop_os_release()
-    except OSError:
-        return None
-    words = [release.get("ID", ""), *release.get("ID_LIKE", "").split()]
-    return next((FAMILIES[word] for word in words if word in FAMILIES), None)
 
 
 def lend_quadmath() -> Path | None:

@@ -14,7 +14,6 @@ from typing import Protocol
 
 from ...fem.files import write_whole
 from ...geometry.common import ComputationError
-from ..cli.console import DRAWING, is_missing_library, missing_extra, way_out
 from ..processes import Death, results
 from .view import Sample
 
@@ -93,6 +92,8 @@ def drawn(pictures: Sequence[Picture], progress: Told = lambda fraction: None) -
                 if isinstance(answer, float):
                     progress(answer)
                 elif isinstance(answer, Death):
+                    from ..cli.console import DRAWING, way_out
+
                     said = f"the process that draws them {answer.how}, as it does without graphics libraries."
                     raise RenderError(f"{said} {way_out(DRAWING)}")
                 elif isinstance(answer, str):
@@ -112,6 +113,8 @@ def _drawing(pictures: Sequence[Picture]) -> Iterator[float | bytes | str]:
             for told in picture.draw():
                 yield (number + told) / len(pictures) if isinstance(told, float) else told
     except Exception as error:  # whatever it is, the other process says it in a line
+        from ..cli.console import DRAWING, is_missing_library, missing_extra, way_out
+
         reason = missing_extra(error) or " ".join(f"{type(error).__name__}: {error}.".split())
         yield f"{reason} {way_out(DRAWING)}" if is_missing_library(error) else reason
         if "SPINLEV_TRACEBACK" in os.environ:

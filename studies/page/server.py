@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import hmac
+import html
 import ipaddress
 import json
 import logging
@@ -55,11 +56,12 @@ PATIENCE = 10.0  # Seconds that a connection may take for a request, and between
 HEADER, BODY, MESSAGE = 48_000, 1000, 1_000_000
 """Bytes of a request's header, with its address; of its body, of which none has any; of a page's message, as a file."""
 FAULTS, PERIOD = 20, 60.0  # Lines about faults that are logged in a period, s
+HEIGHT = 1000  # of the page in a notebook, pixels
 FULL = f"{MOST_PAGES} pages are open, and more are not served at a time. Close one and load this one again."
 
 
-class Pages:
-    """Where pages are served, by `run`, until `stop`.
+class LivePage:
+    """Pages that are served by `run`, or in the background from `begin` on, until `stop`; a notebook shows one.
 
     Parameters
     ----------
@@ -72,6 +74,19 @@ class Pages:
         self.address, self.local, self.opened = address, local, gate.opened
         self._gate, self._listening, self._over = gate, listening, asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread: threading.Thread | None = None
+
+    def __repr__(self) -> str:
+        return f"LivePage at {self.address}"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{html.escape(self.address)}" width="100%" height="{HEIGHT}" style="border:0"></iframe>'
+
+    def begin(self) -> LivePage:
+        """Serve in a thread of its own."""
+        self._thread = threading.Thread(target=self.run, name="spinlev explore", daemon=True)
+        self._thread.start()
+        return self
 
     def run(self) -> None:
         """Serve in this thread until `stop`, or until someone stops the program."""
@@ -90,6 +105,8 @@ class Pages:
         else:
             with suppress(RuntimeError):  # it has ended
                 self._loop.call_soon_threadsafe(self._over.set)
+        if self._thread is not None:
+            self._thread.join()
 
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -108,7 +125,7 @@ class Pages:
             await http.close_all_connections()
 
 
-def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int = 0, framed: bool = False) -> Pages:
+def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int = 0, framed: bool = False) -> LivePage:
     """Listen for browsers that ask for pages about a scene, which `run` serves.
 
     Parameters
@@ -145,7 +162,7 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
     name = socket.getfqdn() if host in ("0.0.0.0", "::") else named
     gate = _Gate(first_state(scene, source), token, host, NOTEBOOKS if framed else "'none'")
     local = ipaddress.ip_address(number).is_loopback
-    return Pages(f"http://{name}:{port}/?token={token}", local, gate, listening)
+    return LivePage(f"http://{name}:{port}/?token={token}", local, gate, listening)
 
 
 def program(path: str) -> str:

@@ -19,7 +19,7 @@ from multiprocessing.context import ForkServerContext, ForkServerProcess
 from typing import Any
 
 from ...geometry.common import SpinlevError
-from ..processes import safe_path
+from ..processes import end_with, safe_path
 
 MEMORY = 4 * 2**30  # Bytes that a process may take
 PATIENCE = 10  # By how much a process is nicer than others that does not hurry
@@ -161,7 +161,7 @@ def _serve(connection: Connection, patience: int) -> None:
     os.nice(patience)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with, args=(connection.fileno(),), daemon=True).start()
     while True:
         try:
             function, *arguments = connection.recv()
@@ -175,10 +175,3 @@ def _serve(connection: Connection, patience: int) -> None:
             connection.send((answer, problem))
         except (EOFError, BrokenPipeError, ConnectionResetError):  # the page has gone
             return
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

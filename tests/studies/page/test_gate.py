@@ -166,7 +166,7 @@ def test_what_is_too_large_is_not_waited_for(page, content):
 
 def test_a_page_for_other_machines_says_so(monkeypatch, caplog):
     caplog.set_level("INFO", "spinlev")
-    monkeypatch.setattr("spinlev.studies.page.server.Pages.run", lambda pages: pages.stop())
+    monkeypatch.setattr("spinlev.studies.page.server.LivePage.run", lambda pages: pages.stop())
     with cli.heard(), contextlib.redirect_stdout(io.StringIO()):
         for host in ("0.0.0.0", "::"):
             assert cli._status(["explore", str(OVER_PLATE), "--no-browser", "--host", host], io.StringIO()) == 0
@@ -187,7 +187,7 @@ def test_the_token_is_not_on_the_browsers_command_line(monkeypatch):
         seen.update(address=address, file=file, mode=file.stat().st_mode & 0o777, text=file.read_text())
 
     monkeypatch.setattr("webbrowser.open", opened)
-    monkeypatch.setattr("spinlev.studies.page.server.Pages.run", lambda pages: pages.stop())
+    monkeypatch.setattr("spinlev.studies.page.server.LivePage.run", lambda pages: pages.stop())
     said = io.StringIO()
     assert cli._status(["explore", str(OVER_PLATE)], said) == 0
     token = said.getvalue().strip().partition("token=")[2]

@@ -58,7 +58,7 @@ def reader(served):
     for one in opened:
         one.close()
     end = time.monotonic() + 120
-    while served._pages.opened:
+    while served.opened:
         assert time.monotonic() < end, "a page that was left stays open"
         time.sleep(0.05)
 
@@ -136,7 +136,7 @@ def crowd(number):
 def test_work_that_takes_too_long_is_cut_off_and_other_pages_answer(served, reader):
     patient = reader()
     patient.answered()
-    (its,) = served._pages.opened
+    (its,) = served.opened
     other = reader("frequency_hz=120")
     its.quick.seconds = 2.0
     put_in(patient, crowd(60))
