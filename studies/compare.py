@@ -95,9 +95,11 @@ def compared(scene: Scene, asked: Models, spin: float = 0.0) -> list[Compared]:
     for name, levitation in reversed(made):  # the best first: the others' equilibria are those nearest to its own
         note(f"Model: {name}")
         if found:
-            plate = found[0].levitation.plate  # its model and region: all have one network of the currents
-            plan = plate and PlatePlan(plate.model, plate.neglected, asked.plate_rtol, plate.table.region)
-            levitation.plate = plan and levitation.plate_about(np.zeros(3), plan)
+            levitation.plate = None
+            if (best_plate := found[0].levitation.plate) is not None:  # all have one network of its currents
+                model, edges, region = best_plate.model, best_plate.neglected, best_plate.table.region
+                plan = PlatePlan(model, edges, asked.plate_rtol, region)
+                levitation.plate = levitation.plate_about(np.zeros(3), plan)
         chosen = _nearest(worth_a_row(levitation.equilibria), found[0].found if found else None)
         found.append(_with_branch(Compared(name, levitation, chosen)))
     return found[::-1]

@@ -12,8 +12,8 @@ import resource
 import signal
 import threading
 from collections.abc import Callable, Hashable
-from functools import cache
-from multiprocessing import forkserver, resource_tracker
+from functools import cache, partial
+from multiprocessing import forkserver, resource_tracker, spawn
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 from typing import Any
@@ -22,6 +22,7 @@ from ...geometry.common import SpinlevError
 from ..processes import end_with, safe_path
 
 MEMORY = 4 * 2**30  # Bytes that a process may take
+NAME = "spinlev page"  # Of each process
 PATIENCE = 10  # By how much a process is nicer than others that does not hurry
 Call = Callable[[], tuple[Any, ...]]
 
@@ -30,11 +31,17 @@ Call = Callable[[], tuple[Any, ...]]
 def context() -> ForkServerContext:
     """Processes are copies of one that loads the numeric libraries from now on, and begin in hundredths of a second."""
     found = multiprocessing.get_context("forkserver")
+    spawn.get_preparation_data = partial(_prepared, spawn.get_preparation_data)
     found.set_forkserver_preload([f"{__package__}.work"])
     with safe_path():
         resource_tracker.ensure_running()
         forkserver.ensure_running()
     return found
+
+
+def _prepared(known: Callable[[str], dict[str, Any]], name: str) -> dict[str, Any]:
+    """What a process is told as it begins: not to run the user's script once more, which may have no guard, if ours."""
+    return {key: value for key, value in known(name).items() if name != NAME or not key.startswith("init_main")}
 
 
 class Worker:
@@ -119,7 +126,7 @@ class Worker:
     async def _answer(self, question: tuple[Any, ...]) -> tuple[Any, str]:
         if self.process is None:
             self._connection, other = context().Pipe()
-            process = context().Process(target=_serve, args=(other, self.patience), daemon=True)
+            process = context().Process(target=_serve, name=NAME, args=(other, self.patience), daemon=True)
             # Not here: a signal stops this thread anywhere, and a process that is not told its task says so at length.
             begun = asyncio.get_running_loop().run_in_executor(None, process.start)
             try:

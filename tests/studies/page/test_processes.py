@@ -147,6 +147,31 @@ def test_a_process_at_work_ends_with_a_program_that_is_killed():
         time.sleep(0.05)
 
 
+UNGUARDED = """
+import asyncio, math
+from spinlev.studies.page.worker import Worker
+
+print("begun")
+async def ask():
+    said = []
+    worker = Worker("", 60.0, said.append)
+    worker.ask("", lambda: (math.sqrt, 4), said.append)
+    while not said:
+        await asyncio.sleep(0.01)
+    print(said[0])
+    worker.stop()
+
+asyncio.run(ask())
+"""
+
+
+def test_a_script_needs_no_guard(tmp_path):
+    """It is run once, where multiprocessing would run it in each process again."""
+    (tmp_path / "script.py").write_text(UNGUARDED)
+    done = subprocess.run([sys.executable, tmp_path / "script.py"], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["begun", "2.0"]
+
+
 STRUCK = """
 import asyncio, os, signal, time
 from multiprocessing import forkserver
