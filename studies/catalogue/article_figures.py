@@ -20,9 +20,8 @@ from ..levitation import Levitation
 from ..plan import sources
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, recorded
-from . import article, drawing
+from . import article, showing
 from .article_formulas import field, force, side_radius
-from .tables import span, text_table
 
 # On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
 DISTANCES = np.array([15e-3, 20e-3, 25e-3, 30e-3, 40e-3])
@@ -74,11 +73,11 @@ def deviations(part: xr.Dataset) -> dict[str, Any]:
     return {**found, "fem": true["field_error"] / size}
 
 
-@drawing.drawn
+@showing.drawn
 def component_figure(result: xr.Dataset, quantity: str, ylabel: str) -> Figure:
     """One component of the field below the rotor against the parameter of each configuration."""
     styles = {"fem": DASHES["fem"], "dipole": DASHES["dipole"], "article": "+"}
-    figure, rows = drawing.configuration_panels(result, 2.7, ylabel=ylabel)
+    figure, rows = showing.configuration_panels(result, 2.7, ylabel=ylabel)
     for axes, configuration, part in rows:
         for model, style in styles.items():
             found = _of(part, model)
@@ -91,10 +90,10 @@ def component_figure(result: xr.Dataset, quantity: str, ylabel: str) -> Figure:
     return figure
 
 
-@drawing.drawn
+@showing.drawn
 def differences_figure(result: xr.Dataset) -> Figure:
     """How far the simpler models are from the finite elements."""
-    figure, rows = drawing.configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
+    figure, rows = showing.configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
     for axes, configuration, part in rows:
         value, off = _of(part, "fem")["value"], deviations(part)
         for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
@@ -109,12 +108,12 @@ def differences_figure(result: xr.Dataset) -> Figure:
 
 def _explain(axes: Axes, result: xr.Dataset, models: dict[str, str]) -> None:
     places = {f"{1e3 * distance:g} mm below": f"C{k}-" for k, distance in enumerate(result["distance"].values)}
-    drawing.explain(axes, places | models)
+    showing.explain(axes, places | models)
 
 
 def components_lines(result: xr.Dataset) -> list[str]:
     rows = []
-    for configuration, part in drawing.by_configuration(result):
+    for configuration, part in showing.by_configuration(result):
         true, off = _of(part, "fem"), deviations(part)
         for k, distance in enumerate(1e3 * result["distance"].values):
             ends = [" to ".join(f"{1e3 * true[q].values[n, k]:.3f}" for n in (0, -1)) for q in ("off_axis", "on_axis")]
@@ -122,7 +121,7 @@ def components_lines(result: xr.Dataset) -> list[str]:
             rows.append((f"{configuration}, {distance:g} mm", *ends, *worst))
     head = ("rotors, distance", "off-axis (mT)", "on-axis (mT)", "dipole", "μr = 1", "formula", "error")
     last = "Largest deviations from the finite elements, and their own estimated error, in per cent of |B|."
-    return [*text_table(head, rows), last]
+    return [*showing.text_table(head, rows), last]
 
 
 OFF, ON = r"off-axis field $B_\perp$ (mT)", r"on-axis field $B_z$ (mT)"
@@ -223,7 +222,7 @@ STYLES = {
 POINTS = {"near_tipping": ("<", "near tipping point"), "equilibrium": ("o", "stable"), "far_tipping": (">", "far one")}
 
 
-@drawing.drawn
+@showing.drawn
 def parts_figure(result: xr.Dataset) -> Figure:
     """Attraction, repulsion and net force at one frequency by each way of computing, and how far these are apart."""
     figure, ((left, right),) = panels(1, 2, 3.9)
@@ -237,8 +236,8 @@ def parts_figure(result: xr.Dataset) -> Figure:
                 # in units of the weight: the parts themselves cross zero
                 _plot(right, found, 100e-3 * (found[part] - true[part]) / article.WEIGHT, style, color=color)
         _plot(left, found, _net(found), style, color="k")
-        drawing.explain(left, {text: style})
-    drawing.explain(left, {"attracting part": "C0-", "repelling part": "C1-", "net force, with gravity": "k-"})
+        showing.explain(left, {text: style})
+    showing.explain(left, {"attracting part": "C0-", "repelling part": "C1-", "net force, with gravity": "k-"})
     _mark(left, true, PALETTE[2])
     left.axhline(0.0, color="0.3", lw=0.6)
     left.set(ylabel="force, upwards (mN)", ylim=(-470, 350), title=f"(a) δx = 1 mm, {float(one['frequency']):g} Hz")
@@ -246,7 +245,7 @@ def parts_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@drawing.drawn
+@showing.drawn
 def net_figure(result: xr.Dataset) -> Figure:
     """The net force at every frequency, and the polar angle that goes with it."""
     figure, ((net, angle),) = panels(1, 2, 3.2)
@@ -256,8 +255,8 @@ def net_figure(result: xr.Dataset) -> Figure:
             _plot(net, found, _net(found), STYLES[model][0], color=color)
         _mark(net, found, color)
         _plot(angle, found, 1e-3 * np.degrees(found["polar_angle"].values), "-", color=color)
-        drawing.explain(net, {f"{float(found['frequency']):g} Hz": f"C{k}-"})
-    drawing.explain(net, {text: style for style, text in list(STYLES.values())[:2]})
+        showing.explain(net, {f"{float(found['frequency']):g} Hz": f"C{k}-"})
+    showing.explain(net, {text: style for style, text in list(STYLES.values())[:2]})
     net.axhline(0.0, color="0.3", lw=0.6)
     net.set(ylabel="net force, with gravity (mN)", ylim=(-60, 1.1e3 * float(_net(result).max())))
     angle.axhline(TOLD_ANGLE, color="0.4", lw=0.8, ls="-.", label="near tipping point in the article")
@@ -290,7 +289,7 @@ def force_lines(result: xr.Dataset) -> list[str]:
             angles = [f"{np.degrees(float(a)):.2f}" for a in (found["angle_near"], found["angle_equilibrium"], far)]
             rows.append((f"{frequency:g} Hz, {text}", *places, *angles))
     head = ("δx = 1 mm", "near tipping (mm)", "stable (mm)", "far tipping (mm)", "θ near (°)", "θ stable", "θ at 40 mm")
-    return [*text_table(head, rows), "The article: θ = 9° at the near tipping point, almost zero at 40 mm."]
+    return [*showing.text_table(head, rows), "The article: θ = 9° at the near tipping point, almost zero at 40 mm."]
 
 
 FORCE_CURVE = Study(
@@ -383,10 +382,10 @@ def orbit_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@drawing.drawn
+@showing.drawn
 def radius_figure(result: xr.Dataset) -> Figure:
     """The radius of the side mode against frequency for every rotor, and the article's formula."""
-    figure, rotors = drawing.rotor_panels(result, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")
+    figure, rotors = showing.rotor_panels(result, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")
     for axes, rotor, color in rotors:
         axes.axhspan(*TYPICAL, color="0.92", lw=0, label="called typical in the article")
         found = case_with(rotor, model="fem")
@@ -395,7 +394,7 @@ def radius_figure(result: xr.Dataset) -> Figure:
         axes.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
         axes.set(xlim=(35, 255), ylim=(0, None))
     key = {"stable": "-", "unstable": "--", "$\\mathcal{G}/\\mu_f\\omega^2$ of the article": ":"}
-    drawing.explain(rotors[0][0], key)
+    showing.explain(rotors[0][0], key)
     return figure
 
 
@@ -405,17 +404,18 @@ def side_lines(result: xr.Dataset) -> list[str]:
         radius = 1e3 * np.hypot(simulated["flight_x"].values, simulated["flight_y"].values)
         lines.append(
             f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {simulated['model'].item()}: radius {radius.mean():.4f} mm "
-            f"({span(radius, '.4f')}) at {-1e3 * float(simulated['flight_z'].mean()):.3f} mm; "
+            f"({showing.span(radius, '.4f')}) at {-1e3 * float(simulated['flight_z'].mean()):.3f} mm; "
             f"𝒢/(μ_f ω²) = {_predicted(simulated):.4f} mm."
         )
-    for label, rotor in drawing.by_rotor(result):
+    for label, rotor in showing.by_rotor(result):
         cells = []
         for found in (case_with(rotor, model=model) for model in article.MODELS):
             radius = found["radius"].where(article.stable_in_flight(found["growth"]))
-            cells += [span(1e3 * radius, ".3f"), span(100 * (found["article_radius"] / radius - 1), "+.1f")]
+            off = 100 * (found["article_radius"] / radius - 1)
+            cells += [showing.span(1e3 * radius, ".3f"), showing.span(off, "+.1f")]
         rows.append((label, *cells))
     head = ("where stable", *(f"{model} {words}" for model in article.MODELS for words in ("(mm)", "formula off (%)")))
-    return [*lines, *text_table(head, rows)]
+    return [*lines, *showing.text_table(head, rows)]
 
 
 SIDE_MODE = Study(

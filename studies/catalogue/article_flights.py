@@ -24,8 +24,7 @@ from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
 from . import article
 from .article_formulas import analytic_distance, balanced
-from .drawing import by_configuration, by_rotor, drawn, explain, rotor_panels, small_multiples
-from .tables import span, text_table
+from .showing import by_configuration, by_rotor, drawn, explain, rotor_panels, small_multiples, span, text_table
 
 # Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.
 #

@@ -31,8 +31,7 @@ from ..figures.style import PALETTE, colour_bar, panels, styled, titled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
 from . import article
-from .drawing import by_rotor, configuration_panels, drawn
-from .tables import text_table
+from .showing import by_rotor, configuration_panels, drawn, text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
 """From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m."""

@@ -21,7 +21,6 @@ from ...geometry.common import Array
 from ..figures.style import PALETTE, legend_below, panels, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
-from .drawing import drawn
 from .experiment_design import design_row
 from .experiment_model import (
     EVEN,
@@ -44,7 +43,7 @@ from .experiment_model import (
     prior_values,
     quantile,
 )
-from .tables import records, text_table, uncertain
+from .showing import drawn, records, text_table, uncertain
 
 KEPT = 1000  # Draws of the posterior that are kept
 TOGETHER = 500  # Draws that are evaluated in one call

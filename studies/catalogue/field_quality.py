@@ -29,8 +29,7 @@ from ..figures.style import PALETTE
 from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE
-from .drawing import drawn, explain, small_multiples
-from .tables import last_crossing, text_table
+from .showing import drawn, explain, last_crossing, small_multiples, text_table
 
 # Where the point dipole, and models between it and the field of the finite magnets, can be trusted.
 #

@@ -26,9 +26,8 @@ from ..figures.style import PALETTE, panels
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, recorded, study_of_one
+from . import showing
 from .article import levitated_rotors, levitation_of, polar_angle, rotor_scene
-from .drawing import by_configuration, by_rotor, configuration_panels, drawn, explain, rotor_panels, rotor_places
-from .tables import last_crossing, range_text, text_table, uncertain
 
 # How wrong is the dipole? Levitation of the article's rotors by dipoles and by finite magnets, cause by cause.
 MODELS = ("article", "dipole", "cuboid", "fem", "mutual")
@@ -131,27 +130,27 @@ PAIR = {"article": ("--", PALETTE[5], "point dipoles"), "mutual": ("-", PALETTE[
 """Models that are compared in figures: line, colour, name."""
 
 
-@drawn
+@showing.drawn
 def distances_figure(result: xr.Dataset) -> Figure:
     """The levitation distance by point dipoles and in the field of the finite magnets."""
-    figure, rotors = rotor_panels(result, 3.0, "frequency of the rotor (Hz)", "levitation distance (mm)")
+    figure, rotors = showing.rotor_panels(result, 3.0, "frequency of the rotor (Hz)", "levitation distance (mm)")
     for axes, rotor, color in rotors:
         one = rotor.isel(case=0)
         for model, (style, _, name) in PAIR.items():
             mfc = None if model == "mutual" else "white"
             distance = 1e3 * one["distance"].sel(model=model)
             axes.plot(one["frequency"], distance, f"o{style}", color=color, ms=3, mfc=mfc)
-            explain(axes, {name: f"o{style}"}, ms=3, mfc=mfc)
+            showing.explain(axes, {name: f"o{style}"}, ms=3, mfc=mfc)
     return figure
 
 
-@drawn
+@showing.drawn
 def causes_figure(result: xr.Dataset) -> Figure:
     """By how much each cause changes the distance: mean and range over the frequencies."""
-    figure, rows = configuration_panels(result, 2.8, ylabel="change of the distance (mm)")
+    figure, rows = showing.configuration_panels(result, 2.8, ylabel="change of the distance (mm)")
     width = 0.8 / (len(CAUSES) + 1)
     for axes, configuration, part in rows:
-        places = rotor_places(axes, configuration, part)
+        places = showing.rotor_places(axes, configuration, part)
         for k, (cause, models) in enumerate([*CAUSES.items(), ("all together", TOTAL)]):
             value, error = (1e3 * values.values for values in change(part, "distance", models))
             mean = value.mean(axis=1)
@@ -160,17 +159,17 @@ def causes_figure(result: xr.Dataset) -> Figure:
             style: Any = {"color": color, "label": cause, "error_kw": {"lw": 0.7, "capsize": 1.5}}
             axes.bar(places + (k - len(CAUSES) / 2) * width, mean, width, yerr=spread, **style)
         axes.axhline(0.0, color="0.3", lw=0.8)
-    explain(rows[0][0], {"bar: range over the frequencies, with errors": "|"})
+    showing.explain(rows[0][0], {"bar: range over the frequencies, with errors": "|"})
     return figure
 
 
-@drawn
+@showing.drawn
 def ranges_figure(result: xr.Dataset) -> Figure:
     """The frequencies of stable levitation by point dipoles and in the field of the finite magnets."""
-    figure, rows = configuration_panels(result, 2.8, ylabel="stable frequencies (Hz)")
+    figure, rows = showing.configuration_panels(result, 2.8, ylabel="stable frequencies (Hz)")
     for axes, configuration, part in rows:
         for (model, (_, color, name)), offset in zip(PAIR.items(), (-0.2, 0.2), strict=True):
-            places = rotor_places(axes, configuration, part) + offset
+            places = showing.rotor_places(axes, configuration, part) + offset
             low, high = (part[end].sel(model=model).values for end in ("lowest", "highest"))
             axes.bar(places, high - low, 0.35, bottom=low, color=color, label=name)
             for end, values in (("lowest", low), ("highest", high)):
@@ -180,7 +179,7 @@ def ranges_figure(result: xr.Dataset) -> Figure:
                 axes.plot(places[ends], high[ends], marker, color="k", ms=4)
         axes.use_sticky_edges = False
         axes.margins(y=0.08)
-    explain(rows[0][0], {words: marker for marker, words in ENDS.values()}, color="k", ms=4)
+    showing.explain(rows[0][0], {words: marker for marker, words in ENDS.values()}, color="k", ms=4)
     return figure
 
 
@@ -188,28 +187,28 @@ def dipole_lines(result: xr.Dataset) -> list[str]:
     causes = [*CAUSES.items(), ("all together", TOTAL)]
     rows = [
         (f"{configuration}: {cause}", *_changes(part, models))
-        for configuration, part in by_configuration(result)
+        for configuration, part in showing.by_configuration(result)
         for cause, models in causes
     ]
     head = ("change by", "distance (mm)", "polar angle (°)", "lowest (Hz)", "highest (Hz)", "axial mode (%)")
     limits = []
-    for rotor, part in by_rotor(result):
+    for rotor, part in showing.by_rotor(result):
         for model in ("article", "cuboid", "fem", "mutual"):
             one, cells = part.isel(case=0).sel(model=model), [f"{rotor}, {model}"]
             for name, kind in (("lowest", "low_kind"), ("highest", "high_kind")):
-                cells += [uncertain(one[name], one[f"{name}_error"]), one[kind].item()]
+                cells += [showing.uncertain(one[name], one[f"{name}_error"]), one[kind].item()]
             limits.append(cells)
-    ends = text_table(("stable frequencies", "lowest (Hz)", "", "highest (Hz)", ""), limits)
-    return [*text_table(head, rows), *ends, sentence(result)]
+    ends = showing.text_table(("stable frequencies", "lowest (Hz)", "", "highest (Hz)", ""), limits)
+    return [*showing.text_table(head, rows), *ends, sentence(result)]
 
 
 def _changes(part: xr.Dataset, models: tuple[str, str]) -> list[str]:
     """What lies between two models: range and largest error of distance, angle, ends of stability and axial mode."""
     scales = {"distance": 1e3, "polar_angle": 1.0, "lowest": 1.0, "highest": 1.0}
-    cells = [range_text(*change(part, name, models), scale) for name, scale in scales.items()]
+    cells = [showing.range_text(*change(part, name, models), scale) for name, scale in scales.items()]
     relative, bounce = 100 / part["mode_frequency"].sel(model=models[0]), {"mode": "bounce"}
     value, error = ((each * relative).sel(bounce) for each in change(part, "mode_frequency", models))
-    return [*cells, range_text(value, error)]
+    return [*cells, showing.range_text(value, error)]
 
 
 def sentence(result: xr.Dataset) -> str:
@@ -217,7 +216,7 @@ def sentence(result: xr.Dataset) -> str:
 
     def wrong(name: str, scale: float = 1.0) -> str:
         value, error = change(result, name, TOTAL)
-        return range_text(-value, error, scale)
+        return showing.range_text(-value, error, scale)
 
     return (
         f"For the {result.sizes['case']} rotors that levitated, the dipole model errs by {wrong('distance', 1e3)} mm "
@@ -315,7 +314,7 @@ def sufficient(dataset: xr.Dataset) -> xr.Dataset:
     """
     rising, quantities = dataset.sortby("distance"), ["force", "torque"]
     shares = [(rising[f"{name}_missed"] + rising[f"{name}_missed_error"]).values for name in quantities]
-    rows = [[last_crossing(rising["distance"].values, share, level) for level in LEVELS] for share in shares]
+    rows = [[showing.last_crossing(rising["distance"].values, share, level) for level in LEVELS] for share in shares]
     values = variable(("quantity", "level"), rows, "m", "distance from which on the rigid dipole suffices")
     return xr.Dataset({"sufficient_from": values}, {"quantity": quantities, "level": list(LEVELS)})
 
@@ -366,7 +365,7 @@ LABELS = {
 }
 
 
-@drawn
+@showing.drawn
 def floater_figure(result: xr.Dataset) -> Figure:
     """What the rigid dipole misses against distance: share of force and torque; axial force by its two causes."""
     figure, ((left, right),) = panels(1, 2, 3.3)
@@ -395,7 +394,7 @@ def floater_figure(result: xr.Dataset) -> Figure:
 def floater_lines(result: xr.Dataset) -> list[str]:
     reach = 1e3 * result["sufficient_from"]
     rows = [(f"{100 * float(k):g} %", *reach.sel(level=k, quantity=["force", "torque"]).values) for k in reach["level"]]
-    lines = text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)
+    lines = showing.text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)
     if "shift" in result:
         force, error = (float(result[name].sel(axis="z")) for name in ("missed_force", "missed_force_error"))
         shift, doubt = (1e3 * float(result[name].sel(axis="z")) for name in ("shift", "shift_error"))

@@ -19,8 +19,7 @@ from ..figures.style import PALETTE, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .article import FLOATER, PERMEABILITY, REMANENCE, levitation_of, losses, rotor_scene
-from .drawing import drawn, small_multiples
-from .tables import span, text_table
+from .showing import drawn, small_multiples, span, text_table
 
 
 class DriftCase(NamedTuple):

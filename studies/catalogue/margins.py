@@ -35,8 +35,7 @@ from ..cli.options import FieldModel
 from ..figures.style import PALETTE
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
-from . import article, drawing
-from .tables import text_table, uncertain
+from . import article, showing
 
 # Which parameter matters: derivatives by each, and what realistic tolerances of all make of a rotor.
 FRACTIONS = (0.1, 0.5, 0.9)  # Places in the range of stable frequencies at which the distance is asked for
@@ -199,41 +198,41 @@ def band(part: xr.Dataset, quantity: str) -> Array:
     return np.asarray(SCALES[quantity][0] * np.nanpercentile(values, [50, *PERCENTILES], axis=-1))
 
 
-@drawing.drawn
+@showing.drawn
 def contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figure:
     """What one standard deviation of each parameter does to distance or lowest frequency; with errors."""
-    figure, rotors = drawing.rotor_panels(result, 3.6, words, "")
+    figure, rotors = showing.rotor_panels(result, 3.6, words, "")
     chosen = [k for k, name in enumerate(PARAMETERS) if name != "gravity"]  # which is known
     for axes, rotor, color in rotors:
         value, error = contributions(rotor.isel(case=0), quantity)[:, chosen]
         axes.errorbar(value, range(len(chosen)), xerr=error, fmt="o", ms=4, color=color)
-        drawing.plain_log(axes)
+        showing.plain_log(axes)
     first = rotors[0][0]
     first.set_yticks(range(len(chosen)), [list(PARAMETERS.values())[k].words for k in chosen])
     first.invert_yaxis()
     return figure
 
 
-@drawing.drawn
+@showing.drawn
 def bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> Figure:
     """Quantities of the rotors within all tolerances together."""
-    figure, rows = drawing.configuration_panels(result, 2.6, ylabel=words)
+    figure, rows = showing.configuration_panels(result, 2.6, ylabel=words)
     for axes, configuration, part in rows:
         for name, color in zip(quantities, PALETTE, strict=False):
             middle, low, high = band(part, name)
-            places, bars = drawing.rotor_places(axes, configuration, part), [middle - low, high - middle]
+            places, bars = showing.rotor_places(axes, configuration, part), [middle - low, high - middle]
             axes.errorbar(places, middle, bars, fmt="s", ms=4, capsize=3, color=color, label=name)
-    drawing.explain(rows[0][0], {f"median, and {BANDS}": "s"}, ms=4)
+    showing.explain(rows[0][0], {f"median, and {BANDS}": "s"}, ms=4)
     return figure
 
 
 def sensitivity_lines(result: xr.Dataset) -> list[str]:
-    rotors = [(head, rotor.isel(case=0)) for head, rotor in drawing.by_rotor(result)]
+    rotors = [(head, rotor.isel(case=0)) for head, rotor in showing.by_rotor(result)]
     names = [known.words for known in PARAMETERS.values()]
     slopes, bands, leading, leans = [], [], [], []
     for head, one in rotors:
         slope, doubt = (one[name].sel(parameter="measure").values for name in ("derivative", "derivative_error"))
-        slopes.append((head, *map(uncertain, slope[:2], doubt[:2]), *(1e3 * slope[2:])))
+        slopes.append((head, *map(showing.uncertain, slope[:2], doubt[:2]), *(1e3 * slope[2:])))
         bands.append((head, *("{:.2f} ({:.2f} to {:.2f})".format(*band(one, name)) for name in SCALES)))
         sizes = [np.nan_to_num(contributions(one, quantity)[0]) for quantity in SCALES]
         leading.append((head, *(", ".join(f"{names[k]} {s[k]:.2g}" for k in np.argsort(-s)[:3]) for s in sizes)))
@@ -243,10 +242,10 @@ def sensitivity_lines(result: xr.Dataset) -> list[str]:
     tilted = [f"{words}, {tilt:g}°" for words in ("distance (mm)", "growth (1/s)") for tilt in TILTS[1:]]
     per = "derivative, by mm or °", "lowest (Hz)", "highest (Hz)", *(f"{q} (mm)" for q in QUANTITIES[2:])
     return [
-        *text_table(per, slopes),
-        *text_table((f"within tolerance: median, {BANDS}", *units), bands),
-        *text_table(("leading tolerances, one standard deviation", *units), leading),
-        *text_table(("change with the axis tilted from the vertical", *tilted), leans),
+        *showing.text_table(per, slopes),
+        *showing.text_table((f"within tolerance: median, {BANDS}", *units), bands),
+        *showing.text_table(("leading tolerances, one standard deviation", *units), leading),
+        *showing.text_table(("change with the axis tilted from the vertical", *tilted), leans),
     ]
 
 
@@ -438,15 +437,15 @@ def wishes(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     ]
 
 
-@drawing.drawn
+@showing.drawn
 def design_figure(result: xr.Dataset) -> Figure:
     """Stability margin against the cubes' edge for every configuration and wish."""
     across, words = len(np.unique(result["wanted_frequency"])), ("edge of the cubes (mm)", "margin in frequency")
-    figure, rows = drawing.small_multiples(dict(wishes(result)), 2.3, across, *words, sharex=True)
+    figure, rows = showing.small_multiples(dict(wishes(result)), 2.3, across, *words, sharex=True)
     for panel, answers in rows:
         for configuration, color in zip(article.CONFIGURATIONS, PALETTE, strict=False):
             one = case_with(answers, configuration=configuration)
-            panel.plot(1e3 * one["edge"], one["margin"], "o", ms=4, color=color, label=drawing.TITLES[configuration])
+            panel.plot(1e3 * one["edge"], one["margin"], "o", ms=4, color=color, label=showing.TITLES[configuration])
         panel.yaxis.set_major_formatter(PercentFormatter(1.0))
         panel.margins(y=0.15)
         panel.set_ylim(-0.02, None)
@@ -467,12 +466,12 @@ def design_lines(result: xr.Dataset) -> list[str]:
             ends = f"{float(at['lowest']):.1f} to {float(at['highest']):.1f}"
             cells = [f"{1e3 * float(at['edge']):g} mm", found[0], f"{100 * float(at['margin']):.1f} %", ends]
             if np.isfinite(one["true_distance"]):
-                met = uncertain(1e3 * one["true_distance"], 1e3 * one["true_distance_error"])
+                met = showing.uncertain(1e3 * one["true_distance"], 1e3 * one["true_distance_error"])
                 state = "stable" if float(one["true_stable"]) else f"grows at {float(one['true_growth']):.2g} 1/s"
                 cells += [found[1], met, state]
             rows.append((head, *cells, *["not met"] * (7 - len(cells))))
     heads = ("wanted, by", "edge", "closed form", "margin", "stable (Hz)", "finite magnets", "distance (mm)", "")
-    return text_table(heads, rows)
+    return showing.text_table(heads, rows)
 
 
 DESIGN = Study(

@@ -26,8 +26,7 @@ from ..figures.style import PALETTE, panels
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with, each_case, study_of_one
-from . import article, drawing
-from .tables import range_text, text_table, uncertain
+from . import article, showing
 
 # What a plate does to each mode of the floater, against its place, conductivity, thickness, and the rotor.
 DISTANCE = 0.018  # Face below or beside the floater's centre in the sweeps over all else, m
@@ -186,11 +185,11 @@ def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
     }
 
 
-@drawing.drawn
+@showing.drawn
 def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
     """Damping rate of each mode against what is varied; crosses: it grows; bars: error of the plate's table."""
     titles = {SWEEPS[sweep][0]: sweep for sweep in sweeps}
-    figure, rows = drawing.small_multiples(titles, 3.0, 3, ylabel="damping rate (1/s)", sharey=True)
+    figure, rows = showing.small_multiples(titles, 3.0, 3, ylabel="damping rate (1/s)", sharey=True)
     for panel, sweep in rows:
         for ending, (words, style, fill) in ENDINGS.items():
             part = part_of(result, sweep + ending)
@@ -199,11 +198,11 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
             varied = part["rotor_frequency"] if sweep == "frequency" else part["value"] * SWEEPS[sweep][2]
             for mode, color in zip(result["mode"].values, PALETTE, strict=False):
                 _damped(panel, varied, part["growth"].sel(mode=mode), part["error"], style, color, fill)
-                drawing.explain(panel, {drawing.mode_label(mode): "-"}, color=color)
-            drawing.explain(panel, {words: style}, mfc=fill, ms=4)
+                showing.explain(panel, {showing.mode_label(mode): "-"}, color=color)
+            showing.explain(panel, {words: style}, mfc=fill, ms=4)
         panel.set_xlabel(SWEEPS[sweep][1])
         if sweep in PLACES:
-            drawing.plain_log(panel, DISTANCES)
+            showing.plain_log(panel, DISTANCES)
         elif sweep != "frequency":
             panel.set_xscale("log")
     return figure
@@ -217,10 +216,10 @@ def _damped(
     axes.plot(x, growth.where(growth >= 0), "x", color=color, ms=5)
     axes.set_yscale("log")
     if (growth >= 0).any():
-        drawing.explain(axes, {"growth rate (unstable)": "x"}, ms=5)
+        showing.explain(axes, {"growth rate (unstable)": "x"}, ms=5)
 
 
-@drawing.drawn
+@showing.drawn
 def rotors_figure(result: xr.Dataset) -> Figure:
     """Damping rate of the least stable mode of every rotor of the article, plate below and beside, face at 18 mm."""
     figure, ((axes,),) = panels(1, 1, 3.4)
@@ -228,18 +227,18 @@ def rotors_figure(result: xr.Dataset) -> Figure:
         part = part_of(result, sweep)
         places = np.arange(part.sizes["case"])
         _damped(axes, places, part["growth"].max("mode"), part["error"], marker, color, None)
-        drawing.explain(axes, {f"plate {place}": marker}, color=color, ms=4)
+        showing.explain(axes, {f"plate {place}": marker}, color=color, ms=4)
         rotors = zip(part["configuration"].values.tolist(), part["value"].values.tolist(), strict=True)
         axes.set_xticks(places, [article.rotor_label(*rotor) for rotor in rotors], rotation=90)
     axes.set(xlabel="rotor; face of the plate at 18 mm", ylabel="damping rate of the\nleast stable mode (1/s)")
     return figure
 
 
-@drawing.drawn
+@showing.drawn
 def means_figure(result: xr.Dataset) -> Figure:
     """What the plate does on average: it moves the floater, pushes it, brakes it and is warmed."""
     titles = {title: (name, label) for name, (title, label) in MEANS.items()}
-    figure, rows = drawing.small_multiples(titles, 2.2, 2, "distance of the face (mm)", sharex=True)
+    figure, rows = showing.small_multiples(titles, 2.2, 2, "distance of the face (mm)", sharex=True)
     for panel, (name, label) in rows:
         for place, line, color in zip(PLACES, ("-", "--"), PALETTE, strict=False):
             for ending, (words, style, fill) in ENDINGS.items():
@@ -249,7 +248,7 @@ def means_figure(result: xr.Dataset) -> Figure:
                     more: Any = {"ms": 4, "color": color, "mfc": fill, "label": f"{place}, {words}"}
                     panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
         panel.set(ylabel=label, yscale="linear" if name == "lift" else "log")
-        drawing.plain_log(panel, DISTANCES)
+        showing.plain_log(panel, DISTANCES)
     return figure
 
 
@@ -271,13 +270,13 @@ def damping_lines(result: xr.Dataset) -> list[str]:
                 where = f"plate {1e3 * DISTANCE:g} mm below"
             cells, worst = ["no equilibrium", "", *[""] * len(MEANS)], float(one["growth"].max("mode"))
             if np.isfinite(worst):
-                mode = drawing.mode_label(one["mode"].values[int(one["growth"].argmax("mode"))])
-                rate = uncertain(worst, abs(worst) * one["error"])
+                mode = showing.mode_label(one["mode"].values[int(one["growth"].argmax("mode"))])
+                rate = showing.uncertain(worst, abs(worst) * one["error"])
                 cells = [mode, rate, *(f"{float(v):.3g}" for v in means(one).values())]
             before = f"{float(one['growth_without'].max()):+.1g}"
             rows.append((where, f"{float(one['rotor_frequency']):.1f}", before, *cells))
     head = ("where", "rotor (Hz)", "growth without (1/s)", "least stable mode", "growth (1/s)")
-    return [*text_table((*head, *(words for _, words in MEANS.values())), rows), sentence(result)]
+    return [*showing.text_table((*head, *(words for _, words in MEANS.values())), rows), sentence(result)]
 
 
 def sentence(result: xr.Dataset) -> str:
@@ -289,7 +288,7 @@ def sentence(result: xr.Dataset) -> str:
         kept, gone, span = (
             int((worst < 0).sum()),
             int(worst.isnull().sum()),
-            range_text(worst, abs(worst) * part["error"]),
+            showing.range_text(worst, abs(worst) * part["error"]),
         )
         lost = f", {gone} without an equilibrium" if gone else ""
         words.append(f"{place} to {span} /s ({kept} of {part.sizes['case']} stable{lost})")
@@ -425,7 +424,7 @@ def team7_lines(result: xr.Dataset) -> list[str]:
     return lines
 
 
-@drawing.drawn
+@showing.drawn
 def team7_figure(result: xr.Dataset) -> Figure:
     """The four curves with what is measured, and their deviation."""
     figure, ((left, right),) = panels(1, 2, 3.2)
@@ -435,7 +434,7 @@ def team7_figure(result: xr.Dataset) -> Figure:
         left.plot(x, 1e3 * here["computed"], color=color, label=curve)
         left.plot(x, 1e3 * here["measured"], "o", ms=3.5, color=color)
         right.plot(x, 100 * here["deviation"], "o-", ms=3, color=color, label=curve)
-    drawing.explain(left, {"computed, at the same places": "-", "measured (COMPEL 1990)": "o"}, ms=3.5)
+    showing.explain(left, {"computed, at the same places": "-", "measured (COMPEL 1990)": "o"}, ms=3.5)
     right.axhspan(-5, 5, color="0.93", zorder=0)
     left.set(xlabel="x (mm)", ylabel="$B_z$ (mT)")
     right.set(xlabel="x (mm)", ylabel="computed less measured (% of the peak)")

@@ -21,8 +21,7 @@ from ..figures.style import COLORS, NAMES, PALETTE
 from ..levitation import Levitation
 from ..result import Columns
 from ..study import Point, Study, cases_with, each_case, recorded
-from . import article, drawing
-from .tables import records, text_table
+from . import article, showing
 
 # Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
 #
@@ -141,14 +140,14 @@ MARKS = {
 }
 
 
-@drawing.drawn
+@showing.drawn
 def map_figure(result: xr.Dataset) -> Figure:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
-    figure, rows = drawing.configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)")
+    figure, rows = showing.configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)")
     for axes, configuration, rotors in rows:
         for model in article.MODELS:
             _region(axes, cases_with(rotors, model=model), COLORS[model])
-            drawing.explain(axes, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
+            showing.explain(axes, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
         true = cases_with(rotors, model="fem")
         growth, frequency = true["plate_growth"].values, true["plate_frequency"].values
         measure = np.broadcast_to(true["measure"].values[:, None], growth.shape)
@@ -177,12 +176,12 @@ def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
                 here = part[name].values[:, k] == kind
                 if here.any():
                     axes.plot(measure[here], values[here], marker, color=color, mfc="white", ms=4)
-                    drawing.explain(axes, {words: marker}, mfc="white", ms=4)
+                    showing.explain(axes, {words: marker}, mfc="white", ms=4)
 
 
 def map_lines(result: xr.Dataset) -> list[str]:
     rows = []
-    for label, rotor in drawing.by_rotor(result):
+    for label, rotor in showing.by_rotor(result):
         for one in each_case(rotor):
             ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
             stable = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
@@ -199,7 +198,7 @@ def map_lines(result: xr.Dataset) -> list[str]:
             cells = (" and ".join(stable) or "never", ", ".join(plate), " and ".join(lasting))
             rows.append((f"{label}, {one['model'].item()}", *cells))
     head = ("rotor, model", "stable", "growth with the plate (1/s)", f"trajectories last {article.FLIGHT:g} s")
-    return text_table(head, rows)
+    return showing.text_table(head, rows)
 
 
 STABILITY_MAP = Study(
@@ -285,11 +284,11 @@ def upper_limit(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, found, {})
 
 
-@drawing.drawn
+@showing.drawn
 def limit_figure(result: xr.Dataset) -> Figure:
     """Levitation time against frequency of each rotor, one line for each variant."""
-    rotors, words = dict(drawing.by_rotor(result)), ("frequency (Hz)", "levitation time (s)")
-    figure, rows = drawing.small_multiples(rotors, 1.9, 4, *words, sharey=True)
+    rotors, words = dict(showing.by_rotor(result)), ("frequency (Hz)", "levitation time (s)")
+    figure, rows = showing.small_multiples(rotors, 1.9, 4, *words, sharey=True)
     for panel, rotor in rows:
         for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
             frequency, time = one["rotor_frequency"], one["levitated"]
@@ -303,7 +302,7 @@ def limit_figure(result: xr.Dataset) -> Figure:
 
 def limit_lines(result: xr.Dataset) -> list[str]:
     rows, lines = [], []
-    for label, rotor in drawing.by_rotor(result):
+    for label, rotor in showing.by_rotor(result):
         for one in each_case(rotor):
             low, high, start, end = (f"{float(one[name]):.1f}" for name in ENDS)
             lasts = "none" if np.isnan(one["lasts_to"]) else f"{start} to {end} ± 0.5"
@@ -321,13 +320,13 @@ def limit_lines(result: xr.Dataset) -> list[str]:
             f"{float(first['rotor_frequency'][k]):.1f} Hz its floater stays for {times[0]:g} instead of {times[1]:g} s."
         )
     head = ("rotor", "stable without losses (Hz)", f"trajectories last {article.FLIGHT:g} s (Hz)", "then")
-    return [*text_table(head, rows), *lines]
+    return [*showing.text_table(head, rows), *lines]
 
 
 def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
     """Ends of lasting flights by rotor and variant as numbers: `limits`."""
     names = {"configuration": "configuration", "value": "measure", "variant": "variant"}
-    return {"limits": records(result, names | {f"{name}_hz": name for name in ENDS})}
+    return {"limits": showing.records(result, names | {f"{name}_hz": name for name in ENDS})}
 
 
 UPPER_LIMIT = Study(

@@ -38,8 +38,7 @@ from ..processes import safe_path
 from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, REMANENCE
-from .drawing import drawn, explain, small_multiples
-from .tables import text_table
+from .showing import drawn, explain, small_multiples, text_table
 
 Magnets = tuple[Magnet, ...]
 Build = Callable[[Any, Magnets], tuple[FieldTable, int]]  # Makes a table, and says its number of unknowns
