@@ -26,7 +26,7 @@ from ..fem.mutual.table import MutualTable
 from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
-from ..fem.rotor.choice import cached_rotor_table, resolve_model, rotor_table
+from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rotor_table
 from ..fem.rotor.models import AccuracyError
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
@@ -143,9 +143,9 @@ class Levitation:
         if model == "auto":
             detail(f"Field model: {name} ({reason})")
         key = field_key(scene, name, rtol)
-        if name == "fem":
+        if name in PERMEABLE:
             make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest)
-            return self._tables.table(key, name, "Rotor's field by finite elements", make)
+            return self._tables.table(key, name, f"Rotor's field by {PERMEABLE[name]}", make)
         return self._tables.once(key, lambda: rotor_table(scene.rotor, name, rtol, nearest))
 
     @cached_property

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...fem.harmonics.solid import turned_entries
 from ...fem.mutual.making import cached_mutual_table
-from ...fem.rotor.choice import cached_rotor_table, rotor_table
+from ...fem.rotor.choice import PERMEABLE, cached_rotor_table, rotor_table
 from ...fem.rotor.table import FieldFormula, RotorTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import Array, InputError
@@ -207,10 +207,10 @@ def rotor_family(
             f"Input configuration must be one of {', '.join(MOVES)} and have the scene's number of magnets, "
             f"{len(scene.rotor)}; instead received {configuration!r}."
         )
-    if len(moves) > 1 and model == "fem":
+    if len(moves) > 1 and model in PERMEABLE:
         raise InputError(
             "Input model must be dipole or cuboid for a family of rotors whose magnets move against each other, as how "
-            "they magnetise each other changes with their distance; instead received fem. Take one scene a "
+            f"they magnetise each other changes with their distance; instead received {model}. Take one scene a "
             "distance (spinlev.sweep over rotor.displacement_mm), which makes a table for each."
         )
     rotor = tuple(
@@ -219,7 +219,7 @@ def rotor_family(
     )
     alone = [
         cached_rotor_table((magnet,), model, rtol, lambda _: None, nearest)[0]
-        if model == "fem"  # elements take a second, and are kept
+        if model in PERMEABLE  # elements take a second, and are kept
         else rotor_table((magnet,), model, rtol, nearest)
         for magnet in rotor
     ]

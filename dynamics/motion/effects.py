@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...fem.mutual.making import most_points, without_response
+from ...fem.rotor.choice import PERMEABLE
 from ...fem.rotor.floater import floater_sources
 from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
@@ -55,7 +56,7 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
                 f"mutual, for which a magnet would respond at {points} points ({LARGEST} at most)."
             )
         return True, "as asked"
-    if table.model != "fem":
+    if table.model not in PERMEABLE:
         return False, f"the field model {table.model} has no permeability"
     if reasons:
         why = reasons[min(reasons)].split(".")[0]

@@ -271,7 +271,7 @@ ROUNDS = 6  # of reweighting in a fit
 
 
 def trimmed_expansions(
-    expansions: Sequence[MultipoleExpansion], points: Array, allowed: Array
+    expansions: Sequence[MultipoleExpansion], points: Array, allowed: Array, most: int = MOST
 ) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
     """The coefficients that matter, and what they leave out.
 
@@ -279,10 +279,11 @@ def trimmed_expansions(
     ----------
     expansions : whose fields add up
     points, allowed : (n, 3) m, and (n,) T of the whole field that may be left out there
+    most : coefficients up to which they are fitted
 
     The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
-    stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.  Coefficients
-    are those along each expansion's own axes, where its expressions are written.
+    stand in for what is missing: little more than half as many do then. Charges and dipoles stay as they are.
+    Coefficients are those along each expansion's own axes, where its expressions are written.
     """
     parts = [
         (k, int(l), int(m), part)
@@ -304,9 +305,9 @@ def trimmed_expansions(
         fields, end = _fields(expansion, mine, points) / allowed[:, None], start + len(mine)
         sizes[start:end] = np.linalg.norm(fields, axis=2).max(axis=1)
         total += fields.sum(axis=0)
-        of_dipoles += fields[degrees[start:end] == 1].sum(axis=0)
+        of_dipoles += fields[degrees[start:end] <= 1].sum(axis=0)
         start = end
-    dipoles = [part for part in parts if part[1] == 1]
+    dipoles = [part for part in parts if part[1] <= 1]
     if _largest(total) <= 1:
         dipoles = []
     else:
@@ -324,7 +325,7 @@ def trimmed_expansions(
         fields[here[here >= 0]] = _fields(expansion, chosen, points) / allowed[:, None]
         start += len(mine)
     # the fewest of the largest that will do: enough without a fit, and by halving with one
-    factors = _fewest(fields, total)
+    factors = _fewest(fields, total, most)
     kept = [(k, l, m, c * f) for (k, l, m, c), f in zip((parts[i] for i in order), factors, strict=False)]
     kept += dipoles
     missing = [(k, l, m, -c) for k, l, m, c in kept] + parts
@@ -334,7 +335,7 @@ def trimmed_expansions(
     )
 
 
-def _fewest(fields: Array, total: Array) -> Array:
+def _fewest(fields: Array, total: Array, most: int) -> Array:
     """Factors of the first few of the fields (k, n, 3), with which they make the total (n, 3) to 1 at every point."""
     too_few, enough, left_out = 0, 0, total.copy()
     while enough < len(fields) and _largest(left_out) > 1:
@@ -343,7 +344,7 @@ def _fewest(fields: Array, total: Array) -> Array:
     if not enough:
         return np.zeros(0)
     factors = np.ones(enough)
-    if enough > MOST:
+    if enough > most:
         return factors
     while enough - too_few > 1:
         count = (enough + too_few) // 2

@@ -8,7 +8,8 @@ import numpy as np
 
 from ...geometry.common import Watch, unwatched
 from ...geometry.magnets import Magnet
-from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moments_table
+from ..elements.surface import has_skin, smooth
+from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moments_table, surface_table
 from .table import ROTOR, RotorTable, alike
 
 # From the cheapest to the dearest in evaluation
@@ -16,8 +17,13 @@ MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
     "dipole": dipole_table,
     "moments": moments_table,
     "cuboid": cuboid_table,
+    "surface": surface_table,
     "fem": fem_table,
 }
+# Models that know the permeability, and what they are by
+PERMEABLE = {"surface": "charges on the magnets' surfaces", "fem": "finite elements"}
+# Magnets, and accuracy, from which on charges on the surfaces are far quicker than finite elements
+MANY, ROUGH = 4, 1e-5
 FEW_MOMENTS = 16  # coefficients per magnet up to which moments are quicker to evaluate than the closed form
 
 
@@ -26,7 +32,8 @@ def resolve_model(
 ) -> tuple[str, str]:
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
 
-    `auto` is the cheapest of dipole, moments, closed form and finite elements that meets the accuracy.
+    `auto` is the cheapest of dipole, moments and closed form that meets the accuracy; where permeability matters,
+    finite elements, or charges on the surfaces of `MANY` magnets or where no more than `ROUGH` is asked.
 
     Parameters
     ----------
@@ -46,7 +53,13 @@ def resolve_model(
     where = f"at {clearance * 1e3:.3g} mm from the magnets' faces and beyond, where {rtol:.1e} is asked for"
     permeability = float(np.max(cuboid_table(rotor, accuracy).absolute_error(points)[0] / scale))
     if permeability > rtol:
-        return "fem", f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
+        reason = f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
+        if all(has_skin(magnet) or not magnet.contrast for magnet in rotor) and smooth(rotor):
+            if len(rotor) >= MANY:
+                return "surface", f"{reason}, and elements of {len(rotor)} magnets take minutes and gigabytes"
+            if rtol >= ROUGH:
+                return "surface", f"{reason}, and charges on the surfaces take a fraction of the elements' time"
+        return "fem", reason
     for table in (dipole_table(rotor, accuracy), moments_table(rotor, accuracy)):
         error = float(np.max(table.absolute_error(points)[0] / scale))
         count = sum(np.count_nonzero(expansion.coefficients) for expansion in table.expansions)
@@ -70,10 +83,11 @@ def rotor_table(
     ----------
     rotor : magnets, m and T in the rotor's frame
     model : "dipole" (moments J V/μ0 of the remanence, as in the article), "moments" (more of them), "cuboid" (closed
-        form, μr = 1), "fem" (with recoil permeability and mutual demagnetisation), or "auto", see `resolve_model`
-    rtol, nearest : relative accuracy of B asked of "fem" and "moments", and the distance from the magnets' faces from
-        which on it holds, m (None: 0.8 of the largest magnet's edge, if it were a cube)
-    watch : hears of the progress of "fem"
+        form, μr = 1), "surface" and "fem" (with recoil permeability and mutual demagnetisation, by charges on the
+        surfaces or by finite elements), or "auto", see `resolve_model`
+    rtol, nearest : relative accuracy of B asked of "moments", "surface" and "fem", and the distance from the magnets'
+        faces from which on it holds, m (None: 0.8 of the largest magnet's edge, if it were a cube)
+    watch : hears of the progress of "surface" and "fem"
 
     "dipole", "moments" and "cuboid" have the moment J V/μ0 of the remanence alone, as the article does; a cube with
     μr = 1.05 has 0.984 of it, so that their field is 1.6 % too strong by convention ("fem" has the true one, and the
@@ -90,6 +104,8 @@ def rotor_table(
         raise ValueError("Input rotor must hold at least one magnet; instead received none.")
     name, _ = resolve_model(rotor, model, rtol, nearest)
     lone = alike(rotor)
+    if name == "surface":
+        return surface_table(lone, accuracy, watch).posed(rotor)
     if name == "fem":
         return fem_table(lone, accuracy, watch=watch).posed(rotor)
     return _simple_table(_Asked(ROTOR.key(lone, name, rtol, nearest), lone), name, accuracy).posed(rotor)

@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -14,16 +15,23 @@ from ...geometry.cutting import CONVERGENCE, cells_of, cut_magnets
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.overlap import largest_shift
-from ...geometry.shapes import Sphere
+from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Part, places_off
 from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
-from ..harmonics.expansion import MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
+from ..elements.surface import SurfaceCharges, gap, has_skin
+from ..harmonics.expansion import MOST, MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
+from ..harmonics.solid import FOUR_PI, weighted_sums
 from .table import KNOWN, RotorTable
 
 # Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
 NEAR, FARTHER = 600, 150  # in how many directions; nearest by, what is left out of a series changes within 10°
+# Share of what the magnets' fields would be without signs to which errors are relative where they cancel: next to the
+# rotor, more by each of its sizes, and at most. Far from a rotor without a moment nothing is left of its field but what
+# permeability does, and errors relative to that took minutes and gigabytes that no floater there would feel.
+CANCELLED, CANCELLED_FARTHER, CANCELLED_MOST = 0.05, 0.03, 0.3
+FEW, LEAST_NUMBER = 4, 40
 BETWEEN = 0.8  # what may be left out, by what is allowed: between these places it is up to a fifth more than there
 # Least distance from faces from which on a table is to be accurate, by the edge of the largest magnet, if it were a
 # cube: a floater far smaller than the rotor floats as far away as a large one, and the number of pieces that are
@@ -60,29 +68,37 @@ def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, 
     """Points (n, 3) m at which errors are looked at, and the scale (n,) of B (T) there.
 
     They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles with
-    their permeability, which is right to a few per cent, but at least a third of its median at like distances, where
-    fields cancel; 1 T if nothing is magnetised.
+    their permeability, which is right to a few per cent, but at least a third of its median at like distances and
+    a share of what it would be without signs, where fields cancel; 1 T if nothing is magnetised.
     """
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
-    shells = [points_around(magnets, clearance + f * size, FARTHER if f else NEAR) for f in OFFSETS]
-    points, scales = zip(*[(points, typical_field(magnets, points)) for points in shells], strict=True)
+    points = [points_around(magnets, clearance + f * size, FARTHER if f else NEAR) for f in OFFSETS]
+    shares = [min(CANCELLED + CANCELLED_FARTHER * f, CANCELLED_MOST) for f in OFFSETS]
+    scales = [typical_field(magnets, shell, share) for shell, share in zip(points, shares, strict=True)]
     return np.concatenate(points), np.concatenate(scales)
 
 
 def points_around(magnets: tuple[Magnet, ...], offset: float, number: int = FARTHER) -> Array:
-    """Points (n, 3) m at a distance `offset` (m) from the nearest of the `magnets`' faces, in `number` directions."""
-    directions = even_directions(number)
+    """Points (n, 3) m at a distance `offset` (m) from the nearest of the `magnets`' faces.
+
+    In `number` directions, of each of up to `FEW` magnets, and in fewer of more.
+    """
+    directions = even_directions(max(number * FEW // max(len(magnets), FEW), LEAST_NUMBER))
     points = np.concatenate([places_off(magnet.body, directions, offset) for magnet in magnets])
     outside = np.all([magnet.body.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
     return np.asarray(points[outside])
 
 
-def typical_field(magnets: tuple[Magnet, ...], points: Array) -> Array:
-    """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `error_points`."""
+def typical_field(magnets: tuple[Magnet, ...], points: Array, share: float = CANCELLED) -> Array:
+    """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `error_points`.
+
+    `share` is the least, of the field of all magnets without their signs.
+    """
     carriers = [magnet if isinstance(magnet.body, Part) else carrier(magnet) for magnet in magnets]
-    dipoles = [uniform_moments(magnet, 1) for magnet in carriers]
-    field = np.linalg.norm(sum(dipole.evaluate(points)[0] for dipole in dipoles), axis=1)
-    return np.maximum(field, np.median(field) / 3) if field.any() else np.ones(len(field))
+    fields = [uniform_moments(magnet, 1).evaluate(points)[0] for magnet in carriers]
+    field = np.linalg.norm(sum(fields), axis=1)
+    least = np.maximum(np.median(field) / 3, share * sum(np.linalg.norm(one, axis=1) for one in fields))
+    return np.maximum(field, least) if field.any() else np.ones(len(field))
 
 
 DEGREE = 25  # degree up to which the part that a model leaves out is computed
@@ -237,14 +253,7 @@ def fem_table(
     polarized = tuple(one for one in carriers if one.polarization.any())
     table = RotorTable("fem", magnets, polarized, tuple(whole), {k: parts for k, parts in doubts.items() if parts})
     table = _trimmed(table, accuracy, BETWEEN / 20, 1.0)
-    reached = float(np.max(table.absolute_error(points)[0] / scale))
-    if reached > accuracy.rtol:
-        warnings.warn(
-            f"The field's estimated error is {reached:.1e}, more than the {accuracy.rtol:.1e} asked for from "
-            f"{clearance * 1e3:.3g} mm off the magnets' faces on.",
-            AccuracyWarning,
-            stacklevel=2,
-        )
+    reached = _warn_beyond(table, accuracy, points, scale)
     mesh = solution.mesh
     made: dict[str, str | float] = {
         "solver": "ngsolve " + importlib.metadata.version("ngsolve"),
@@ -262,6 +271,117 @@ def fem_table(
     return replace(table, provenance=made)
 
 
+NODES = (4, 6, 8, 10, 12, 14, 16, 20, 24)  # along an edge of a face, from coarse to fine
+# Ratio of two steps of these that is assumed at first, and between which one is believed: a geometric series is left
+FIRST_RATE, FASTEST_RATE, SLOWEST_RATE = 0.3, 0.25, 0.75
+RATE_SAFETY = 2.0
+CONTACT = 0.02  # gap, in edges, below which round bodies count as touching
+FITTED = 40  # coefficients up to which a fit of them takes less than the charges
+SOME = 5  # every so many places are looked at from step to step
+
+
+def without_charges(magnets: Rotor) -> str:
+    """Why charges on the surfaces do not describe the magnets; empty where they do."""
+    for magnet in magnets:
+        if magnet.contrast and isinstance(magnet.body, Part):
+            return "one is a part from a STEP file"
+        if magnet.contrast and not has_skin(magnet):
+            return "one has two permeabilities"
+    for first, second in combinations([magnet.body for magnet in magnets if magnet.contrast], 2):
+        if not (isinstance(first, Box) and isinstance(second, Box)) and gap(first, second) < CONTACT:
+            return "two of them, of which one is round, touch"
+    return ""
+
+
+def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) -> RotorTable:
+    """Field of magnets of one recoil permeability each: closed forms, and expansions of the charges on their surfaces.
+
+    Nodes are added until the estimated error meets the accuracy. If no number of `NODES` does, as where faces that
+    nearly touch lie across each other, the last table is returned with an `AccuracyWarning`.
+
+    Parameters
+    ----------
+    magnets : cuboids, cylinders, rings and spheres, m and T in the rotor's frame
+    accuracy : asked for
+    watch : hears of the progress
+
+    Raises
+    ------
+    InputError : a magnet has two permeabilities, or is a part from a file
+    """
+    start, clearance = time.perf_counter(), accuracy.clearance(magnets)
+    if reason := without_charges(magnets):
+        raise InputError(
+            f'Input rotor must have magnets that charges on their surfaces describe, for the model "surface"; instead '
+            f"{reason}. Choose --model fem."
+        )
+    carriers = tuple(carrier(magnet) for magnet in magnets)
+    points, scale = error_points(magnets, clearance)
+    permeable = tuple(magnet for magnet in magnets if magnet.contrast)
+    cut = cut_magnets(permeable, clearance, _least_ratio(magnets, accuracy.rtol))
+    cells = [
+        (np.array([piece.body.center for piece in pieces]), np.full(len(pieces), pieces[0].body.circumradius), None)
+        if isinstance(pieces[0].body, Box)
+        else (own.centers, own.radii, own)
+        for pieces in cut
+        for own in (cells_of(pieces[0].body, clearance),)
+    ]
+    ratio = min((np.min(np.linalg.norm(points[:, None] - c, axis=2) / r) for c, r, _ in cells), default=CONVERGENCE)
+    degree = _degree([pieces[0] for pieces in cut], [float(ratio)] * len(cut), accuracy.rtol / 10)
+
+    def charged(count: int) -> list[MultipoleExpansion]:
+        skin, found = SurfaceCharges(magnets, count), list[MultipoleExpansion]()
+        beyond = skin.beyond(carriers)
+        for k, (centers, radii, own) in enumerate(cells):
+            places, amounts = skin.fine(k, beyond)
+            nearest = np.argmin(np.linalg.norm(places[:, None] - centers, axis=2), axis=1)
+            owner = own.which(places) if own else nearest
+            for piece, (center, radius) in enumerate(zip(centers, radii.tolist(), strict=True)):
+                chosen = owner == piece
+                weights = amounts[chosen, None] / (FOUR_PI * radius**2)
+                (sums,) = weighted_sums(degree, (places[chosen] - center) / radius, weights)
+                if len(radii) == 1:  # a whole magnet has no charge
+                    sums[0] = 0.0
+                found.append(MultipoleExpansion(center, radius, without_noise(np.conj(sums), 1e-15)))
+        return found
+
+    whole_moments = np.arange(degree + 1)[:, None] > 0
+    whole, steps, before = charged(NODES[0]) if permeable else [], list[MultipoleExpansion](), np.inf
+    for k, count in enumerate(NODES[1:] if permeable else ()):
+        coarse, whole = whole, charged(count)
+        step = [replace(b, coefficients=b.coefficients - a.coefficients) for a, b in zip(coarse, whole, strict=True)]
+        missed = sum(part.evaluate(points[::SOME])[0] for part in step)
+        size = float(np.max(np.linalg.norm(missed, axis=1) / scale[::SOME]))
+        rate = float(np.clip(size / before, FASTEST_RATE, SLOWEST_RATE)) if np.isfinite(before) else FIRST_RATE
+        left, before = RATE_SAFETY * rate / (1 - rate), size
+        # what charge a piece lacks another of its magnet has: seen from afar it is none
+        steps = [replace(part, coefficients=left * part.coefficients * whole_moments) for part in step]
+        watch("charges on the surfaces", (k + 1) / len(NODES))
+        if left * size <= accuracy.rtol / 4:
+            break
+    doubts = {"discretisation": nonzero(steps), "tail": nonzero(extrapolated_tail(whole, float(ratio)))}
+    polarized = tuple(one for one in carriers if one.polarization.any())
+    known = {cause: parts for cause, parts in doubts.items() if parts}
+    table = _trimmed(
+        RotorTable("surface", magnets, polarized, tuple(whole), known), accuracy, BETWEEN / 20, 1.0, FITTED
+    )
+    _warn_beyond(table, accuracy, points, scale)
+    return replace(table, provenance={"nodes": count if permeable else 0, "seconds": time.perf_counter() - start})
+
+
+def _warn_beyond(table: RotorTable, accuracy: Accuracy, points: Array, scale: Array) -> float:
+    """Estimated error of a table at points (n, 3) m by their `scale` (n,) T; warns where it is more than was asked."""
+    reached = float(np.max(table.absolute_error(points)[0] / scale))
+    if reached > accuracy.rtol:
+        warnings.warn(
+            f"The field's estimated error is {reached:.1e}, more than the {accuracy.rtol:.1e} asked for from "
+            f"{accuracy.clearance(table.magnets) * 1e3:.3g} mm off the magnets' faces on.",
+            AccuracyWarning,
+            stacklevel=3,
+        )
+    return reached
+
+
 def _guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
     """Points (n, 3) m nearer to edges and corners than `clearance`, as far from a magnet's centre as its faces' places.
 
@@ -275,11 +395,11 @@ def _guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array
     return points, typical_field(magnets, points)
 
 
-def _trimmed(table: RotorTable, accuracy: Accuracy, least: float, beside: float) -> RotorTable:
+def _trimmed(table: RotorTable, accuracy: Accuracy, least: float, beside: float, most: int = MOST) -> RotorTable:
     """The table without what its other doubts leave room for; that is known, and a doubt of its own.
 
     `least` is the share of the tolerance that may be left out even if the table itself does not meet it, `beside` that
-    of `BESIDE` next to edges.
+    of `BESIDE` next to edges; `most` is that of `trimmed_expansions`.
     """
     clearance = accuracy.clearance(table.magnets)
     points, scale = error_points(table.magnets, clearance)
@@ -291,6 +411,7 @@ def _trimmed(table: RotorTable, accuracy: Accuracy, least: float, beside: float)
         table.expansions,
         np.concatenate([points, guards]),
         np.concatenate([allowed, beside * BESIDE * accuracy.rtol * scale_beside]),
+        most,
     )
     known = (*table.doubts.get(KNOWN, ()), *nonzero(dropped))
     return replace(table, expansions=nonzero(kept), doubts={**table.doubts, **({KNOWN: known} if known else {})})

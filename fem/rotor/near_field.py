@@ -121,7 +121,7 @@ class NearElements:
 
 HIGHEST = 8  # order of the elements
 NEAR_RTOL = 1e-4  # error of B asked for, relative to the largest remanence
-CONTINUED = ("cuboid", "fem")  # models whose field is known inside the magnets, too
+CONTINUED = ("cuboid", "surface", "fem")  # models whose field is known inside the magnets, too
 ON_EDGE = 1e-7  # distance (m) from an edge below which the field counts as that on the edge
 OFF_FACE = 1e-10  # distance (m) from a face below which a point counts as just outside of it
 
@@ -233,7 +233,7 @@ class CompleteTable(RotorTable):
     @cached_property
     def _elements(self) -> NearElements:
         """Of the magnets whose field is the table's: those of closed forms have μr = 1."""
-        return NearElements(self.magnets if self.model == "fem" else [magnet.rigid for magnet in self.magnets])
+        return NearElements(self.magnets if self.model != "cuboid" else [magnet.rigid for magnet in self.magnets])
 
     def fields(self, points: ArrayLike) -> NearField:
         """B, H, M and the gradient at points (n, 3) m, with their errors. Raises InputError on edges."""
@@ -288,7 +288,7 @@ class CompleteTable(RotorTable):
         factor = np.ones(len(points))
         clear = Accuracy().clearance(self.magnets)
         beside = np.min([magnet.body.distance(points) for magnet in self.magnets], axis=0) < clear
-        for part in self.expansions if self.model == "fem" else ():
+        for part in self.expansions if self.model != "cuboid" else ():
             if part.nearest and beside.any():
                 square = (np.linalg.norm(points[beside] - part.center, axis=1) / part.nearest) ** 2
                 slower = (CONVERGENCE**2 - 1) / np.maximum(square - 1, np.finfo(float).tiny)

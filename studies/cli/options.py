@@ -136,7 +136,7 @@ Flag = Annotated[bool, Parameter(negative="")]
 Place = Annotated[str, Parameter(allow_leading_hyphen=True)]
 SceneFile = Annotated[Path, Parameter(help="Scene file.")]
 Spin = Annotated[float, Parameter(help="Body spin S = Ω·m̂/ω of the floater about its own moment.")]
-FieldModel = Literal["dipole", "cuboid", "fem", "map", "auto"]
+FieldModel = Literal["dipole", "cuboid", "surface", "fem", "map", "auto"]
 InteractionModel = Literal["rigid", "mutual", "auto"]
 Quantity = Literal["equilibria", "flight", "field"]
 PlateModel = Literal["none", "slab", "fem", "reduced", "auto"]
@@ -163,9 +163,10 @@ class Models:
 
     Parameters
     ----------
-    model : {"auto", "dipole", "cuboid", "fem", "map"}
+    model : {"auto", "dipole", "cuboid", "surface", "fem", "map"}
         Field model of the motion. dipole and cuboid take the rotor's moment as Br V/μ0, as the article does: for cubes
-        of μr = 1.05 that is 1.6 % too strong. fem has the true one; the floater's always carries its 3/(μr + 2).
+        of μr = 1.05 that is 1.6 % too strong. surface and fem have the true one. The floater's
+        always carries its 3/(μr + 2).
     plate_model : {"auto", "none", "slab", "fem", "reduced"}
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
     interaction : {"auto", "rigid", "mutual"}

@@ -65,10 +65,11 @@ NAMES = _Looks(
     fem="finite elements",
     moments="moments",
     map="map",
+    surface="charges on the surfaces",
 )
 COLORS = _Looks(zip(NAMES, PALETTE, strict=False))
-DASHES = _Looks(dipole="--", cuboid="-.", fem="-", moments=":", map="-")
-COLORS.other, DASHES.other = PALETTE[len(NAMES)], "-"
+DASHES = _Looks(dipole="--", cuboid="-.", fem="-", moments=":", map="-", surface="-")
+COLORS.other, DASHES.other = "#000000", "-"
 Arguments = ParamSpec("Arguments")
 
 

@@ -90,7 +90,7 @@ class Page:
     def _begin(self) -> None:
         """Show the controls of a new scene."""
         self.begun, state = True, self.state
-        names = ["dipole", "cuboid", "fem", *(["map"] if state.scene.field_map else [])]
+        names = ["dipole", "cuboid", "surface", "fem", *(["map"] if state.scene.field_map else [])]
         names += [state.model] if state.model not in names else []
         self.tell(
             controls={

@@ -34,6 +34,7 @@ ENDS = {
 MODEL_WORDS = {
     "dipole": "point dipole",
     "cuboid": "closed form of the cuboids",
+    "surface": "charges on the magnets' surfaces",
     "fem": "finite elements",
     "map": "map of the field",
 }

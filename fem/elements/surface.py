@@ -1,0 +1,487 @@
+"""Permeable magnets by charges on their surfaces: boundary elements, one graded panel a face.
+
+In a magnet of one recoil permeability μ = 1 + χ nothing but its surface is charged, because ∇·M = 0 there. With
+σ = n·μ0 M and outward normals n the charge solves
+
+    (1 + χ/2) σ - χ K σ = n·J + χ n·b,        (K σ)(x) = 1/4π ∫ σ(y) n·(x - y)/|x - y|³ dS,
+
+b the field μ0 H of sources elsewhere. The closed form of uniform carriers is split off, so that a σ of order χ is
+left, with logarithms at the edges. Nodes crowd there as x = sin(π/2 sin(π/2 u)), and between nodes σ is a polynomial
+in u. K from face to face of a body, or of two that are near each other, integrates the product of this polynomial and
+the kernel, with a hyperbolic sine about the place nearest to the target; from afar the nodes' own rule does. Errors
+fall about as n⁻⁷ with the number n of nodes along an edge.
+
+O. D. Kellogg, Foundations of Potential Theory (1929), ch. VI; P. R. Johnston and D. Elliott, Int. J. Numer. Meth. Eng.
+62 (2005) 564, for the hyperbolic sine.
+"""
+
+from collections.abc import Sequence
+from functools import cache, cached_property
+from itertools import combinations, product
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+
+from ...geometry.common import Array, ComputationError
+from ...geometry.magnets import Magnet
+from ...geometry.overlap import separation
+from ...geometry.shapes import Box, Cylinder, Sphere
+from ...geometry.solids import Solid
+from ..closed_forms.uniform import remanent_field
+from ..harmonics.interior import sphere
+from ..harmonics.solid import FOUR_PI, members, orthonormal
+
+INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
+SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
+APART = 4.0  # distance from a face, in edges by the nodes along them, from which on the nodes' own rule does to 1e-8
+MORE = 2  # times as many nodes along an edge for moments as for charges
+KINKS = 0.2  # gap, in edges, from which on a neighbour's edges make no kink in the charges
+FINE = 10  # nodes of the rule for a product beyond those along an edge
+ROWS = 1 << 20  # numbers at once in such a rule
+ROUND_OFF = 1e-13
+WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near the axis, too
+
+
+@cache
+def graded(count: int) -> tuple[Array, Array]:
+    """Places x (n,) = sin(π/2 sin(π/2 u)), -1 to 1, at Gauss's u, and weights (n,) of an integral over x."""
+    u, weights = np.polynomial.legendre.leggauss(count)
+    inner = np.pi / 2 * np.sin(np.pi / 2 * u)
+    return np.sin(inner), weights * (np.pi / 2) ** 2 * np.cos(inner) * np.cos(np.pi / 2 * u)
+
+
+@cache
+def _to_nodes(count: int) -> Array:
+    """(n, n): Lagrange's polynomials at Gauss's nodes by Legendre's."""
+    u, weights = np.polynomial.legendre.leggauss(count)
+    return np.asarray((np.arange(count) + 0.5)[:, None] * np.polynomial.legendre.legvander(u, count - 1).T * weights)
+
+
+def _lagrange(places: Array, count: int) -> Array:
+    """(..., n): Lagrange's polynomials in u, for the nodes of `graded`, at places x (...,)."""
+    u = 2 / np.pi * np.arcsin(2 / np.pi * np.arcsin(np.clip(places, -1.0, 1.0)))
+    return np.asarray(np.polynomial.legendre.legvander(u, count - 1) @ _to_nodes(count))
+
+
+def _about(place: Array, scale: Array, half: float, count: int) -> tuple[Array, Array, Array]:
+    """Places (..., m), weights, and distances from (`place`, `scale`) of a rule from -half to half, fine about `place`.
+
+    It is graded towards both ends, too, where the polynomials in u have no derivatives.
+    """
+    x, weights = graded(count)
+    low, high = np.arcsinh((-half - place) / scale)[..., None], np.arcsinh((half - place) / scale)[..., None]
+    angle = (low + high) / 2 + (high - low) / 2 * x
+    distance = scale[..., None] * np.cosh(angle)
+    return place[..., None] + scale[..., None] * np.sinh(angle), (high - low) / 2 * weights * distance, distance
+
+
+def face_rows(places: Array, normals: Array, halves: Array, counts: tuple[int, int]) -> Array:
+    """n·h (T) at places off the plane of a rectangle by the charges (T) at its n × m nodes: weights (t, n m).
+
+    Parameters
+    ----------
+    places, normals : (t, 3), along the rectangle's edges and its normal, from its middle
+    halves : (2,) half edges
+    counts : n and m, nodes along the edges
+    """
+    (first, second), result = counts, np.empty((len(places), *counts))
+    step = max(1, ROWS // ((first + FINE) * (second + FINE) * second))
+    for start in range(0, len(places), step):
+        some = slice(start, start + step)
+        (p, q, d), (a, b, c) = places[some].T, normals[some].T
+        s, wide, beside = _about(p, np.abs(d), float(halves[0]), first + FINE)
+        t, tall, distance = _about(np.broadcast_to(q[:, None], beside.shape), beside, float(halves[1]), second + FINE)
+        across = (a[:, None] * (p[:, None] - s) + (c * d)[:, None])[..., None]
+        across = across + b[:, None, None] * (q[:, None, None] - t)
+        along = ((across * tall / distance**3)[..., None, :] @ _lagrange(t / halves[1], second))[..., 0, :]
+        result[some] = np.swapaxes(_lagrange(s / halves[0], first), 1, 2) @ (along * wide[..., None])
+    return result.reshape(len(places), first * second) / FOUR_PI
+
+
+def far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Array:
+    """As `face_rows`, by the rule of the nodes alone: `sources` (n, 3) with `areas` (n,)."""
+    inverse = 1 / np.maximum(
+        np.sum(places**2, axis=1)[:, None] + np.sum(sources**2, axis=1) - 2 * places @ sources.T, np.finfo(float).tiny
+    )
+    inverse *= np.sqrt(inverse)
+    inverse *= np.sum(places * normals, axis=1)[:, None] - normals @ sources.T
+    return np.asarray(inverse * (areas / FOUR_PI))
+
+
+class Skin:
+    """Nodes on the surface of a body: `places` (n, 3) m, outward `normals` (n, 3) and `areas` (n,) m², body's axes.
+
+    Nearer than `reach` (m) to it `near_rows` does what the nodes' own rule does not.
+    """
+
+    places: Array
+    normals: Array
+    areas: Array
+    reach = 0.0
+
+    @cached_property
+    def own(self) -> Array:
+        """K (n, n) of the body alone."""
+        raise NotImplementedError
+
+    def near_rows(self, places: Array, normals: Array) -> Array:
+        """n·h (T) of the charges at places outside the body or on it, (t, n)."""
+        raise NotImplementedError
+
+    @cached_property
+    def fine(self) -> tuple[Array, Array]:
+        """More places (k, 3), for high moments, and the areas there by those of the nodes' values (k, n)."""
+        return self.places, np.diag(self.areas)
+
+    @cached_property
+    def coarse(self) -> tuple[Array, Array, Array]:
+        """Places and normals (k, 3) that stand for all from afar, and the nodes' values by those there (n, k)."""
+        return self.places, self.normals, np.eye(len(self.places))
+
+
+class BoxSkin(Skin):
+    """Of a cuboid, face by face: on those at -x, x, -y, y, -z and z, with more nodes along longer edges."""
+
+    def __init__(self, body: Box, count: int) -> None:
+        self.half = body.half_edges
+        self.counts = [round(count * np.sqrt(half / self.half.min())) for half in self.half]
+        self.reach = APART * float(np.max(2 * self.half / self.counts))
+        rules, places, normals, areas, self.numbers, total = [graded(n) for n in self.counts], [], [], [], {}, 0
+        for axis, side in product(range(3), (-1, 1)):
+            b, c = (axis + 1) % 3, (axis + 2) % 3
+            face = np.empty((self.counts[b], self.counts[c], 3))
+            face[..., axis] = side * self.half[axis]
+            face[..., b], face[..., c] = self.half[b] * rules[b][0][:, None], self.half[c] * rules[c][0]
+            places.append(face.reshape(-1, 3))
+            normals.append(np.broadcast_to(side * np.eye(3)[axis], places[-1].shape))
+            areas.append(self.half[b] * self.half[c] * np.outer(rules[b][1], rules[c][1]).ravel())
+            self.numbers[axis, side] = total + np.arange(face[..., 0].size).reshape(face.shape[:2])  # of the nodes
+            total += len(places[-1])
+        self.places, self.normals, self.areas = (np.concatenate(part) for part in (places, normals, areas))
+
+    def _face(self, axis: int, side: int, places: Array) -> tuple[list[int], Array, Array, tuple[int, int]]:
+        """A face's axes and normal as an order, places as it sees them, its half edges, and its counts of nodes."""
+        order = [(axis + 1) % 3, (axis + 2) % 3, axis]
+        seen = places[:, order] - [0, 0, side * self.half[axis]]
+        return order, seen, self.half[order[:2]], (self.counts[order[0]], self.counts[order[1]])
+
+    def _image(self, axis: int) -> NDArray[np.intp]:
+        """(n,) the nodes' mirror images at the plane across an axis."""
+        found = np.empty(len(self.places), int)
+        for (across, side), mine in self.numbers.items():
+            along = [(across + 1) % 3, (across + 2) % 3]
+            image = self.numbers[across, -side] if across == axis else np.flip(mine, along.index(axis))
+            found[mine] = image
+        return found
+
+    @cached_property
+    def own(self) -> Array:
+        """K (n, n); what mirrors and, of a cube, turns of the body make of each other is computed once."""
+        total = len(self.places)
+        result, everything = np.zeros((total, total)), np.arange(total)
+        mirrors = [self._image(axis) for axis in range(3)]
+        cube = np.ptp(self.half) <= INSET * self.half[0]
+        for axis in range(1 if cube else 3):
+            order, seen, halves, counts = self._face(axis, -1, self.places)
+            chosen, face = np.flatnonzero((seen >= 0).all(axis=1) & (seen[:, 2] > 0)), self.numbers[axis, -1].ravel()
+            rows = face_rows(seen[chosen], self.normals[chosen][:, order], halves, counts)
+            for which in product((False, True), repeat=3):
+                image = everything
+                for mirror, used in zip(mirrors, which, strict=True):
+                    image = mirror[image] if used else image
+                for turn in range(3 if cube else 1):
+                    turned = (image + turn * total // 3) % total
+                    result[np.ix_(turned[chosen], turned[face])] = rows
+        return result
+
+    @cached_property
+    def fine(self) -> tuple[Array, Array]:
+        places, shares = [], []
+        for axis, side in self.numbers:
+            order, _, halves, counts = self._face(axis, side, self.places[:1])
+            (x, wide), (y, tall) = (graded(MORE * n) for n in counts)
+            face = np.empty((len(x), len(y), 3))
+            face[..., axis], face[..., order[0]] = side * self.half[axis], halves[0] * x[:, None]
+            face[..., order[1]] = halves[1] * y
+            places.append(face.reshape(-1, 3))
+            along, across = (_lagrange(places_, n) for places_, n in zip((x, y), counts, strict=True))
+            areas = halves[0] * halves[1] * np.outer(wide, tall).ravel()
+            shares.append(areas[:, None] * np.kron(along, across))
+        return np.concatenate(places), np.asarray(scipy.linalg.block_diag(*shares))
+
+    @cached_property
+    def coarse(self) -> tuple[Array, Array, Array]:
+        x, _ = np.polynomial.legendre.leggauss(COARSE)
+        places, normals, shares = [], [], []
+        for (axis, side), numbers in self.numbers.items():
+            order, _, halves, counts = self._face(axis, side, self.places[:1])
+            face = np.empty((COARSE, COARSE, 3))
+            face[..., axis], face[..., order[0]] = side * self.half[axis], halves[0] * x[:, None]
+            face[..., order[1]] = halves[1] * x
+            places.append(face.reshape(-1, 3))
+            normals.append(np.broadcast_to(self.normals[numbers.flat[0]], places[-1].shape))
+            vander = np.linalg.inv(np.polynomial.legendre.legvander(x, COARSE - 1))
+            shares.append(
+                np.kron(*(np.polynomial.legendre.legvander(graded(n)[0], COARSE - 1) @ vander for n in counts))
+            )
+        return np.concatenate(places), np.concatenate(normals), np.asarray(scipy.linalg.block_diag(*shares))
+
+    def near_rows(self, places: Array, normals: Array) -> Array:
+        result = np.empty((len(places), len(self.places)))
+        for (axis, side), numbers in self.numbers.items():
+            (order, seen, halves, counts), mine = self._face(axis, side, places), numbers.ravel()
+            beyond = np.maximum(np.abs(seen) - [*halves, 0.0], 0)
+            near = np.linalg.norm(beyond, axis=1) < APART * np.max(2 * halves / counts)
+            off = np.abs(seen[:, 2]) > INSET * self.half.max()
+            rows = face_rows(seen[near & off], normals[near & off][:, order], halves, counts)
+            result[np.ix_(near & off, mine)] = rows
+            result[np.ix_(near & ~off, mine)] = 0.0
+            apart = far_rows(places[~near], normals[~near], self.places[mine], self.areas[mine])
+            result[np.ix_(~near, mine)] = apart
+            on = near & ~off & (beyond[:, :2] == 0).all(axis=1)  # of a body that touches: the charges' own jump
+            along, across = (_lagrange(seen[on, i] / halves[i], counts[i]) for i in range(2))
+            jump = 0.5 * side * normals[on, axis, None] * along
+            result[np.ix_(on, mine)] = (jump[:, :, None] * across[:, None]).reshape(-1, len(mine))
+        return result
+
+
+class RoundSkin(Skin):
+    """Of a cylinder or ring: n nodes along each line of its section, 2 n around."""
+
+    def __init__(self, body: Cylinder, count: int) -> None:
+        half, outer, inner = body.height / 2, body.radius, body.inner_radius
+        self.count = count
+        # middle and half way of each line (r, z), and its normal
+        self.lines = [
+            (np.array([outer, 0.0]), np.array([0.0, half]), np.array([1.0, 0.0])),
+            *(
+                (np.array([(outer + inner) / 2, s * half]), np.array([(outer - inner) / 2, 0.0]), np.array([0.0, s]))
+                for s in (-1.0, 1.0)
+            ),
+        ]
+        if inner:
+            self.lines.append((np.array([inner, 0.0]), np.array([0.0, half]), np.array([-1.0, 0.0])))
+        (x, weights), turns = graded(count), 2 * count
+        self.section = np.concatenate([middle + x[:, None] * way for middle, way, _ in self.lines])
+        across = np.concatenate([np.broadcast_to(normal, (count, 2)) for _, _, normal in self.lines])
+        widths = np.concatenate([weights * np.linalg.norm(way) for _, way, _ in self.lines])
+        angle = 2 * np.pi * np.arange(turns) / turns
+        self.places, self.normals = (
+            np.stack(
+                np.broadcast_arrays(r[:, None] * np.cos(angle), r[:, None] * np.sin(angle), z[:, None]), axis=-1
+            ).reshape(-1, 3)
+            for r, z in (self.section.T, across.T)
+        )
+        self.section_normals = across
+        self.areas = np.repeat(widths * self.section[:, 0] * 2 * np.pi / turns, turns)
+
+    @cached_property
+    def own(self) -> Array:
+        """K (n, n), which around the axis is a convolution."""
+        count, turns = self.count, 2 * self.count
+        orders = np.arange(count + 1)
+        modes = np.concatenate([self._modes(line, orders) for line in self.lines], axis=1)  # (targets, nodes, orders)
+        apart = 2 * np.pi * (np.arange(turns)[:, None] - np.arange(turns)) / turns
+        shares = np.where((orders == 0) | (orders == count), 1.0, 2.0) / turns
+        kernel = np.einsum("ijm,mab->iajb", modes * shares, np.cos(orders[:, None, None] * apart))
+        return np.asarray(kernel.reshape(len(self.places), -1))
+
+    def _modes(self, line: tuple[Array, Array, Array], orders: NDArray[np.intp]) -> Array:
+        """(targets, n, orders): n·h at the section's nodes by cos mφ times the polynomials of one line's nodes."""
+        middle, way, normal = line
+        half, count, result = float(np.linalg.norm(way)), self.count, []
+        unit, (x, weights) = way / half, graded(count + FINE)
+        for place, own in zip(self.section, self.section_normals, strict=True):
+            along, off = float((place - middle) @ unit), abs(float((place - middle) @ normal))
+            if off > INSET * half:
+                s, width, _ = (a[0] for a in _about(np.array([along]), np.array([off]), half, count + FINE))
+            else:  # on the line itself there is a logarithm
+                ends = np.array([-half, min(max(along, -half), half), half])
+                wide = np.diff(ends)[:, None] / 2
+                s, width = ((ends[:-1, None] + wide) + wide * x).ravel(), (wide * weights).ravel()
+            sources = middle + s[:, None] * unit
+            gap = np.maximum(np.linalg.norm(place - sources, axis=1), ROUND_OFF * half)
+            scale = np.minimum(gap / np.sqrt(place[0] * np.maximum(sources[:, 0], ROUND_OFF * half)), WIDEST)
+            u, v = np.polynomial.legendre.leggauss(count + 2 * FINE)
+            top = np.arcsinh(np.pi / scale)[:, None] / 2
+            angle, step = scale[:, None] * np.sinh(top * (1 + u)), top * v * scale[:, None] * np.cosh(top * (1 + u))
+            r, square = sources[:, :1], gap[:, None] ** 2 + 4 * place[0] * sources[:, :1] * np.sin(angle / 2) ** 2
+            # r - r' cos φ with what cancels taken together
+            beside = place[0] - r + 2 * r * np.sin(angle / 2) ** 2
+            kernel = (own[0] * beside + own[1] * (place[1] - sources[:, 1:])) / square**1.5
+            around = np.einsum("sk,skm->sm", kernel * step, np.cos(angle[..., None] * orders))
+            around *= (2 * width * sources[:, 0])[:, None] / FOUR_PI
+            result.append(_lagrange(s / half, count).T @ around)
+        return np.array(result)
+
+
+class SphereSkin(Skin):
+    """Of a sphere, on which K of a harmonic of degree l is half of it by 2 l + 1."""
+
+    def __init__(self, body: Sphere, count: int) -> None:
+        self.normals, areas = sphere(count)
+        self.places, self.areas, self.count = body.radius * self.normals, body.radius**2 * areas, count
+
+    @cached_property
+    def own(self) -> Array:
+        keys = members(self.count)
+        values = orthonormal(keys, self.normals)
+        return np.asarray(values / [2 * (2 * l + 1) for l, _, _ in keys] @ (values.T * sphere(self.count)[1]))
+
+
+@cache
+def _skin(kind: str, numbers: tuple[float, ...], count: int) -> Skin:
+    """Of a body in units of its first number: alike bodies of all sizes and magnets share what K is."""
+    if kind == "cuboid":
+        return BoxSkin(Box(np.array(numbers)), count)
+    if kind == "sphere":
+        return SphereSkin(Sphere(numbers[0]), count)
+    radius, hole, height = (*numbers, 0.0)[:3] if len(numbers) > 2 else (numbers[0], 0.0, numbers[1])
+    return RoundSkin(Cylinder(radius, height, inner_radius=hole), count)
+
+
+def has_skin(magnet: Magnet) -> bool:
+    """Whether a magnet can respond by charges on its surface: a shape with a closed form, of one permeability."""
+    return magnet.isotropic and isinstance(magnet.body, Box | Cylinder | Sphere)
+
+
+def alike_in_contact(first: Solid, second: Solid) -> bool:
+    """Whether two bodies are cuboids whose faces that look at each other are alike and opposite each other."""
+    if not (isinstance(first, Box) and isinstance(second, Box)):
+        return False
+    turn, offset = np.abs(first.rotation.T @ second.rotation), np.abs(first.to_body(second.center))
+    small = INSET * float(first.size.max())
+    beside = offset > small
+    same = np.abs(turn @ second.size - first.size) <= small
+    return bool(np.all((turn < INSET) | (np.abs(turn - 1) < INSET)) and beside.sum() == 1 and same[~beside].all())
+
+
+def gap(first: Solid, second: Solid) -> float:
+    """Gap of two bodies in the smallest edge of both; where their circumscribed spheres are apart, at least theirs."""
+    apart = float(np.linalg.norm(first.center - second.center)) - first.circumradius - second.circumradius
+    edge = min(float(first.size.min()), float(second.size.min()))
+    return apart / edge if apart > edge else separation(first, second)[0] / edge
+
+
+def smooth(magnets: Sequence[Magnet]) -> bool:
+    """Whether charges have no kinks but at the edges: elsewhere faces that lie across each other would make some."""
+    pairs = combinations([magnet.body for magnet in magnets], 2)
+    return all(alike_in_contact(first, second) or gap(first, second) > KINKS for first, second in pairs)
+
+
+# Distance of two bodies' centres, in the sum of their circumradii, from which on few places on each stand for all:
+# those of Gauss's rule, COARSE along an edge. What is charged beyond the carriers has hardly a field there.
+FAR, COARSE = 1.5, 4
+
+
+class SurfaceCharges:
+    """Charges on the surfaces of permeable magnets that respond to each other.
+
+    Parameters
+    ----------
+    magnets : each of them `has_skin`
+    count : n, nodes along an edge of a face
+
+    Attributes
+    ----------
+    magnets : those that are permeable, on whose surfaces the nodes are
+    places, normals, areas : of the nodes, (n, 3) m, outward (n, 3) and (n,) m²; rotor's frame, magnet by magnet
+    owner : (n,) which of `magnets` a node is of
+    """
+
+    def __init__(self, magnets: Sequence[Magnet], count: int) -> None:
+        self.all, self.magnets = tuple(magnets), tuple(magnet for magnet in magnets if magnet.contrast)
+        places, normals, areas, self._skins, self._sizes = [], [], [], [], []
+        for magnet in self.magnets:
+            body, size = magnet.body, float(magnet.body.shape_numbers[0])
+            skin = _skin(body.kind, tuple(np.round(body.shape_numbers / size, 12).tolist()), count)
+            places.append(body.center + size * skin.places @ body.rotation.T)
+            normals.append(skin.normals @ body.rotation.T)
+            areas.append(size**2 * skin.areas)
+            self._skins.append(skin)
+            self._sizes.append(size)
+        self.places, self.normals, self.areas = (np.concatenate(part) for part in (places, normals, areas))
+        self.owner = np.repeat(np.arange(len(areas)), [len(one) for one in areas])
+        self._contrast = np.array([magnet.recoil_permeability - 1 for magnet in self.magnets])[self.owner]
+        centers = np.array([magnet.body.center for magnet in self.magnets])
+        radii = np.array([magnet.body.circumradius for magnet in self.magnets])
+        distances = np.linalg.norm(centers[:, None] - centers, axis=2)
+        self._far = distances > FAR * (radii[:, None] + radii)
+        self._near = [self._rows(k) for k in range(len(self.magnets))]
+
+    def _rows(self, number: int) -> tuple[NDArray[np.intp], Array]:
+        """Nodes of bodies that are not far from a magnet, and n·h there by its charges."""
+        magnet, skin, size = self.magnets[number], self._skins[number], self._sizes[number]
+        at = np.flatnonzero(~self._far[number, self.owner] & (self.owner != number))
+        mine, rows = self.owner == number, np.zeros((len(at), len(skin.places)))
+        close = magnet.body.distance(self.places[at]) < size * skin.reach
+        rows[~close] = far_rows(self.places[at[~close]], self.normals[at[~close]], self.places[mine], self.areas[mine])
+        if close.any():
+            local = magnet.body.to_body(self.places[at[close]]) / size
+            rows[close] = skin.near_rows(local, self.normals[at[close]] @ magnet.body.rotation)
+        return at, rows
+
+    @cached_property
+    def _from_afar(self) -> Array:
+        """n·h at the coarse places of all bodies by charges at those of bodies that are far from them."""
+        owner = np.repeat(np.arange(len(self.magnets)), [len(skin.coarse[0]) for skin in self._skins])
+        of = list(zip(self.magnets, self._skins, self._sizes, strict=True))
+        places = np.concatenate([m.body.center + size * s.coarse[0] @ m.body.rotation.T for m, s, size in of])
+        normals = np.concatenate([s.coarse[1] @ m.body.rotation.T for m, s, _ in of])
+        result = np.zeros((len(places), len(places)))
+        for k in range(len(self.magnets)):
+            far, mine = self._far[k, owner], owner == k
+            result[np.ix_(far, mine)] = far_rows(places[far], normals[far], places[mine], np.ones(mine.sum()))
+        return result
+
+    def normal_field(self, charges: Array) -> Array:
+        """K σ (n,) T of charges (n,) T."""
+        found = np.zeros_like(charges)
+        of = [np.flatnonzero(self.owner == k) for k in range(len(self.magnets))]
+        for skin, mine, (at, rows) in zip(self._skins, of, self._near, strict=True):
+            found[mine] += skin.own @ charges[mine]
+            found[at] += rows @ charges[mine]
+        if self._far.any():
+            amounts = self.areas * charges
+            seen = self._from_afar @ np.concatenate(
+                [skin.coarse[2].T @ amounts[mine] for skin, mine in zip(self._skins, of, strict=True)]
+            )
+            parts = np.split(seen, np.cumsum([len(skin.coarse[0]) for skin in self._skins])[:-1])
+            for skin, mine, part in zip(self._skins, of, parts, strict=True):
+                found[mine] += skin.coarse[2] @ part
+        return found
+
+    def fine(self, number: int, charges: Array) -> tuple[Array, Array]:
+        """Places (k, 3) m on one of `magnets`, and amounts (k,) T m² there, with the moments of charges (n,) T."""
+        body, size = self.magnets[number].body, self._sizes[number]
+        places, shares = self._skins[number].fine
+        amounts = size**2 * (shares @ charges[self.owner == number])
+        return body.center + size * places @ body.rotation.T, amounts
+
+    def answer(self, field: Array) -> Array:
+        """Charges σ (n,) T that a field b (n, 3) T of sources elsewhere makes. Raises ComputationError as `settled`."""
+        return self.settled(self._contrast * np.sum(field * self.normals, axis=1))
+
+    def settled(self, right: Array) -> Array:
+        """σ (n,) T of (1 + χ/2) σ - χ K σ = `right` (n,) T. Raises ComputationError where they do not settle."""
+        share = 1 / (1 + self._contrast / 2)
+        whole = scipy.sparse.linalg.LinearOperator(
+            (len(right),) * 2, lambda v: v - share * self._contrast * self.normal_field(v), dtype=float
+        )
+        rtol = SOLVED * (1 + float(self._contrast.max()))
+        found, failed = scipy.sparse.linalg.gmres(whole, share * right, rtol=rtol, restart=60, maxiter=5)
+        if failed:
+            raise ComputationError("The charges on the magnets' surfaces did not settle.")
+        return np.asarray(found)
+
+    def beyond(self, carriers: Sequence[Magnet]) -> Array:
+        """σ (n,) T beyond n·J' of uniform `carriers`, one for each of all magnets."""
+        sizes = np.array([magnet.body.size.min() for magnet in self.magnets])[self.owner]
+        closed = remanent_field(carriers, self.places - INSET * sizes[:, None] * self.normals)
+        kept = [one for one, magnet in zip(carriers, self.all, strict=True) if magnet.contrast]
+        rest = np.array(
+            [m.polarization_in_rotor - c.polarization_in_rotor for m, c in zip(self.magnets, kept, strict=True)]
+        )
+        return self.settled(np.sum((rest[self.owner] + self._contrast[:, None] * closed) * self.normals, axis=1))

@@ -1,0 +1,161 @@
+"""Charges on the surfaces of permeable magnets, against finite elements, exact spheres, and themselves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import HORIZONTAL
+
+import spinlev as sl
+from spinlev.fem.elements import surface
+from spinlev.fem.elements.surface import SurfaceCharges, smooth
+from spinlev.fem.rotor.choice import resolve_model
+from spinlev.fem.rotor.models import Accuracy, AccuracyWarning, error_points, fem_table, surface_table
+from spinlev.geometry.common import InputError
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, rotation_matrix
+
+EDGE = 1e-2
+ALONG, ACROSS = np.array([0.0, 0.0, 1.3]), np.array([1.0, 0.0, 0.4])
+
+
+def box(size=(1, 1, 1), center=(0, 0, 0), turn=(0, 0, 0), polarization=ALONG, mu=1.05):
+    body = Box(EDGE * np.array(size, float), EDGE * np.array(center, float), rotation_matrix(turn))
+    return Magnet(body, polarization, mu)
+
+
+def halbach(number, radius, mu=1.05):
+    angles = 2 * np.pi * np.arange(number) / number
+    return tuple(
+        box((0.6,) * 3, radius * np.array([np.cos(a), np.sin(a), 0]), (0, 90, np.degrees(2 * a)), mu=mu) for a in angles
+    )
+
+
+ROTORS = {
+    "cube": (box(),),
+    "turned brick": (box((1, 1.4, 0.8), (0.2, 0, 0), (20, 0, 30), ACROSS, 1.1),),
+    "two that touch": (box((1, 1, 0.5), (0, 0, 0.25)), box((1, 1, 0.5), (0, 0, -0.25))),
+    "two side by side, opposite": (box(center=(0.5, 0, 0)), box(center=(-0.5, 0, 0), polarization=-ALONG)),
+    "cylinder across": (Magnet(Cylinder(0.5 * EDGE, EDGE), ACROSS, 1.05),),
+    "cylinder beside a cube": (
+        Magnet(Cylinder(0.5 * EDGE, EDGE, EDGE * np.array([1.3, 0, 0]), rotation_matrix((0, 90, 0))), ALONG, 1.1),
+        box(),
+    ),
+    "sphere beside a cube": (Magnet(Sphere(0.5 * EDGE, EDGE * np.array([1.2, 0, 0])), ALONG, 1.1), box()),
+}
+
+
+FAST = ("cube", "turned brick", "cylinder across")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in ROTORS]
+)
+def test_the_field_is_that_of_finite_elements(name):
+    """Another method altogether: volumes instead of surfaces, weak instead of strong, meshed instead of graded."""
+    rotor = ROTORS[name]
+    charges, elements = surface_table(rotor, Accuracy(1e-5)), fem_table(rotor, Accuracy(1e-5))
+    points, scale = error_points(rotor, Accuracy().clearance(rotor))
+    apart = np.linalg.norm(charges.evaluate(points)[0] - elements.evaluate(points)[0], axis=1)
+    stated = charges.absolute_error(points)[0] + elements.absolute_error(points)[0]
+    assert np.all(apart <= np.maximum(stated, 1e-6 * scale))
+    assert np.max(stated / scale) < 3e-5
+    rigid = surface_table(tuple(magnet.rigid for magnet in rotor), Accuracy()).evaluate(points)[0]
+    assert np.max(np.linalg.norm(charges.evaluate(points)[0] - rigid, axis=1) / scale) > 1e-3  # there is something
+
+
+@pytest.mark.parametrize("name", ["cube", "two that touch", "cylinder across"])
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3, 1e-4])
+def test_the_stated_error_is_not_exceeded(name, rtol):
+    rotor = ROTORS[name]
+    table, fine = surface_table(rotor, Accuracy(rtol)), surface_table(rotor, Accuracy(3e-6))
+    points, scale = error_points(rotor, Accuracy().clearance(rotor))
+    error = np.linalg.norm(table.evaluate(points)[0] - fine.evaluate(points)[0], axis=1) / scale
+    stated = table.absolute_error(points)[0] / scale
+    assert error.max() <= stated.max() <= rtol
+
+
+def test_errors_fall_with_the_seventh_power():
+    magnets = ROTORS["cube"]
+    carriers = [replace(m, polarization=m.polarization / (1 + 0.05 / 3), recoil_permeability=1.0) for m in magnets]
+    points = error_points(magnets, 0.8 * EDGE)[0][:200]
+
+    def field(count):
+        skin = SurfaceCharges(magnets, count)
+        away = points[:, None] - skin.places
+        amounts = skin.beyond(carriers) * skin.areas
+        return np.einsum("k,nka->na", amounts, away / np.linalg.norm(away, axis=2)[..., None] ** 3)
+
+    best = field(20)
+    coarse, fine = (np.abs(field(count) - best).max() for count in (6, 12))
+    assert fine < coarse / 2**6
+
+
+@pytest.mark.parametrize("mu", [1.05, 5.0, 1000.0])
+def test_a_sphere_in_a_uniform_field(mu):
+    """3 (μ - 1)/(μ + 2) of n·b, exactly (Jackson, section 4.4)."""
+    skin = SurfaceCharges([Magnet(Sphere(EDGE), np.zeros(3), mu)], 6)
+    field = np.array([0.1, -0.2, 0.3])
+    found = skin.answer(np.broadcast_to(field, skin.places.shape))
+    np.testing.assert_allclose(found, 3 * (mu - 1) / (mu + 2) * skin.normals @ field, rtol=0, atol=1e-11)
+
+
+def test_few_places_from_afar_do(monkeypatch):
+    rotor = halbach(6, 2.0, 1.1)
+    points = EDGE * np.array([[0.0, 0.0, -1.5], [1.0, 0.5, -2.0], [0.2, 0.1, 0.0]])
+    few = surface_table(rotor, Accuracy(3e-3)).evaluate(points)[0]
+    monkeypatch.setattr(surface, "FAR", np.inf)
+    each = surface_table(rotor, Accuracy(3e-3)).evaluate(points)[0]
+    assert 0 < np.abs(few - each).max() < 1e-6 * np.linalg.norm(each, axis=1).max()
+
+
+@pytest.mark.slow
+def test_a_ring_of_cubes_within_its_error():
+    """Fields cancel there: the error is relative to what is left of them nearby, not far away where nothing is."""
+    rotor = halbach(8, 1.4)
+    table, fine = surface_table(rotor, Accuracy(1e-3)), surface_table(rotor, Accuracy(3e-5))
+    points, scale = error_points(rotor, Accuracy().clearance(rotor))
+    error = np.linalg.norm(table.evaluate(points)[0] - fine.evaluate(points)[0], axis=1)
+    assert np.max(error / scale) <= 1e-3
+
+
+def test_faces_that_lie_across_each_other_say_so():
+    shifted = (box(center=(0.5, 0, 0.3)), box(center=(-0.5, 0, 0)))
+    assert not smooth(shifted)
+    assert smooth(ROTORS["two side by side, opposite"])
+    assert resolve_model(shifted, "auto", 1e-4)[0] == "fem"
+    with pytest.warns(AccuracyWarning, match="more than the 1.0e-06 asked for"):
+        surface_table(shifted, Accuracy(1e-6))
+
+
+def test_auto_takes_it_for_many_magnets_and_for_rough_answers():
+    assert resolve_model(ROTORS["cube"], "auto") == ("fem", resolve_model(ROTORS["cube"], "auto")[1])
+    name, why = resolve_model(ROTORS["cube"], "auto", 1e-4)
+    assert name == "surface"
+    assert "a fraction of the elements' time" in why
+    name, why = resolve_model(halbach(8, 1.4), "auto")
+    assert name == "surface"
+    assert "elements of 8 magnets" in why
+
+
+@pytest.mark.parametrize(
+    ("rotor", "reason"),
+    [
+        ((replace(box(), transverse_permeability=1.2),), "one has two permeabilities"),
+        ((Magnet(Sphere(EDGE / 2), ALONG, 1.05), box(center=(1, 0, 0))), "touch"),
+    ],
+)
+def test_what_it_cannot_do(rotor, reason):
+    with pytest.raises(InputError, match=f"{reason}.* Choose --model fem"):
+        surface_table(rotor, Accuracy())
+
+
+def test_equilibria_by_it_are_those_of_finite_elements():
+    """Growth rates too, and mutual magnetisation is chosen with it as with elements."""
+    by = {
+        model: sl.equilibria(HORIZONTAL, model=model, interaction="rigid", plate_model="none")
+        for model in ("surface", "fem")
+    }
+    surface_, fem = (found.isel(equilibrium=0) for found in by.values())
+    assert float(abs(surface_.distance - fem.distance)) <= float(surface_.position_error + fem.position_error)
+    assert surface_.growth == pytest.approx(float(fem.growth), abs=1e-4)
