@@ -29,6 +29,8 @@ RELAYED = {
     "name": "late: as Python has it of a module that is not installed",
     "str(path)": "whole_files: the system's own error, with the name of the file",
     "str(answer[1])": "basics/apart: the text of a library's error",
+    "said": "figures/renderer: the end of the note that no pictures can be drawn",
+    "answer": "figures/renderer: the same, from the process that draws",
     "reason": "bodies/step_file: one of ENDS, or what OpenCASCADE says",
     "f\"holds {counted(named, 'solid')}{unread}\" if named else f\"holds none, and {counted(faces, 'open face')}\"": (
         "bodies/step_file: the end of a sentence"
