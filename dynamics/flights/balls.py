@@ -33,11 +33,21 @@ ERROR = 1e-6
 SPACING = 1 / 32  # Of the lattice, in radii of the floater
 LEAST = 1.5  # Smallest radius of a ball in spacings: a floater that enters it is at most 0.87 of them from the centre
 TRIALS = 5
+FITTED = (
+    1 / 10
+)  # Of the distance from the magnets, about the radius up to which effects in a ball are within their error
 ANGLES, DEPTHS = 72, 400
 MOST = 4096  # Balls that are remembered, 2.6 kB each
 # A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius, up or down.
 STAY = 4.0
 SNUG = 0.97  # Largest part of a ball's radius to which the circle may reach on which the rotor sees the floater
+# A ball ahead is worth its making (1 to 4 ms) if the floater stays for so many radians of the rotor's turn: with mutual
+# magnetisation twenty of them cost what a turn in the table's own field does, and most of them are met again.
+PART = 0.3
+# Largest spacing of their lattice in tenths of the distance from a body: the coarser, the fewer balls there are (half
+# of those at 0.4), but above 0.8 a floater would often be near the surface of the nearest one.
+COARSE = 0.78
+NEIGHBOURS = np.indices((3, 3, 3)).reshape(3, -1).T - 1.0  # (27, 3) of a cell, and itself
 
 
 def is_long(table: FieldTable) -> bool:
@@ -78,40 +88,86 @@ class Balls:
         """Set the runtime parameters `values` to the first ball of `formulas` that will do for a scaled state; error.
 
         It must hold the circle on which the rotor sees a floater that turns less than the rotor, or not at all: once a
-        turn, backwards.
+        turn, backwards.  Where no ball does, those of the last of `formulas` hold a part of the way each.
         """
         length, rate, (x, y, _) = values[Parameter.LENGTH], values[Parameter.RATE], state[:3]
+        lost, spacing = float(values[Parameter.LOST_DISTANCE]) * length, SPACING * self.scene.floater.radius
         drift = state[3:6] - rate * np.array([-y, x, 0.0])
         arm = rate * np.array([-drift[1], drift[0], 0.0])
         middle, way = (state[:3] - arm) * length, float(abs(drift[2]) if rate else np.linalg.norm(drift)) * length
         values[DEGREE : self.end] = 0.0
         for formula in formulas:
-            found = self.at(formula, float(values[Parameter.LOST_DISTANCE]) * length, middle)
+            found = self.at(formula, spacing, lost, middle)
             if found is None:
                 continue
             numbers, error = found
             reach = float(np.linalg.norm(arm)) * length + float(np.linalg.norm(middle - numbers[:3]))
             if reach * numbers[3] <= SNUG and STAY * way * numbers[3] <= 1:
-                values[DEGREE], values[DEGREE + 1 : DEGREE + 1 + len(numbers)] = formula.degree, numbers
-                return error
-        return 0.0
+                break
+        else:
+            found = self._ahead(formulas[-1], lost, state[:3] * length, drift * length, arm * length)
+            if found is None:
+                return 0.0
+            formula, (numbers, error) = formulas[-1], found
+        values[DEGREE], values[DEGREE + 1 : DEGREE + 1 + len(numbers)] = formula.degree, numbers
+        return error
 
-    def at(self, formula: BallField, reach: float, place: Array) -> tuple[Array, float] | None:
-        """Parameters and error of a `formula`'s ball for `place` (3,) m; None near a body or loss (`reach`, m)."""
-        spacing = SPACING * self.scene.floater.radius
+    def _ahead(
+        self, formula: BallField, lost: float, place: Array, drift: Array, arm: Array
+    ) -> tuple[Array, float] | None:
+        """The ball of a coarse lattice in which a floater at a `place` (3,) m stays longest; None where that is short.
+
+        Its velocity is `drift` (3,) as seen from the rotor, m in a unit of time, which turns it about `place` - `arm`;
+        `arm` is zero where it flies straight on.
+        """
+        speed = float(np.linalg.norm(drift))
+        near = min(_room(self.scene, place, lost), FITTED * self._distance(place))
+        if near <= 0 or not speed:
+            return None
+        spacing = float(2 ** (np.floor(2 * np.log2(COARSE * near)) / 2))  # of few sizes, so that cells are met again
+        here = self.at(formula, spacing, lost, place)
+        if here is None:
+            return None
+        radius = 1 / here[0][3]  # those around are about as large
+        times, level = np.linspace(0.0, 2.2 * radius / speed, 25)[:, None], drift * [1.0, 1.0, 0.0]
+        bent = np.sin(times) if arm.any() else times
+        way = place + (drift - level) * times + bent * level - (1 - np.cos(times)) * arm
+        cells = spacing * (np.round(way[9] / spacing) + NEIGHBOURS)
+        gone = np.linalg.norm(way - cells[:, None], axis=2) > SNUG * radius
+        gone[:, -1] = True
+        left = np.argmax(gone, axis=1)
+        best = int(np.argmax(left))
+        if float(times[left[best], 0]) < PART:
+            return None
+        found = self.at(formula, spacing, lost, cells[best])
+        for ball in (found, here):
+            if ball is not None and np.linalg.norm(place - ball[0][:3]) * ball[0][3] <= SNUG:
+                return ball
+        return None
+
+    def at(self, formula: BallField, spacing: float, lost: float, place: Array) -> tuple[Array, float] | None:
+        """Parameters and error of a `formula`'s ball for `place` (3,) m; None near a body or loss.
+
+        It is about the nearest point of a lattice of a `spacing` (m); at a distance `lost` (m) the floater is lost.
+        """
         cell = np.round(place / spacing)
-        key = formula.degree, reach, *cell.tolist()
+        key = formula.degree, spacing, lost, *cell.tolist()
         if key not in self._known:
             if len(self._known) >= MOST:
                 self._known.clear()
-            self._known[key] = self._largest(formula, reach, cell * spacing, LEAST * spacing)
+            self._known[key] = self._largest(formula, lost, cell * spacing)
         return self._known[key]
 
-    def _largest(self, formula: BallField, reach: float, center: Array, least: float) -> tuple[Array, float] | None:
+    def _distance(self, place: Array) -> float:
+        """Of a place (3,) m from the nearest body that turns with the rotor, m."""
+        return rotor_gap(self.scene, place) + self.scene.floater.radius
+
+    def _largest(self, formula: BallField, lost: float, center: Array) -> tuple[Array, float] | None:
         """The largest ball about `center` whose expansion has at most the error allowed."""
-        room = _room(self.scene, center, reach)
-        near = rotor_gap(self.scene, center) + self.scene.floater.radius
-        radius = min(room, near / 10)
+        room, least = _room(self.scene, center, lost), LEAST * SPACING * self.scene.floater.radius
+        # first so large that the terms left out, (radius / distance)^(degree - 1) nearly, are about the error allowed
+        part = (ERROR / 4) ** (1 / (formula.degree - 1))
+        radius = min(room, self._distance(center) * (min(part, FITTED) if _fitted(self.whole, formula) else part))
         error = np.inf
         for _ in range(TRIALS):
             if radius < least:
@@ -132,7 +188,9 @@ class Balls:
         effects = _fitted(self.whole, formula)
         if not effects:
             return values, error
-        gradient = self.whole.evaluate(ball.center[None])[1][0]
+        constants = 4 + 3 * formula.degree**2 + (formula.degree - 1) ** 2 * np.arange(5)  # those of the gradient
+        xx, xy, xz, yy, yz = values[constants]
+        gradient = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, -xx - yy]])
         found = [effect.fit(ball, gradient) for effect in effects]
         padded = np.concatenate([values, np.zeros(FIRST - DEGREE - 1 - len(values))])
         return np.concatenate([padded, *(numbers for numbers, _ in found)]), max(

@@ -23,6 +23,10 @@ from ...geometry.common import MU_0, Array
 from .expressions import UPPER, FieldExpressions, regular_harmonics, whole_gradient
 from .solid import CHUNK, FOUR_PI, Coefficients, entries, entry, factorials, members, regular_values, weighted_sums
 
+# Nodes of the rule for balls beyond their degree. What it cannot tell apart is 1e-3 of the error: a ball's radius is a
+# seventh of the distance from the sources, so that four degrees beyond those that are left out little is left.
+MORE = 2
+
 
 @dataclass(frozen=True, eq=False)
 class Ball:
@@ -33,9 +37,9 @@ class Ball:
 
 
 @cache
-def sphere(degree: int) -> tuple[Array, Array]:
-    """Points (n, 3) on the unit sphere and their areas (n,), exact for products of two harmonics up to `degree` + 5."""
-    nodes = degree + 6
+def sphere(degree: int, more: int = 6) -> tuple[Array, Array]:
+    """Points (n, 3) on the unit sphere and their areas (n,), exact for harmonics up to 2 (`degree` + `more`) - 1."""
+    nodes = degree + more
     height, weights = np.polynomial.legendre.leggauss(nodes)
     angle = np.pi * np.arange(2 * nodes) / nodes
     across = np.sqrt(1 - height**2)[:, None]
@@ -59,19 +63,19 @@ def interior_coefficients(field: Callable[[Array], Array], ball: Ball, degree: i
     return _by_normal_field(np.sum(field(ball.center + ball.radius * normals) * normals, axis=1), degree)
 
 
-def _by_normal_field(normal: Array, degree: int) -> Coefficients:
+def _by_normal_field(normal: Array, degree: int, more: int = 6) -> Coefficients:
     """Coefficients a_lm (T) by the normal component of B (n,) T at the points of `sphere`."""
-    around = (sphere(degree)[1] * normal).reshape(degree + 6, -1)
+    around = (sphere(degree, more)[1] * normal).reshape(degree + more, -1)
     # a Fourier transform on each circle of latitude, then a sum over heights
     orders = np.conj(np.fft.rfft(around))[:, : degree + 1]
-    return np.asarray(np.einsum("lmk,km->lm", _by_height(degree), orders), complex)
+    return np.asarray(np.einsum("lmk,km->lm", _by_height(degree, more), orders), complex)
 
 
 @cache
-def _by_height(degree: int) -> Array:
+def _by_height(degree: int, more: int) -> Array:
     """[l, m, k]: weights of the normal field at the heights of `sphere`; around them Υ_lm is that at y = 0 by e^imφ."""
-    first = sphere(degree)[0].reshape(degree + 6, -1, 3)[:, 0]
-    result = np.zeros((degree + 1, degree + 1, degree + 6))
+    first = sphere(degree, more)[0].reshape(degree + more, -1, 3)[:, 0]
+    result = np.zeros((degree + 1, degree + 1, degree + more))
     for (l, m), values in regular_values(degree, *first.T).items():
         if l:
             result[l, m] = -(2 * l + 1) / (FOUR_PI * l) * values.real
@@ -174,7 +178,7 @@ def real_weights(coefficients: Coefficients) -> Array:
 def _real_values(degree: int) -> Array:
     """(K, n): R_k up to one degree less at the points of `sphere`."""
     (l, m, part), sizes = _real(degree - 1)[0].T, _real(degree - 1)[1]
-    known = regular_values(degree - 1, *sphere(degree)[0].T)
+    known = regular_values(degree - 1, *sphere(degree, MORE)[0].T)
     values = np.array([known[key] for key in zip(l.tolist(), m.tolist(), strict=True)]) / sizes[l, m][:, None]
     return np.asarray(np.where(part[:, None], values.imag, values.real))
 
@@ -241,10 +245,10 @@ class BallField:
 
         The error is the largest on the surface, of B or of its gradient, by the root mean square there.
         """
-        normals, _ = sphere(self.degree)
+        normals, _ = sphere(self.degree, MORE)
         field, gradient = evaluate(ball.center + ball.radius * normals)
         known = [field.T, np.array([gradient[:, i, j] for i, j in UPPER])]
-        incident = _by_normal_field(np.sum(field * normals, axis=1), self.degree)
+        incident = _by_normal_field(np.sum(field * normals, axis=1), self.degree, MORE)
         parts = [-gradient_coefficients(incident, axis) for axis in range(3)]
         slopes = [gradient_coefficients(parts[i], j) / ball.radius for i, j in UPPER]
         weights = [np.array([real_weights(one) for one in group]) for group in (parts, slopes)]

@@ -18,8 +18,8 @@ from spinlev.geometry.scene.contents import AbsoluteStart
 
 TABLE = RotorTable("moments", MAGNETS, (), tuple(uniform_moments(m, 13) for m in MAGNETS))
 DURATION = 0.3
-PLACES = np.array([[0, 0, 0], [1e-4, 0, 0], [0, 1e-4, 2e-4], [0, 0, 4e-4], [0, 0, 8e-3]])
-"""Displacements: at rest, two that leave their small ball, one that swings, and one drawn to the magnet."""
+PLACES = np.array([[0, 0, 0], [1e-4, 0, 0], [0, 1e-4, 2e-4], [0, 0, 4e-4], [3e-4, 0, 0], [0, 0, 8e-3]])
+"""Displacements: at rest, two that leave their small ball, two that swing, one wide, and one drawn to the magnet."""
 
 
 @pytest.fixture(scope="module")

@@ -98,6 +98,19 @@ def test_a_ball_holds_the_circle_of_a_floater_that_was_displaced(start):
     assert list(flight.parts) == [7, 9]
 
 
+def test_a_floater_that_swings_wider_than_any_ball_is_in_several_a_turn(start):
+    """Its circle has 3.5 mm; the table's own field is not needed, and the jumps from ball to ball add up to no more."""
+    offset = np.array([3e-4, 0.0, 0.0])
+    turning = np.cross([0.0, 0.0, SCENE.angular_velocity], offset)
+    begun = replace(start, position=start.position + offset, velocity=start.velocity + turning)
+    near, whole = both(begun, 0.5)
+    assert np.hypot(*near.lab.position[:, :2].T).max() > 3e-3
+    assert near.field_changes.count > 50
+    assert near.energy_error < 1e-12
+    assert abs(near.field_changes.energy) < 1e-5
+    assert np.abs(near.lab.position - whole.lab.position).max() < 1e-6
+
+
 def test_contact_is_that_of_the_tables_own_flight():
     """Drawn to the magnet; near it there is no room for a ball, and the table's own field takes over."""
     place, turning = np.array([2e-3, 0.0, -16e-3]), np.array([0.0, 0.0, SCENE.angular_velocity])

@@ -10,7 +10,7 @@ from article import PERMEABLE, PERMEABLE_MAGNETS
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, in_ball
 from spinlev.dynamics.flights.batch import fly_together
-from spinlev.dynamics.flights.flight import Flight, integrate
+from spinlev.dynamics.flights.flight import Flight, displaced, integrate
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import mutual_choice
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
@@ -120,7 +120,7 @@ def test_in_a_ball_force_and_torque_come_from_one_energy(mutual, start, formula)
     slopes = [hy.diff(hy.sum(list(equations.jacobi)), v) for v in equations.variables]
     terms = [a * b for a, b in zip(slopes, equations.rates, strict=True)]
     function = hy.cfunc([*terms, *equations.rates], list(equations.variables), compact_mode=True, opt_level=0)
-    numbers, error = Balls(SCENE, mutual).at(formula, 0.1, start.position)
+    numbers, error = Balls(SCENE, mutual).at(formula, 2e-4, 0.1, start.position)
     values = np.concatenate([parameters(SCENE, SCALES), [0.0], numbers])
     states = np.tile(SCALES.pack(start.state), (6, 1))
     generator = np.random.default_rng(2)
@@ -142,6 +142,21 @@ def test_a_kicked_floater_keeps_the_jacobi_integral(mutual, start):
     assert flight.ended_by == "duration"
     assert flight.energy_error < 1e-12
     assert np.ptp(flight.lab.position[:, 2]) > 1e-4
+
+
+def test_a_floater_that_swings_wide_moves_as_by_the_tables_energy(mutual, start):
+    """In balls ahead of it, alone and in lanes; the balls' force errs by 1e-5, of which most averages out."""
+    flight = Flight(SCENE, mutual, 0.3, compact=True)
+    begun = displaced(start.state, np.array([3e-4, 0.0, 0.0]), SCENE.angular_velocity)
+    near = integrate(flight, begun, 0.3)
+    whole = integrate(Flight(SCENE, mutual, 0.3, compact=True, in_balls=False), begun, 0.3)
+    (lane,) = fly_together([SCENE], mutual, [begun], 0.3)
+    assert np.hypot(*near.lab.position[:, :2].T).max() > 2e-3
+    assert 0 not in flight.parts
+    assert near.field_changes.count > 50
+    assert near.energy_error < 1e-12
+    assert np.abs(near.lab.position - whole.lab.position).max() < 5e-7
+    assert np.abs(near.lab.position - lane.lab.position).max() < 1e-10
 
 
 def test_a_floater_at_its_equilibrium_stays_there(mutual, start):

@@ -46,7 +46,7 @@ def test_the_brake_is_that_of_the_table(equilibrium, formula):
     outputs = [*added, equations.power]
     function = hy.cfunc(outputs, list(equations.variables), compact_mode=True, opt_level=0)
     center = equilibrium.position
-    found = Balls(SCENE, TABLE).at(formula, 0.1, center)
+    found = Balls(SCENE, TABLE).at(formula, 2e-4, 0.1, center)
     numbers, error = found
     assert error <= 1e-6
     known = parameters(SCENE, SCALES)
