@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...dynamics.continuation.branch import OSCILLATORY, REAL
 from ...dynamics.continuation.frequencies import HIGHEST, StableRange, at_frequency, levitating_ranges
 from ...dynamics.continuation.slow_drift import Lasting, drift, lasting_frequencies
 from ...dynamics.equilibria.equilibrium import EquilibriumError
@@ -43,7 +44,11 @@ INTERVAL: Columns = {
     "highest": (("interval",), "Hz", "upper end of an interval of stability"),
     "distance_lowest": (("interval",), "m", "distance at the lower end"),
     "distance_highest": (("interval",), "m", "distance at the upper end"),
-    "leading_highest": (("interval",), "Hz", "frequency of the mode that becomes unstable at the upper end"),
+    "leading_highest": (
+        ("interval",),
+        "Hz",
+        "frequency of the mode that is the first unstable one above",
+    ),
     "low_kind": (("interval",), "", "what is at the lower end"),
     "high_kind": (("interval",), "", "what is at the upper end"),
     "plate_frequency": (("tried",), "Hz", "frequency at which a plate below is tried"),
@@ -87,7 +92,9 @@ def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
     rows, kinds = np.full((5, MOST), np.nan), np.full((2, MOST), "", dtype="U12")
     for k, run in enumerate(ranges[:MOST]):
         ends = run.low, run.high
-        rows[:, k] = [*(e.parameter for e in ends), *(e.distance for e in ends), run.high.leading_hz]
+        # at a fold, or where the floater touches the rotor, no mode is the least stable but by round-off
+        leading = run.high.leading_hz if run.high.kind in (OSCILLATORY, REAL) else np.nan
+        rows[:, k] = [*(e.parameter for e in ends), *(e.distance for e in ends), leading]
         kinds[:, k] = [e.kind for e in ends]
     plate = np.full((TRIED, 4), np.nan)
     if ranges and point["with_plate"]:
