@@ -33,6 +33,7 @@ ERROR = 1e-6
 SPACING = 1 / 32  # Of the lattice, in radii of the floater
 LEAST = 1.5  # Smallest radius of a ball in spacings: a floater that enters it is at most 0.87 of them from the centre
 TRIALS = 5
+WIDEST = 1 / 4  # No ball is larger, of the distance from a body: at degree 9 it would err by 1e-5 at least
 FITTED = (
     1 / 10
 )  # Of the distance from the magnets, about the radius up to which effects in a ball are within their error
@@ -96,8 +97,9 @@ class Balls:
         arm = rate * np.array([-drift[1], drift[0], 0.0])
         middle, way = (state[:3] - arm) * length, float(abs(drift[2]) if rate else np.linalg.norm(drift)) * length
         values[DEGREE : self.end] = 0.0
+        held = float(np.linalg.norm(arm)) * length <= WIDEST * self._distance(middle)  # else none is fitted in vain
         for formula in formulas:
-            found = self.at(formula, spacing, lost, middle)
+            found = self.at(formula, spacing, lost, middle) if held else None
             if found is None:
                 continue
             numbers, error = found
