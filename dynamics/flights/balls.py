@@ -34,9 +34,7 @@ SPACING = 1 / 32  # Of the lattice, in radii of the floater
 LEAST = 1.5  # Smallest radius of a ball in spacings: a floater that enters it is at most 0.87 of them from the centre
 TRIALS = 5
 WIDEST = 1 / 4  # No ball is larger, of the distance from a body: at degree 9 it would err by 1e-5 at least
-FITTED = (
-    1 / 10
-)  # Of the distance from the magnets, about the radius up to which effects in a ball are within their error
+FITTED = 1 / 10  # Of that distance: about the radius up to which effects in a ball err as much as is allowed
 ANGLES, DEPTHS = 72, 400
 MOST = 4096  # Balls that are remembered, 2.6 kB each
 # A ball is worth its making if the floater needs so many radians of the rotor's turn for its radius, up or down.
