@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -146,15 +147,13 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
         on_branch(replace(row.levitation.scene, plate=None), row.levitation.rates, row.branch, frequencies)
         for row in rows
     ]
-    distances = [[-p.position[2] if p else math.nan for p in row] for row in points]
-    growths = [[p.growth_per_s if p else math.nan for p in row] for row in points]
-
+    nothing = math.nan, math.nan, False
+    branch = np.array(
+        [[(-p.position[2], p.growth_per_s, levitates(p)) if p else nothing for p in row] for row in points]
+    )
     found = [row.found for row in rows]
-    modes = max((len(e.frequencies_hz) for e in found if e), default=0)
-    spectrum = np.full((len(rows), modes), math.nan)
-    for k, e in enumerate(found):
-        if e:
-            spectrum[k, : len(e.frequencies_hz)] = e.frequencies_hz
+    modes = [e.frequencies_hz if e else () for e in found]
+    spectrum = np.array([*zip_longest(*modes, fillvalue=math.nan)], float).reshape(-1, len(rows)).T
 
     def each(value: str) -> Array:
         return np.array([getattr(e, value) if e else math.nan for e in found], float)
@@ -174,9 +173,9 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
                 ("model", "end"), [row.stable or (math.nan,) * 2 for row in rows], "Hz",
                 "ends of the range of stable frequencies, without the plate",
             ),
-            "branch_distance": variable(over, distances, "m", "levitation distance, without the plate"),
-            "branch_growth": variable(over, growths, "1/s", "growth rate, without the plate"),
-            "branch_stable": (over, [[bool(p and levitates(p)) for p in row] for row in points]),
+            "branch_distance": variable(over, branch[..., 0], "m", "levitation distance, without the plate"),
+            "branch_growth": variable(over, branch[..., 1], "1/s", "growth rate, without the plate"),
+            "branch_stable": (over, branch[..., 2] == 1),
         },
         {
             "model": [row.name for row in rows],

@@ -199,7 +199,16 @@ def field_map_job(scene: Scene, plane: str, extent: Array | None, offset: float,
     write_dataset(found, out / "field-map.nc", scene)
     files = [str(out / "field-map.nc"), *save_figures({"field-map": field_map_figure(found)}, out)]
     files.append(str(out / "field-map.vtu"))
-    _write_vtu(found, out / "field-map.vtu", plane, offset)
+    places, cells = _lattice([found[plane[1]].values, found[plane[0]].values])
+    points = np.full((len(places), 3), offset)
+    points[:, PLANES[plane][1::-1]] = places
+    data: dict[str, Array] = {"error": found["error"].values.ravel(), "magnet": found["magnet"].values.ravel()}
+    for model in MODELS:
+        chosen = found.sel(model=model)
+        data |= {f"{name}_{model}": chosen[name].values.reshape(-1, 3) for name in "BHM"}
+        data[f"difference_{model}"] = chosen["difference"].values.ravel()
+    with replacing(out / "field-map.vtu") as temporary:
+        meshio.Mesh(points, [("quad", cells)], point_data=data).write(temporary)
     error = float(np.nanmax(found["error"].values) / np.nanmax(np.linalg.norm(found["B"].sel(model="fem"), axis=-1)))
     apart = {m: float(np.nanmedian(found["difference"].sel(model=m))) for m in MODELS[:2]}
     values = {"model": "fem", "error_estimate": error, "median_difference": apart, "files": files}
@@ -272,17 +281,3 @@ def _dipoles(scene: Scene, places: Array) -> Array:
     field = np.full(places.shape, np.nan)
     field[clear] = np.sum([dipole.evaluate(places[clear])[0] for dipole in dipoles], axis=0)
     return field
-
-
-def _write_vtu(found: xr.Dataset, path: Path, plane: str, offset: float) -> None:
-    along, up, _ = PLANES[plane]
-    places, cells = _lattice([found[plane[1]].values, found[plane[0]].values])
-    points = np.full((len(places), 3), offset)
-    points[:, up], points[:, along] = places.T
-    data: dict[str, Array] = {"error": found["error"].values.ravel(), "magnet": found["magnet"].values.ravel()}
-    for model in MODELS:
-        chosen = found.sel(model=model)
-        data |= {f"{name}_{model}": chosen[name].values.reshape(-1, 3) for name in "BHM"}
-        data[f"difference_{model}"] = chosen["difference"].values.ravel()
-    with replacing(path) as temporary:
-        meshio.Mesh(points, [("quad", cells)], point_data=data).write(temporary)

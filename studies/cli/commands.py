@@ -27,6 +27,7 @@ from .options import (
     SceneFile,
     Spin,
     Workers,
+    check_spin,
     check_steps,
     default_scene,
     frequency_grid,
@@ -49,11 +50,6 @@ def _loaded(scene: Path) -> "Scene":
     from ...geometry.scene.files import load_scene
 
     return load_scene(scene)
-
-
-def _check_spin(spin: float) -> None:
-    if not -1e3 <= spin <= 1e3:
-        raise InputError(f"Input --spin must be between -1000 and 1000; instead received {spin}.")
 
 
 def run(
@@ -81,7 +77,7 @@ def run(
         Field to 0.1 %, plate's response to 5 %, no mutual magnetisation: half a minute for most scenes.
     """
     positive("--duration-s", duration_s)
-    _check_spin(spin)
+    check_spin("--spin", spin)
     asked = asked.checked()
     if quick:
         interaction: InteractionModel = "rigid" if asked.interaction == "auto" else asked.interaction
@@ -159,7 +155,7 @@ def field(
 
 def equilibria(scene: SceneFile, *, asked: Models = Models(), spin: Spin = 0.0, output: Output = Output()) -> Answer:
     """All equilibria of the floater, frequency-locked to the rotor, with their modes and stability."""
-    _check_spin(spin)
+    check_spin("--spin", spin)
     loaded = _loaded(scene)
     from ..run import equilibria_job
 
@@ -192,7 +188,7 @@ def compare(
     plate_rtol
         Relative accuracy asked of the plate's reaction.
     """
-    _check_spin(spin)
+    check_spin("--spin", spin)
     frequencies = None if frequency_hz is None else frequency_grid(frequency_hz)
     asked = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
     loaded = _loaded(scene)

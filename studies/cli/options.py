@@ -91,6 +91,12 @@ def finite(name: str, value: float) -> float:
     return float(value)
 
 
+def check_spin(name: str, spin: float) -> None:
+    """Raises InputError where the body spin is larger than any that is looked at."""
+    if not -1e3 <= spin <= 1e3:
+        raise InputError(f"Input {name} must be between -1000 and 1000; instead received {spin}.")
+
+
 def read_points(path: Path) -> Array:
     """Points (n, 3) in m from a CSV file with a header that has the columns x_mm, y_mm, z_mm.
 

@@ -16,7 +16,7 @@ from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import changed, parse_scene, scene_keys, scene_text
 from ...geometry.scene.making import assemble
 from ...geometry.scene.messages import SceneError
-from ..cli.options import FieldModel, Models, PlateModel, finite
+from ..cli.options import FieldModel, Models, PlateModel, check_spin, finite
 
 CHOICES = ("model", "plate_model", "spin")  # Keys of an address that are none of the scene file
 LONGEST, LARGEST = 20_000, 200_000  # Characters of an address's state; bytes of a scene file that is opened in a page
@@ -99,8 +99,7 @@ class PageState:
             spin = finite("spin", float(chosen["spin"]))
         except ValueError:
             raise InputError(f"Input spin must be a number; instead received {shown(chosen['spin'])}.") from None
-        if not -1e3 <= spin <= 1e3:
-            raise InputError(f"Input spin must be between -1000 and 1000; instead received {shown(chosen['spin'])}.")
+        check_spin("spin", spin)
         given = {key: value for key, value in asked.items() if key not in CHOICES}
         if not given:
             return replace(self, **{**chosen, "spin": spin})
