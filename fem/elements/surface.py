@@ -16,7 +16,7 @@ O. D. Kellogg, Foundations of Potential Theory (1929), ch. VI; P. R. Johnston an
 """
 
 from collections.abc import Sequence
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from itertools import combinations, product
 
 import numpy as np
@@ -130,10 +130,9 @@ class Skin:
         """n·h (T) of the charges at places outside the body or on it, (t, n)."""
         raise NotImplementedError
 
-    @cached_property
-    def fine(self) -> tuple[Array, Array]:
-        """More places (k, 3), for high moments, and the areas there by those of the nodes' values (k, n)."""
-        return self.places, np.diag(self.areas)
+    def fine(self, charges: Array) -> tuple[Array, Array]:
+        """More places (k, 3), for high moments, and what is there (k,) of the charges (n,) T by their areas."""
+        return self.places, self.areas * charges
 
     @cached_property
     def coarse(self) -> tuple[Array, Array, Array]:
@@ -196,20 +195,18 @@ class BoxSkin(Skin):
                     result[np.ix_(turned[chosen], turned[face])] = rows
         return result
 
-    @cached_property
-    def fine(self) -> tuple[Array, Array]:
-        places, shares = [], []
-        for axis, side in self.numbers:
+    def fine(self, charges: Array) -> tuple[Array, Array]:
+        places, amounts = [], []
+        for (axis, side), numbers in self.numbers.items():
             order, _, halves, counts = self._face(axis, side, self.places[:1])
             (x, wide), (y, tall) = (graded(MORE * n) for n in counts)
             face = np.empty((len(x), len(y), 3))
             face[..., axis], face[..., order[0]] = side * self.half[axis], halves[0] * x[:, None]
             face[..., order[1]] = halves[1] * y
             places.append(face.reshape(-1, 3))
-            along, across = (_lagrange(places_, n) for places_, n in zip((x, y), counts, strict=True))
-            areas = halves[0] * halves[1] * np.outer(wide, tall).ravel()
-            shares.append(areas[:, None] * np.kron(along, across))
-        return np.concatenate(places), np.asarray(scipy.linalg.block_diag(*shares))
+            between = _lagrange(x, counts[0]) @ charges[numbers] @ _lagrange(y, counts[1]).T
+            amounts.append((halves[0] * halves[1] * np.outer(wide, tall) * between).ravel())
+        return np.concatenate(places), np.concatenate(amounts)
 
     @cached_property
     def coarse(self) -> tuple[Array, Array, Array]:
@@ -331,7 +328,7 @@ class SphereSkin(Skin):
         return np.asarray(values / [2 * (2 * l + 1) for l, _, _ in keys] @ (values.T * sphere(self.count)[1]))
 
 
-@cache
+@lru_cache(maxsize=16)  # one size of cube at all numbers of nodes takes some 50 MB
 def _skin(kind: str, numbers: tuple[float, ...], count: int) -> Skin:
     """Of a body in units of its first number: alike bodies of all sizes and magnets share what K is."""
     if kind == "cuboid":
@@ -392,6 +389,7 @@ class SurfaceCharges:
     """
 
     def __init__(self, magnets: Sequence[Magnet], count: int) -> None:
+        self.count = count
         self.all, self.magnets = tuple(magnets), tuple(magnet for magnet in magnets if magnet.contrast)
         places, normals, areas, self._skins, self._sizes = [], [], [], [], []
         for magnet in self.magnets:
@@ -422,6 +420,11 @@ class SurfaceCharges:
             local = magnet.body.to_body(self.places[at[close]]) / size
             rows[close] = skin.near_rows(local, self.normals[at[close]] @ magnet.body.rotation)
         return at, rows
+
+    def numbers_at(self, count: int) -> float:
+        """Of all matrices, with `count` nodes along an edge, about."""
+        nodes = [(count / self.count) ** 2 * np.sum(self.owner == k) for k in range(len(self.magnets))]
+        return float(np.sum(~self._far * np.outer(nodes, nodes)))
 
     @cached_property
     def _from_afar(self) -> Array:
@@ -456,9 +459,8 @@ class SurfaceCharges:
     def fine(self, number: int, charges: Array) -> tuple[Array, Array]:
         """Places (k, 3) m on one of `magnets`, and amounts (k,) T m² there, with the moments of charges (n,) T."""
         body, size = self.magnets[number].body, self._sizes[number]
-        places, shares = self._skins[number].fine
-        amounts = size**2 * (shares @ charges[self.owner == number])
-        return body.center + size * places @ body.rotation.T, amounts
+        places, amounts = self._skins[number].fine(charges[self.owner == number])
+        return body.center + size * places @ body.rotation.T, size**2 * amounts
 
     def answer(self, field: Array) -> Array:
         """Charges σ (n,) T that a field b (n, 3) T of sources elsewhere makes. Raises ComputationError as `settled`."""

@@ -276,6 +276,7 @@ NODES = (4, 6, 8, 10, 12, 14, 16, 20, 24)  # along an edge of a face, from coars
 FIRST_RATE, FASTEST_RATE, SLOWEST_RATE = 0.3, 0.25, 0.75
 RATE_SAFETY = 2.0
 CONTACT = 0.02  # gap, in edges, below which round bodies count as touching
+LARGEST = 6e7  # numbers of the matrices that are kept, at most
 FITTED = 40  # coefficients up to which a fit of them takes less than the charges
 SOME = 5  # every so many places are looked at from step to step
 
@@ -296,8 +297,8 @@ def without_charges(magnets: Rotor) -> str:
 def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) -> RotorTable:
     """Field of magnets of one recoil permeability each: closed forms, and expansions of the charges on their surfaces.
 
-    Nodes are added until the estimated error meets the accuracy. If no number of `NODES` does, as where faces that
-    nearly touch lie across each other, the last table is returned with an `AccuracyWarning`.
+    Nodes are added until the estimated error meets the accuracy. If no number of `NODES` does that memory allows, as
+    where faces that nearly touch lie across each other, the last table is returned with an `AccuracyWarning`.
 
     Parameters
     ----------
@@ -329,8 +330,8 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     ratio = min((np.min(np.linalg.norm(points[:, None] - c, axis=2) / r) for c, r, _ in cells), default=CONVERGENCE)
     degree = _degree([pieces[0] for pieces in cut], [float(ratio)] * len(cut), accuracy.rtol / 10)
 
-    def charged(count: int) -> list[MultipoleExpansion]:
-        skin, found = SurfaceCharges(magnets, count), list[MultipoleExpansion]()
+    def charged(skin: SurfaceCharges) -> list[MultipoleExpansion]:
+        found = list[MultipoleExpansion]()
         beyond = skin.beyond(carriers)
         for k, (centers, radii, own) in enumerate(cells):
             places, amounts = skin.fine(k, beyond)
@@ -346,9 +347,15 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
         return found
 
     whole_moments = np.arange(degree + 1)[:, None] > 0
-    whole, steps, before = charged(NODES[0]) if permeable else [], list[MultipoleExpansion](), np.inf
-    for k, count in enumerate(NODES[1:] if permeable else ()):
-        coarse, whole = whole, charged(count)
+    whole, steps, before, count = list[MultipoleExpansion](), list[MultipoleExpansion](), np.inf, 0
+    skin: SurfaceCharges | None = None
+    for k, more in enumerate(NODES if permeable else ()):
+        if k > 1 and skin and skin.numbers_at(more) > LARGEST:
+            break
+        count, skin = more, SurfaceCharges(magnets, more)
+        coarse, whole = whole, charged(skin)
+        if not k:
+            continue
         step = [replace(b, coefficients=b.coefficients - a.coefficients) for a, b in zip(coarse, whole, strict=True)]
         missed = sum(part.evaluate(points[::SOME])[0] for part in step)
         size = float(np.max(np.linalg.norm(missed, axis=1) / scale[::SOME]))
@@ -356,7 +363,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
         left, before = RATE_SAFETY * rate / (1 - rate), size
         # what charge a piece lacks another of its magnet has: seen from afar it is none
         steps = [replace(part, coefficients=left * part.coefficients * whole_moments) for part in step]
-        watch("charges on the surfaces", (k + 1) / len(NODES))
+        watch("charges on the surfaces", k / len(NODES))
         if left * size <= accuracy.rtol / 4:
             break
     doubts = {"discretisation": nonzero(steps), "tail": nonzero(extrapolated_tail(whole, float(ratio)))}
@@ -366,7 +373,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
         RotorTable("surface", magnets, polarized, tuple(whole), known), accuracy, BETWEEN / 20, 1.0, FITTED
     )
     _warn_beyond(table, accuracy, points, scale)
-    return replace(table, provenance={"nodes": count if permeable else 0, "seconds": time.perf_counter() - start})
+    return replace(table, provenance={"nodes": count, "seconds": time.perf_counter() - start})
 
 
 def _warn_beyond(table: RotorTable, accuracy: Accuracy, points: Array, scale: Array) -> float:
