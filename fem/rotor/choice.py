@@ -8,8 +8,19 @@ import numpy as np
 
 from ...geometry.common import Watch, unwatched
 from ...geometry.magnets import Magnet
-from ..elements.surface import has_skin, smooth
-from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moments_table, surface_table
+from ..elements.surface import smooth
+from .models import (
+    Accuracy,
+    cuboid_table,
+    dipole_table,
+    error_points,
+    fem_table,
+    moment_error,
+    moments_table,
+    surface_table,
+    uncut,
+    without_charges,
+)
 from .table import ROTOR, RotorTable, alike
 
 # From the cheapest to the dearest in evaluation
@@ -24,6 +35,7 @@ MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
 PERMEABLE = {"surface": "charges on the magnets' surfaces", "fem": "finite elements"}
 # Magnets, and accuracy, from which on charges on the surfaces are far quicker than finite elements
 MANY, ROUGH = 4, 1e-5
+SURELY = 10  # what permeability does to the moments, by the tolerance, from which on it surely matters
 FEW_MOMENTS = 16  # coefficients per magnet up to which moments are quicker to evaluate than the closed form
 
 
@@ -33,7 +45,8 @@ def resolve_model(
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
 
     `auto` is the cheapest of dipole, moments and closed form that meets the accuracy; where permeability matters,
-    finite elements, or charges on the surfaces of `MANY` magnets or where no more than `ROUGH` is asked.
+    finite elements, or charges on the surfaces of `MANY` magnets or where no more than `ROUGH` is asked, if none is
+    cut.
 
     Parameters
     ----------
@@ -51,10 +64,12 @@ def resolve_model(
     clearance = accuracy.clearance(rotor)
     points, scale = error_points(rotor, clearance)
     where = f"at {clearance * 1e3:.3g} mm from the magnets' faces and beyond, where {rtol:.1e} is asked for"
-    permeability = float(np.max(cuboid_table(rotor, accuracy).absolute_error(points)[0] / scale))
+    permeability = moment_error(rotor, points, scale)
+    if permeability <= SURELY * rtol:  # else its whole field, in seconds, would say no other
+        permeability = float(np.max(cuboid_table(rotor, accuracy).absolute_error(points)[0] / scale))
     if permeability > rtol:
         reason = f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
-        if all(has_skin(magnet) or not magnet.contrast for magnet in rotor) and smooth(rotor):
+        if not without_charges(rotor) and smooth(rotor) and uncut(rotor, accuracy):
             if len(rotor) >= MANY:
                 return "surface", f"{reason}, and elements of {len(rotor)} magnets take minutes and gigabytes"
             if rtol >= ROUGH:

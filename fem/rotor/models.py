@@ -294,6 +294,23 @@ def without_charges(magnets: Rotor) -> str:
     return ""
 
 
+def moment_error(magnets: Rotor, points: Array, scale: Array) -> float:
+    """What leaving out the permeability does to B at points (n, 3) m by the moments alone, by `scale` (n,) T."""
+    missing = np.zeros((len(points), 3))
+    for magnet in magnets:
+        if magnet.contrast and not isinstance(magnet.body, Part):
+            change = replace(magnet, polarization=carrier(magnet).polarization - magnet.polarization).rigid
+            missing += uniform_moments(change, 1).evaluate(points)[0]
+    return float(np.max(np.linalg.norm(missing, axis=1) / scale))
+
+
+def uncut(magnets: Rotor, accuracy: Accuracy) -> bool:
+    """Whether one expansion of each permeable magnet converges; charges of half a face have poor moments."""
+    permeable, clearance = [magnet for magnet in magnets if magnet.contrast], accuracy.clearance(magnets)
+    pieces = cut_magnets(permeable, clearance, _least_ratio(magnets, accuracy.rtol))
+    return all(len(one) == 1 and len(cells_of(one[0].body, clearance).radii) == 1 for one in pieces)
+
+
 def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) -> RotorTable:
     """Field of magnets of one recoil permeability each: closed forms, and expansions of the charges on their surfaces.
 
