@@ -205,7 +205,10 @@ def test_a_sweep_over_a_parameter_and_a_model(tmp_path):
     ("values", "said"),
     [
         ({}, "at least one key"),
-        ({"model": ["magic"]}, "Input model must be one of dipole, cuboid, fem, map, auto; instead received 'magic'."),
+        (
+            {"model": ["magic"]},
+            "Input model must be one of dipole, cuboid, surface, fem, map, auto; instead received 'magic'",
+        ),
         ({"model": [1.0]}, "Input model must be varied over names"),
         ({"frequency": [110.0]}, "did you mean `frequency_hz`?"),
         ({"frequency_hz": [110.0, float("nan")]}, "finite numbers"),

@@ -189,7 +189,7 @@ def test_auto_takes_the_cheapest_model_that_suffices():
 
 def test_input_that_makes_no_sense_is_refused():
     rotor = rotors(1.0)["tilt"]
-    with pytest.raises(ValueError, match="dipole, moments, cuboid, fem, auto; instead received 'bem'"):
+    with pytest.raises(ValueError, match="dipole, moments, cuboid, surface, fem, auto; instead received 'bem'"):
         rotor_table(rotor, "bem")
     with pytest.raises(ValueError, match="rtol must lie between"):
         rotor_table(rotor, "fem", 0.0)
