@@ -13,7 +13,7 @@ from spinlev.fem.rotor.choice import resolve_model
 from spinlev.fem.rotor.models import Accuracy, AccuracyWarning, error_points, fem_table, surface_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.shapes import Box, Cylinder, Sphere, rotation_matrix
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring, rotation_matrix
 
 EDGE = 1e-2
 ALONG, ACROSS = np.array([0.0, 0.0, 1.3]), np.array([1.0, 0.0, 0.4])
@@ -89,6 +89,22 @@ def test_errors_fall_with_the_seventh_power():
     best = field(20)
     coarse, fine = (np.abs(field(count) - best).max() for count in (6, 12))
     assert fine < coarse / 2**6
+
+
+def test_a_ring_with_a_small_hole_is_a_cylinder_but_for_it():
+    """The hole takes a share of the volume, and with it of what the permeability adds."""
+    points = EDGE * np.array([[0.7, 0.0, 1.2], [1.1, 0.3, 0.2], [0.5, -0.9, -0.8]])
+
+    def added(body):
+        magnet = Magnet(body, ACROSS, 1.2)
+        skin, rigid = SurfaceCharges([magnet], 10), magnet.rigid
+        away = points[:, None] - skin.places
+        amounts = skin.beyond([rigid]) * skin.areas / (4 * np.pi)
+        return np.einsum("k,nka->na", amounts, away / np.linalg.norm(away, axis=2)[..., None] ** 3)
+
+    whole, hole = added(Cylinder(0.5 * EDGE, EDGE)), added(ring(0.5 * EDGE, 0.025 * EDGE, EDGE))
+    missing = np.linalg.norm(hole - whole, axis=1) / np.linalg.norm(whole, axis=1)
+    assert np.all((missing > 2e-4) & (missing < 2 * 0.05**2))
 
 
 @pytest.mark.parametrize("mu", [1.05, 5.0, 1000.0])
