@@ -71,7 +71,7 @@ def test_a_fold_is_where_a_survey_loses_two_equilibria(compiled):
     assert (wide[1] - wide[0]) / (close[1] - close[0]) == pytest.approx(10.0, rel=0.02)
 
 
-@pytest.mark.parametrize("gap", [1e-2, 1e-5])
+@pytest.mark.parametrize("gap", [1e-2, pytest.param(1e-3, marks=pytest.mark.slow), 1e-5])
 def test_an_end_just_before_a_fold_is_not_stepped_over(compiled, gap):
     """One long step leads past the end and back round the fold; the branch ends where it was told to, before that."""
     (fold,) = [p for p in followed(compiled, HORIZONTAL, 0.0, 1.0) if p.kind == FOLD]

@@ -102,10 +102,17 @@ def test_equilibria_equal_an_independent_solution(name, model, spin):
         )
 
 
+def some_fast(cases, fast):
+    """All `cases`, the others slow."""
+    return [case if case in fast else pytest.param(*case, marks=pytest.mark.slow) for case in cases]
+
+
 BRUTE = [("vertical", 30.0, 0.0), ("tilt", 80.0, -0.5), ("horizontal", 110.0, 0.5), ("vertical", 250.0, 0.0)]
 
 
-@pytest.mark.parametrize(("name", "frequency", "spin"), BRUTE)
+@pytest.mark.parametrize(
+    ("name", "frequency", "spin"), some_fast([(name, *case) for name in SCENES for _, *case in BRUTE], BRUTE)
+)
 def test_none_is_missed_that_brute_force_finds(name, frequency, spin):
     scene = replace(SCENES[name], frequency=frequency)
     table, scales, where = table_of(scene, "dipole"), Scales.of(scene), SearchRange(scene, 0.1)
@@ -164,7 +171,14 @@ PUBLISHED = [  # PHYSICS.md, "the family matters": scene, frequency, body spin, 
 ]
 
 
-@pytest.mark.parametrize(("name", "free"), [("horizontal", EVERY), ("vertical", LATERAL), ("tilt", EVERY)])
+@pytest.mark.parametrize(
+    ("name", "free"),
+    [
+        pytest.param(name, free, marks=[pytest.mark.slow] * ((free is LATERAL) != (name == "vertical")))
+        for name in SCENES
+        for free in (LATERAL, EVERY)
+    ],
+)
 def test_starts_thinned_on_the_way_find_what_all_find(name, free, monkeypatch):
     scene = SCENES[name]
     rates, values = Rates(table_of(scene, "cuboid")), parameters(scene, Scales.of(scene), frozen_spin=True)
@@ -293,9 +307,11 @@ ROTORS = {
 }
 
 
+STATED = [("horizontal 0.5", 160.0), ("horizontal 2", 110.0), ("vertical 13", 110.0), ("tilt 10", 160.0)]
+
+
 @pytest.mark.parametrize(
-    ("name", "frequency"),
-    [("horizontal 0.5", 160.0), ("horizontal 2", 110.0), ("vertical 13", 110.0), ("tilt 10", 160.0)],
+    ("name", "frequency"), some_fast([(name, frequency) for name, _ in STATED for frequency in (110.0, 160.0)], STATED)
 )
 def test_the_stated_error_of_a_dipole_bounds_the_true_one_and_is_near_it(name, frequency):
     """Within a factor of ten: what a dipole leaves out of cubes of μr = 1 moves the place in a known direction."""

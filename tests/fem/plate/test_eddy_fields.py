@@ -95,7 +95,7 @@ def test_points_outside_the_mesh_are_named(response):
 def test_sphere_in_a_uniform_field_on_curved_tetrahedra():
     """μ0 m² of the induced moment is the coupling of the field with itself; R/δ = 1.7."""
     radius, frequency = 0.01, 200.0
-    mesh = occ_mesh({"ball": Conductor(Sphere(Pnt(0, 0, 0), 10.0), SIGMA, 10.0)}, reach=8.0)
+    mesh = occ_mesh({"ball": Conductor(Sphere(Pnt(0, 0, 0), 10.0), SIGMA, 8.0)}, reach=8.0)
     sources = [HomogeneousField(axis) for axis in np.eye(3)]
     found = solve_eddy(mesh, 3, frequency, sources).couplings
     exact = polarizability(radius, SIGMA, frequency)
