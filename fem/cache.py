@@ -34,7 +34,7 @@ from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_who
 # Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
-    "rotor": 8,
+    "rotor": 9,
     "mutual": 5,
     "map": 3,
     "plate": 2,

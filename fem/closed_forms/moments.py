@@ -36,12 +36,12 @@ def enough_nodes(degree: int) -> int:
 def oblique_contact(bodies: Sequence[Solid]) -> bool:
     """Whether two bodies but parallel boxes (nearly) touch: then kinks run across the panels of the rules."""
     return any(
-        not _parallel(first, second) and separation(first, second)[0] < NEAR * min(first.size.min(), second.size.min())
+        not parallel(first, second) and separation(first, second)[0] < NEAR * min(first.size.min(), second.size.min())
         for first, second in combinations(bodies, 2)
     )
 
 
-def _parallel(first: Solid, second: Solid) -> bool:
+def parallel(first: Solid, second: Solid) -> bool:
     """Whether both are boxes, of the same axes."""
     if not (isinstance(first, Box) and isinstance(second, Box)):
         return False
@@ -67,7 +67,7 @@ def panel_breaks(box: Box, others: Sequence[Solid]) -> list[Array]:
         places = {-half, half}
         for other in others:
             body = box.to_body(other.corners)
-            if _parallel(box, other):
+            if parallel(box, other):
                 places |= {place for place in body[:, axis] if abs(place) < half * (1 - 1e-9)}
         ordered = np.array(sorted(places))
         apart = np.concatenate([[True], np.diff(ordered) > 1e-9 * half])

@@ -16,7 +16,7 @@ O. D. Kellogg, Foundations of Potential Theory (1929), ch. VI; P. R. Johnston an
 """
 
 from collections.abc import Sequence
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from itertools import combinations, product
 
 import numpy as np
@@ -28,20 +28,26 @@ from ...geometry.common import Array, ComputationError
 from ...geometry.magnets import Magnet
 from ...geometry.overlap import separation
 from ...geometry.shapes import Box, Cylinder, Sphere
-from ...geometry.solids import Solid
+from ...geometry.solids import Solid, moved
+from ..closed_forms.moments import parallel
 from ..closed_forms.uniform import remanent_field
 from ..harmonics.interior import sphere
 from ..harmonics.solid import FOUR_PI, members, orthonormal
 
 INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
-APART = 4.0  # distance from a face, in edges by the nodes along them, from which on the nodes' own rule does to 1e-8
+# Distance from a face, in edges by the nodes along them, from which on the nodes' own rule does: nodes are at most
+# h = 1.2 of that apart, so that it errs by exp(-2π 4/1.2) = 1e-9
+APART = 4.0
 MORE = 2  # times as many nodes along an edge for moments as for charges
 KINKS = 0.2  # gap, in edges, from which on a neighbour's edges make no kink in the charges
 FINE = 10  # nodes of the rule for a product beyond those along an edge
 ROWS = 1 << 20  # numbers at once in such a rule
-ROUND_OFF = 1e-13
+ROUND_OFF = 1e-13  # of a line's half: no place is nearer to a node than that
 WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near the axis, too
+# Distance of two bodies' centres, in the sum of their circumradii, from which on few places on each stand for all:
+# those of Gauss's rule, COARSE along an edge. What is charged beyond the carriers has hardly a field there.
+FAR, COARSE = 1.5, 4
 
 
 @cache
@@ -110,10 +116,18 @@ def far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Arr
     return np.asarray(inverse * (areas / FOUR_PI))
 
 
-class Skin:
-    """Nodes on the surface of a body: `places` (n, 3) m, outward `normals` (n, 3) and `areas` (n,) m², body's axes.
+def _from_gauss(places: Array) -> Array:
+    """(n, COARSE): Lagrange's polynomials at Gauss's COARSE nodes, at places x (n,)."""
+    x, weights = np.polynomial.legendre.leggauss(COARSE)
+    shares = (np.arange(COARSE) + 0.5)[:, None] * np.polynomial.legendre.legvander(x, COARSE - 1).T * weights
+    return np.asarray(np.polynomial.legendre.legvander(places, COARSE - 1) @ shares)
 
-    Nearer than `reach` (m) to it `near_rows` does what the nodes' own rule does not.
+
+class Surface:
+    """Nodes on a body's surface: `places` (n, 3) m, outward `normals` (n, 3) and `areas` (n,) m², body's axes.
+
+    Nearer than `reach` (m) to it `rows_nearby` does what the nodes' own rule does not; 0: the rule has to do, and the
+    step to more nodes tells how well it does.
     """
 
     places: Array
@@ -122,25 +136,25 @@ class Skin:
     reach = 0.0
 
     @cached_property
-    def own(self) -> Array:
+    def kernel(self) -> Array:
         """K (n, n) of the body alone."""
         raise NotImplementedError
-
-    def near_rows(self, places: Array, normals: Array) -> Array:
-        """n·h (T) of the charges at places outside the body or on it, (t, n)."""
-        raise NotImplementedError
-
-    def fine(self, charges: Array) -> tuple[Array, Array]:
-        """More places (k, 3), for high moments, and what is there (k,) of the charges (n,) T by their areas."""
-        return self.places, self.areas * charges
 
     @cached_property
     def coarse(self) -> tuple[Array, Array, Array]:
         """Places and normals (k, 3) that stand for all from afar, and the nodes' values by those there (n, k)."""
-        return self.places, self.normals, np.eye(len(self.places))
+        raise NotImplementedError
+
+    def rows_nearby(self, places: Array, normals: Array) -> Array:
+        """n·h (T) of the charges at places outside the body or on it, (t, n)."""
+        raise NotImplementedError
+
+    def refined(self, charges: Array) -> tuple[Array, Array]:
+        """More places (k, 3), for high moments, and what is there (k,) of the charges (n,) T by their areas."""
+        return self.places, self.areas * charges
 
 
-class BoxSkin(Skin):
+class BoxSurface(Surface):
     """Of a cuboid, face by face: on those at -x, x, -y, y, -z and z, with more nodes along longer edges."""
 
     def __init__(self, body: Box, count: int) -> None:
@@ -149,20 +163,32 @@ class BoxSkin(Skin):
         self.reach = APART * float(np.max(2 * self.half / self.counts))
         rules, places, normals, areas, self.numbers, total = [graded(n) for n in self.counts], [], [], [], {}, 0
         for axis, side in product(range(3), (-1, 1)):
-            b, c = (axis + 1) % 3, (axis + 2) % 3
-            face = np.empty((self.counts[b], self.counts[c], 3))
-            face[..., axis] = side * self.half[axis]
-            face[..., b], face[..., c] = self.half[b] * rules[b][0][:, None], self.half[c] * rules[c][0]
-            places.append(face.reshape(-1, 3))
+            (x, wide), (y, tall) = (rules[k] for k in self._order(axis)[:2])
+            places.append(self._grid(axis, side, x, y))
             normals.append(np.broadcast_to(side * np.eye(3)[axis], places[-1].shape))
-            areas.append(self.half[b] * self.half[c] * np.outer(rules[b][1], rules[c][1]).ravel())
-            self.numbers[axis, side] = total + np.arange(face[..., 0].size).reshape(face.shape[:2])  # of the nodes
+            areas.append(self._area(axis) / 4 * np.outer(wide, tall).ravel())
+            self.numbers[axis, side] = total + np.arange(len(places[-1])).reshape(len(x), len(y))  # of the nodes
             total += len(places[-1])
         self.places, self.normals, self.areas = (np.concatenate(part) for part in (places, normals, areas))
 
+    @staticmethod
+    def _order(axis: int) -> list[int]:
+        """The axes along a face, and that across it."""
+        return [(axis + 1) % 3, (axis + 2) % 3, axis]
+
+    def _area(self, axis: int) -> float:
+        return float(np.prod(2 * self.half[self._order(axis)[:2]]))
+
+    def _grid(self, axis: int, side: int, x: Array, y: Array) -> Array:
+        """Places (n m, 3) on a face at x (n,) and y (m,) in half edges."""
+        order, face = self._order(axis), np.empty((len(x), len(y), 3))
+        face[..., axis] = side * self.half[axis]
+        face[..., order[0]], face[..., order[1]] = self.half[order[0]] * x[:, None], self.half[order[1]] * y
+        return face.reshape(-1, 3)
+
     def _face(self, axis: int, side: int, places: Array) -> tuple[list[int], Array, Array, tuple[int, int]]:
         """A face's axes and normal as an order, places as it sees them, its half edges, and its counts of nodes."""
-        order = [(axis + 1) % 3, (axis + 2) % 3, axis]
+        order = self._order(axis)
         seen = places[:, order] - [0, 0, side * self.half[axis]]
         return order, seen, self.half[order[:2]], (self.counts[order[0]], self.counts[order[1]])
 
@@ -170,13 +196,12 @@ class BoxSkin(Skin):
         """(n,) the nodes' mirror images at the plane across an axis."""
         found = np.empty(len(self.places), int)
         for (across, side), mine in self.numbers.items():
-            along = [(across + 1) % 3, (across + 2) % 3]
-            image = self.numbers[across, -side] if across == axis else np.flip(mine, along.index(axis))
-            found[mine] = image
+            flipped = self.numbers[across, -side] if across == axis else np.flip(mine, self._order(across).index(axis))
+            found[mine] = flipped
         return found
 
     @cached_property
-    def own(self) -> Array:
+    def kernel(self) -> Array:
         """K (n, n); what mirrors and, of a cube, turns of the body make of each other is computed once."""
         total = len(self.places)
         result, everything = np.zeros((total, total)), np.arange(total)
@@ -195,37 +220,28 @@ class BoxSkin(Skin):
                     result[np.ix_(turned[chosen], turned[face])] = rows
         return result
 
-    def fine(self, charges: Array) -> tuple[Array, Array]:
-        places, amounts = [], []
-        for (axis, side), numbers in self.numbers.items():
-            order, _, halves, counts = self._face(axis, side, self.places[:1])
-            (x, wide), (y, tall) = (graded(MORE * n) for n in counts)
-            face = np.empty((len(x), len(y), 3))
-            face[..., axis], face[..., order[0]] = side * self.half[axis], halves[0] * x[:, None]
-            face[..., order[1]] = halves[1] * y
-            places.append(face.reshape(-1, 3))
-            between = _lagrange(x, counts[0]) @ charges[numbers] @ _lagrange(y, counts[1]).T
-            amounts.append((halves[0] * halves[1] * np.outer(wide, tall) * between).ravel())
-        return np.concatenate(places), np.concatenate(amounts)
-
     @cached_property
     def coarse(self) -> tuple[Array, Array, Array]:
         x, _ = np.polynomial.legendre.leggauss(COARSE)
         places, normals, shares = [], [], []
-        for (axis, side), numbers in self.numbers.items():
-            order, _, halves, counts = self._face(axis, side, self.places[:1])
-            face = np.empty((COARSE, COARSE, 3))
-            face[..., axis], face[..., order[0]] = side * self.half[axis], halves[0] * x[:, None]
-            face[..., order[1]] = halves[1] * x
-            places.append(face.reshape(-1, 3))
-            normals.append(np.broadcast_to(self.normals[numbers.flat[0]], places[-1].shape))
-            vander = np.linalg.inv(np.polynomial.legendre.legvander(x, COARSE - 1))
-            shares.append(
-                np.kron(*(np.polynomial.legendre.legvander(graded(n)[0], COARSE - 1) @ vander for n in counts))
-            )
+        for axis, side in self.numbers:
+            places.append(self._grid(axis, side, x, x))
+            normals.append(np.broadcast_to(side * np.eye(3)[axis], places[-1].shape))
+            along, across = (_from_gauss(graded(self.counts[k])[0]) for k in self._order(axis)[:2])
+            shares.append(np.kron(along, across))
         return np.concatenate(places), np.concatenate(normals), np.asarray(scipy.linalg.block_diag(*shares))
 
-    def near_rows(self, places: Array, normals: Array) -> Array:
+    def refined(self, charges: Array) -> tuple[Array, Array]:
+        places, amounts = [], []
+        for (axis, side), numbers in self.numbers.items():
+            counts = [self.counts[k] for k in self._order(axis)[:2]]
+            (x, wide), (y, tall) = (graded(MORE * n) for n in counts)
+            places.append(self._grid(axis, side, x, y))
+            between = _lagrange(x, counts[0]) @ charges[numbers] @ _lagrange(y, counts[1]).T
+            amounts.append((self._area(axis) / 4 * np.outer(wide, tall) * between).ravel())
+        return np.concatenate(places), np.concatenate(amounts)
+
+    def rows_nearby(self, places: Array, normals: Array) -> Array:
         result = np.empty((len(places), len(self.places)))
         for (axis, side), numbers in self.numbers.items():
             (order, seen, halves, counts), mine = self._face(axis, side, places), numbers.ravel()
@@ -244,12 +260,12 @@ class BoxSkin(Skin):
         return result
 
 
-class RoundSkin(Skin):
+class RoundSurface(Surface):
     """Of a cylinder or ring: n nodes along each line of its section, 2 n around."""
 
-    def __init__(self, body: Cylinder, count: int) -> None:
+    def __init__(self, body: Cylinder, count: int, rule: tuple[Array, Array] | None = None) -> None:
         half, outer, inner = body.height / 2, body.radius, body.inner_radius
-        self.count = count
+        self.body, self.count = body, count
         # middle and half way of each line (r, z), and its normal
         self.lines = [
             (np.array([outer, 0.0]), np.array([0.0, half]), np.array([1.0, 0.0])),
@@ -260,7 +276,7 @@ class RoundSkin(Skin):
         ]
         if inner:
             self.lines.append((np.array([inner, 0.0]), np.array([0.0, half]), np.array([-1.0, 0.0])))
-        (x, weights), turns = graded(count), 2 * count
+        (x, weights), turns = rule or graded(count), 2 * count
         self.section = np.concatenate([middle + x[:, None] * way for middle, way, _ in self.lines])
         across = np.concatenate([np.broadcast_to(normal, (count, 2)) for _, _, normal in self.lines])
         widths = np.concatenate([weights * np.linalg.norm(way) for _, way, _ in self.lines])
@@ -275,7 +291,17 @@ class RoundSkin(Skin):
         self.areas = np.repeat(widths * self.section[:, 0] * 2 * np.pi / turns, turns)
 
     @cached_property
-    def own(self) -> Array:
+    def coarse(self) -> tuple[Array, Array, Array]:
+        few = RoundSurface(self.body, COARSE, np.polynomial.legendre.leggauss(COARSE))
+        orders, turns = np.arange(COARSE + 1), 2 * COARSE
+        apart = np.pi * np.arange(2 * self.count)[:, None] / self.count - 2 * np.pi * np.arange(turns) / turns
+        around = np.cos(orders[:, None, None] * apart)
+        around[1:-1] *= 2  # trigonometric interpolation
+        along = scipy.linalg.block_diag(*[_from_gauss(graded(self.count)[0])] * len(self.lines))
+        return few.places, few.normals, np.kron(along, around.sum(axis=0) / turns)
+
+    @cached_property
+    def kernel(self) -> Array:
         """K (n, n), which around the axis is a convolution."""
         count, turns = self.count, 2 * self.count
         orders = np.arange(count + 1)
@@ -314,7 +340,7 @@ class RoundSkin(Skin):
         return np.array(result)
 
 
-class SphereSkin(Skin):
+class SphereSurface(Surface):
     """Of a sphere, on which K of a harmonic of degree l is half of it by 2 l + 1."""
 
     def __init__(self, body: Sphere, count: int) -> None:
@@ -322,37 +348,38 @@ class SphereSkin(Skin):
         self.places, self.areas, self.count = body.radius * self.normals, body.radius**2 * areas, count
 
     @cached_property
-    def own(self) -> Array:
+    def coarse(self) -> tuple[Array, Array, Array]:
+        keys, (normals, areas) = members(COARSE), sphere(COARSE)
+        shares = orthonormal(keys, self.normals) @ (orthonormal(keys, normals).T * areas)
+        return float(np.linalg.norm(self.places[0])) * normals, normals, shares
+
+    @cached_property
+    def kernel(self) -> Array:
         keys = members(self.count)
         values = orthonormal(keys, self.normals)
         return np.asarray(values / [2 * (2 * l + 1) for l, _, _ in keys] @ (values.T * sphere(self.count)[1]))
 
 
-@lru_cache(maxsize=16)  # one size of cube at all numbers of nodes takes some 50 MB
-def _skin(kind: str, numbers: tuple[float, ...], count: int) -> Skin:
-    """Of a body in units of its first number: alike bodies of all sizes and magnets share what K is."""
-    if kind == "cuboid":
-        return BoxSkin(Box(np.array(numbers)), count)
-    if kind == "sphere":
-        return SphereSkin(Sphere(numbers[0]), count)
-    radius, hole, height = (*numbers, 0.0)[:3] if len(numbers) > 2 else (numbers[0], 0.0, numbers[1])
-    return RoundSkin(Cylinder(radius, height, inner_radius=hole), count)
+def _surface(body: Solid, count: int) -> Surface:
+    if isinstance(body, Box):
+        return BoxSurface(body, count)
+    assert isinstance(body, Cylinder | Sphere)
+    return RoundSurface(body, count) if isinstance(body, Cylinder) else SphereSurface(body, count)
 
 
-def has_skin(magnet: Magnet) -> bool:
+def bears_charges(magnet: Magnet) -> bool:
     """Whether a magnet can respond by charges on its surface: a shape with a closed form, of one permeability."""
     return magnet.isotropic and isinstance(magnet.body, Box | Cylinder | Sphere)
 
 
-def alike_in_contact(first: Solid, second: Solid) -> bool:
+def face_to_face(first: Solid, second: Solid) -> bool:
     """Whether two bodies are cuboids whose faces that look at each other are alike and opposite each other."""
-    if not (isinstance(first, Box) and isinstance(second, Box)):
+    if not parallel(first, second):
         return False
-    turn, offset = np.abs(first.rotation.T @ second.rotation), np.abs(first.to_body(second.center))
-    small = INSET * float(first.size.max())
+    offset, small = np.abs(first.to_body(second.center)), INSET * float(first.size.max())
     beside = offset > small
-    same = np.abs(turn @ second.size - first.size) <= small
-    return bool(np.all((turn < INSET) | (np.abs(turn - 1) < INSET)) and beside.sum() == 1 and same[~beside].all())
+    same = np.abs(np.abs(first.rotation.T @ second.rotation) @ second.size - first.size) <= small
+    return bool(beside.sum() == 1 and same[~beside].all())
 
 
 def gap(first: Solid, second: Solid) -> float:
@@ -365,12 +392,7 @@ def gap(first: Solid, second: Solid) -> float:
 def smooth(magnets: Sequence[Magnet]) -> bool:
     """Whether charges have no kinks but at the edges: elsewhere faces that lie across each other would make some."""
     pairs = combinations([magnet.body for magnet in magnets], 2)
-    return all(alike_in_contact(first, second) or gap(first, second) > KINKS for first, second in pairs)
-
-
-# Distance of two bodies' centres, in the sum of their circumradii, from which on few places on each stand for all:
-# those of Gauss's rule, COARSE along an edge. What is charged beyond the carriers has hardly a field there.
-FAR, COARSE = 1.5, 4
+    return all(face_to_face(first, second) or gap(first, second) > KINKS for first, second in pairs)
 
 
 class SurfaceCharges:
@@ -378,7 +400,7 @@ class SurfaceCharges:
 
     Parameters
     ----------
-    magnets : each of them `has_skin`
+    magnets : each of them `bears_charges`
     count : n, nodes along an edge of a face
 
     Attributes
@@ -391,15 +413,17 @@ class SurfaceCharges:
     def __init__(self, magnets: Sequence[Magnet], count: int) -> None:
         self.count = count
         self.all, self.magnets = tuple(magnets), tuple(magnet for magnet in magnets if magnet.contrast)
-        places, normals, areas, self._skins, self._sizes = [], [], [], [], []
+        alike = dict[tuple[str | float, ...], Surface]()
+        places, normals, areas, self._surfaces = [], [], [], list[Surface]()
         for magnet in self.magnets:
-            body, size = magnet.body, float(magnet.body.shape_numbers[0])
-            skin = _skin(body.kind, tuple(np.round(body.shape_numbers / size, 12).tolist()), count)
-            places.append(body.center + size * skin.places @ body.rotation.T)
-            normals.append(skin.normals @ body.rotation.T)
-            areas.append(size**2 * skin.areas)
-            self._skins.append(skin)
-            self._sizes.append(size)
+            body = magnet.body
+            key = (body.kind, *body.shape_numbers.tolist())
+            if key not in alike:
+                alike[key] = _surface(moved(body, np.zeros(3), np.eye(3)), count)
+            self._surfaces.append(alike[key])
+            places.append(body.center + alike[key].places @ body.rotation.T)
+            normals.append(alike[key].normals @ body.rotation.T)
+            areas.append(alike[key].areas)
         self.places, self.normals, self.areas = (np.concatenate(part) for part in (places, normals, areas))
         self.owner = np.repeat(np.arange(len(areas)), [len(one) for one in areas])
         self._contrast = np.array([magnet.recoil_permeability - 1 for magnet in self.magnets])[self.owner]
@@ -411,28 +435,28 @@ class SurfaceCharges:
 
     def _rows(self, number: int) -> tuple[NDArray[np.intp], Array]:
         """Nodes of bodies that are not far from a magnet, and n·h there by its charges."""
-        magnet, skin, size = self.magnets[number], self._skins[number], self._sizes[number]
+        magnet, surface = self.magnets[number], self._surfaces[number]
         at = np.flatnonzero(~self._far[number, self.owner] & (self.owner != number))
-        mine, rows = self.owner == number, np.zeros((len(at), len(skin.places)))
-        close = magnet.body.distance(self.places[at]) < size * skin.reach
+        mine, rows = self.owner == number, np.zeros((len(at), len(surface.places)))
+        close = magnet.body.distance(self.places[at]) < surface.reach
         rows[~close] = far_rows(self.places[at[~close]], self.normals[at[~close]], self.places[mine], self.areas[mine])
         if close.any():
-            local = magnet.body.to_body(self.places[at[close]]) / size
-            rows[close] = skin.near_rows(local, self.normals[at[close]] @ magnet.body.rotation)
+            local = magnet.body.to_body(self.places[at[close]])
+            rows[close] = surface.rows_nearby(local, self.normals[at[close]] @ magnet.body.rotation)
         return at, rows
 
     def numbers_at(self, count: int) -> float:
         """Of all matrices, with `count` nodes along an edge, about."""
-        nodes = [(count / self.count) ** 2 * np.sum(self.owner == k) for k in range(len(self.magnets))]
+        nodes = (count / self.count) ** 2 * np.bincount(self.owner)
         return float(np.sum(~self._far * np.outer(nodes, nodes)))
 
     @cached_property
     def _from_afar(self) -> Array:
         """n·h at the coarse places of all bodies by charges at those of bodies that are far from them."""
-        owner = np.repeat(np.arange(len(self.magnets)), [len(skin.coarse[0]) for skin in self._skins])
-        of = list(zip(self.magnets, self._skins, self._sizes, strict=True))
-        places = np.concatenate([m.body.center + size * s.coarse[0] @ m.body.rotation.T for m, s, size in of])
-        normals = np.concatenate([s.coarse[1] @ m.body.rotation.T for m, s, _ in of])
+        owner = np.repeat(np.arange(len(self.magnets)), [len(surface.coarse[0]) for surface in self._surfaces])
+        of = [(magnet.body, surface.coarse) for magnet, surface in zip(self.magnets, self._surfaces, strict=True)]
+        places = np.concatenate([body.center + few[0] @ body.rotation.T for body, few in of])
+        normals = np.concatenate([few[1] @ body.rotation.T for body, few in of])
         result = np.zeros((len(places), len(places)))
         for k in range(len(self.magnets)):
             far, mine = self._far[k, owner], owner == k
@@ -443,31 +467,31 @@ class SurfaceCharges:
         """K σ (n,) T of charges (n,) T."""
         found = np.zeros_like(charges)
         of = [np.flatnonzero(self.owner == k) for k in range(len(self.magnets))]
-        for skin, mine, (at, rows) in zip(self._skins, of, self._near, strict=True):
-            found[mine] += skin.own @ charges[mine]
+        for surface, mine, (at, rows) in zip(self._surfaces, of, self._near, strict=True):
+            found[mine] += surface.kernel @ charges[mine]
             found[at] += rows @ charges[mine]
         if self._far.any():
             amounts = self.areas * charges
             seen = self._from_afar @ np.concatenate(
-                [skin.coarse[2].T @ amounts[mine] for skin, mine in zip(self._skins, of, strict=True)]
+                [surface.coarse[2].T @ amounts[mine] for surface, mine in zip(self._surfaces, of, strict=True)]
             )
-            parts = np.split(seen, np.cumsum([len(skin.coarse[0]) for skin in self._skins])[:-1])
-            for skin, mine, part in zip(self._skins, of, parts, strict=True):
-                found[mine] += skin.coarse[2] @ part
+            parts = np.split(seen, np.cumsum([len(surface.coarse[0]) for surface in self._surfaces])[:-1])
+            for surface, mine, part in zip(self._surfaces, of, parts, strict=True):
+                found[mine] += surface.coarse[2] @ part
         return found
 
-    def fine(self, number: int, charges: Array) -> tuple[Array, Array]:
+    def refined(self, number: int, charges: Array) -> tuple[Array, Array]:
         """Places (k, 3) m on one of `magnets`, and amounts (k,) T m² there, with the moments of charges (n,) T."""
-        body, size = self.magnets[number].body, self._sizes[number]
-        places, amounts = self._skins[number].fine(charges[self.owner == number])
-        return body.center + size * places @ body.rotation.T, size**2 * amounts
+        body = self.magnets[number].body
+        places, amounts = self._surfaces[number].refined(charges[self.owner == number])
+        return body.center + places @ body.rotation.T, amounts
 
-    def answer(self, field: Array) -> Array:
-        """Charges σ (n,) T that a field b (n, 3) T of sources elsewhere makes. Raises ComputationError as `settled`."""
-        return self.settled(self._contrast * np.sum(field * self.normals, axis=1))
+    def response(self, field: Array) -> Array:
+        """Charges σ (n,) T that a field b (n, 3) T of sources elsewhere makes. Raises ComputationError as `solved`."""
+        return self.solved(self._contrast * np.sum(field * self.normals, axis=1))
 
-    def settled(self, right: Array) -> Array:
-        """σ (n,) T of (1 + χ/2) σ - χ K σ = `right` (n,) T. Raises ComputationError where they do not settle."""
+    def solved(self, right: Array) -> Array:
+        """σ (n,) T of (1 + χ/2) σ - χ K σ = `right` (n,) T. Raises ComputationError where they do not converge."""
         share = 1 / (1 + self._contrast / 2)
         whole = scipy.sparse.linalg.LinearOperator(
             (len(right),) * 2, lambda v: v - share * self._contrast * self.normal_field(v), dtype=float
@@ -475,7 +499,7 @@ class SurfaceCharges:
         rtol = SOLVED * (1 + float(self._contrast.max()))
         found, failed = scipy.sparse.linalg.gmres(whole, share * right, rtol=rtol, restart=60, maxiter=5)
         if failed:
-            raise ComputationError("The charges on the magnets' surfaces did not settle.")
+            raise ComputationError("The charges on the magnets' surfaces did not converge. Choose --model fem.")
         return np.asarray(found)
 
     def beyond(self, carriers: Sequence[Magnet]) -> Array:
@@ -486,4 +510,4 @@ class SurfaceCharges:
         rest = np.array(
             [m.polarization_in_rotor - c.polarization_in_rotor for m, c in zip(self.magnets, kept, strict=True)]
         )
-        return self.settled(np.sum((rest[self.owner] + self._contrast[:, None] * closed) * self.normals, axis=1))
+        return self.solved(np.sum((rest[self.owner] + self._contrast[:, None] * closed) * self.normals, axis=1))

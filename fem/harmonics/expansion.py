@@ -282,7 +282,7 @@ def trimmed_expansions(
     most : coefficients up to which they are fitted
 
     The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
-    stand in for what is missing: little more than half as many do then. Charges and dipoles stay as they are.
+    stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.
     Coefficients are those along each expansion's own axes, where its expressions are written.
     """
     parts = [
@@ -305,9 +305,9 @@ def trimmed_expansions(
         fields, end = _fields(expansion, mine, points) / allowed[:, None], start + len(mine)
         sizes[start:end] = np.linalg.norm(fields, axis=2).max(axis=1)
         total += fields.sum(axis=0)
-        of_dipoles += fields[degrees[start:end] <= 1].sum(axis=0)
+        of_dipoles += fields[degrees[start:end] == 1].sum(axis=0)
         start = end
-    dipoles = [part for part in parts if part[1] <= 1]
+    dipoles = [part for part in parts if part[1] == 1]
     if _largest(total) <= 1:
         dipoles = []
     else:

@@ -18,7 +18,6 @@ from .models import (
     moment_error,
     moments_table,
     surface_table,
-    uncut,
     without_charges,
 )
 from .table import ROTOR, RotorTable, alike
@@ -45,8 +44,7 @@ def resolve_model(
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
 
     `auto` is the cheapest of dipole, moments and closed form that meets the accuracy; where permeability matters,
-    finite elements, or charges on the surfaces of `MANY` magnets or where no more than `ROUGH` is asked, if none is
-    cut.
+    finite elements, or charges on the surfaces of `MANY` compact magnets or where no more than `ROUGH` is asked.
 
     Parameters
     ----------
@@ -69,7 +67,7 @@ def resolve_model(
         permeability = float(np.max(cuboid_table(rotor, accuracy).absolute_error(points)[0] / scale))
     if permeability > rtol:
         reason = f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
-        if not without_charges(rotor) and smooth(rotor) and uncut(rotor, accuracy):
+        if not without_charges(rotor, accuracy, points) and smooth(rotor):
             if len(rotor) >= MANY:
                 return "surface", f"{reason}, and elements of {len(rotor)} magnets take minutes and gigabytes"
             if rtol >= ROUGH:

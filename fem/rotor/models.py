@@ -19,7 +19,7 @@ from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Part, places_off
 from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
-from ..elements.surface import SurfaceCharges, gap, has_skin
+from ..elements.surface import SurfaceCharges, bears_charges, gap
 from ..harmonics.expansion import MOST, MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
 from ..harmonics.solid import FOUR_PI, weighted_sums
 from .table import KNOWN, RotorTable
@@ -31,7 +31,7 @@ NEAR, FARTHER = 600, 150  # in how many directions; nearest by, what is left out
 # rotor, more by each of its sizes, and at most. Far from a rotor without a moment nothing is left of its field but what
 # permeability does, and errors relative to that took minutes and gigabytes that no floater there would feel.
 CANCELLED, CANCELLED_FARTHER, CANCELLED_MOST = 0.05, 0.03, 0.3
-FEW, LEAST_NUMBER = 4, 40
+FEW, LEAST_NUMBER = 4, 40  # magnets whose directions are as many as that, and the fewest of one of many
 BETWEEN = 0.8  # what may be left out, by what is allowed: between these places it is up to a fifth more than there
 # Least distance from faces from which on a table is to be accurate, by the edge of the largest magnet, if it were a
 # cube: a floater far smaller than the rotor floats as far away as a large one, and the number of pieces that are
@@ -281,17 +281,26 @@ FITTED = 40  # coefficients up to which a fit of them takes less than the charge
 SOME = 5  # every so many places are looked at from step to step
 
 
-def without_charges(magnets: Rotor) -> str:
-    """Why charges on the surfaces do not describe the magnets; empty where they do."""
-    for magnet in magnets:
-        if magnet.contrast and isinstance(magnet.body, Part):
-            return "one is a part from a STEP file"
-        if magnet.contrast and not has_skin(magnet):
-            return "one has two permeabilities"
-    for first, second in combinations([magnet.body for magnet in magnets if magnet.contrast], 2):
+def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
+    """Why charges on their surfaces do not describe the magnets at points (n, 3) m; empty where they do."""
+    permeable = [magnet for magnet in magnets if magnet.contrast]
+    if any(isinstance(magnet.body, Part) for magnet in permeable):
+        return "one is a part from a STEP file"
+    if not all(bears_charges(magnet) for magnet in permeable):
+        return "one has two permeabilities"
+    for first, second in combinations([magnet.body for magnet in permeable], 2):
         if not (isinstance(first, Box) and isinstance(second, Box)) and gap(first, second) < CONTACT:
             return "two of them, of which one is round, touch"
+    if permeable and min(_ratios(permeable, points)) < _least_ratio(magnets, accuracy.rtol):
+        # pieces of it would do, but of charges on half a face moments are poor, and sums of pieces are charged
+        return f"one is so long or flat that its moments do not converge {accuracy.clearance(magnets) * 1e3:.3g} mm off"
     return ""
+
+
+def _ratios(magnets: Sequence[Magnet], points: Array) -> list[float]:
+    """Least distance of points (n, 3) m from each magnet's centre, in circumradii."""
+    bodies = [magnet.body for magnet in magnets]
+    return [float(np.linalg.norm(points - body.center, axis=1).min()) / body.circumradius for body in bodies]
 
 
 def moment_error(magnets: Rotor, points: Array, scale: Array) -> float:
@@ -304,73 +313,50 @@ def moment_error(magnets: Rotor, points: Array, scale: Array) -> float:
     return float(np.max(np.linalg.norm(missing, axis=1) / scale))
 
 
-def uncut(magnets: Rotor, accuracy: Accuracy) -> bool:
-    """Whether one expansion of each permeable magnet converges; charges of half a face have poor moments."""
-    permeable, clearance = [magnet for magnet in magnets if magnet.contrast], accuracy.clearance(magnets)
-    pieces = cut_magnets(permeable, clearance, _least_ratio(magnets, accuracy.rtol))
-    return all(len(one) == 1 and len(cells_of(one[0].body, clearance).radii) == 1 for one in pieces)
-
-
 def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) -> RotorTable:
     """Field of magnets of one recoil permeability each: closed forms, and expansions of the charges on their surfaces.
 
-    Nodes are added until the estimated error meets the accuracy. If no number of `NODES` does that memory allows, as
+    Nodes are added until the estimated error meets the accuracy. If no number of `NODES` that memory allows does so, as
     where faces that nearly touch lie across each other, the last table is returned with an `AccuracyWarning`.
 
     Parameters
     ----------
-    magnets : cuboids, cylinders, rings and spheres, m and T in the rotor's frame
+    magnets : compact cuboids, cylinders, rings and spheres, m and T in the rotor's frame
     accuracy : asked for
     watch : hears of the progress
 
     Raises
     ------
-    InputError : a magnet has two permeabilities, or is a part from a file
+    InputError : a magnet has two permeabilities, is a part from a file, or is not compact; or round ones touch
     """
-    start, clearance = time.perf_counter(), accuracy.clearance(magnets)
-    if reason := without_charges(magnets):
+    start = time.perf_counter()
+    points, scale = error_points(magnets, accuracy.clearance(magnets))
+    if reason := without_charges(magnets, accuracy, points):
         raise InputError(
             f'Input rotor must have magnets that charges on their surfaces describe, for the model "surface"; instead '
             f"{reason}. Choose --model fem."
         )
-    carriers = tuple(carrier(magnet) for magnet in magnets)
-    points, scale = error_points(magnets, clearance)
-    permeable = tuple(magnet for magnet in magnets if magnet.contrast)
-    cut = cut_magnets(permeable, clearance, _least_ratio(magnets, accuracy.rtol))
-    cells = [
-        (np.array([piece.body.center for piece in pieces]), np.full(len(pieces), pieces[0].body.circumradius), None)
-        if isinstance(pieces[0].body, Box)
-        else (own.centers, own.radii, own)
-        for pieces in cut
-        for own in (cells_of(pieces[0].body, clearance),)
-    ]
-    ratio = min((np.min(np.linalg.norm(points[:, None] - c, axis=2) / r) for c, r, _ in cells), default=CONVERGENCE)
-    degree = _degree([pieces[0] for pieces in cut], [float(ratio)] * len(cut), accuracy.rtol / 10)
+    carriers, permeable = tuple(carrier(magnet) for magnet in magnets), [m for m in magnets if m.contrast]
+    ratios = _ratios(permeable, points)
+    degree = _degree(permeable, ratios, accuracy.rtol / 10)
 
-    def charged(skin: SurfaceCharges) -> list[MultipoleExpansion]:
-        found = list[MultipoleExpansion]()
-        beyond = skin.beyond(carriers)
-        for k, (centers, radii, own) in enumerate(cells):
-            places, amounts = skin.fine(k, beyond)
-            nearest = np.argmin(np.linalg.norm(places[:, None] - centers, axis=2), axis=1)
-            owner = own.which(places) if own else nearest
-            for piece, (center, radius) in enumerate(zip(centers, radii.tolist(), strict=True)):
-                chosen = owner == piece
-                weights = amounts[chosen, None] / (FOUR_PI * radius**2)
-                (sums,) = weighted_sums(degree, (places[chosen] - center) / radius, weights)
-                if len(radii) == 1:  # a whole magnet has no charge
-                    sums[0] = 0.0
-                found.append(MultipoleExpansion(center, radius, without_noise(np.conj(sums), 1e-15)))
+    def charged(surfaces: SurfaceCharges) -> list[MultipoleExpansion]:
+        beyond, found = surfaces.beyond(carriers), list[MultipoleExpansion]()
+        for k, body in enumerate(magnet.body for magnet in permeable):
+            (places, amounts), radius = surfaces.refined(k, beyond), body.circumradius
+            weights = amounts[:, None] / (FOUR_PI * radius**2)
+            (sums,) = weighted_sums(degree, (places - body.center) / radius, weights)
+            sums[0] = 0.0  # a magnet has no charge
+            found.append(MultipoleExpansion(body.center, radius, without_noise(np.conj(sums), 1e-15)))
         return found
 
-    whole_moments = np.arange(degree + 1)[:, None] > 0
     whole, steps, before, count = list[MultipoleExpansion](), list[MultipoleExpansion](), np.inf, 0
-    skin: SurfaceCharges | None = None
+    surfaces: SurfaceCharges | None = None
     for k, more in enumerate(NODES if permeable else ()):
-        if k > 1 and skin and skin.numbers_at(more) > LARGEST:
+        if k > 1 and surfaces and surfaces.numbers_at(more) > LARGEST:
             break
-        count, skin = more, SurfaceCharges(magnets, more)
-        coarse, whole = whole, charged(skin)
+        count, surfaces = more, SurfaceCharges(magnets, more)
+        coarse, whole = whole, charged(surfaces)
         if not k:
             continue
         step = [replace(b, coefficients=b.coefficients - a.coefficients) for a, b in zip(coarse, whole, strict=True)]
@@ -378,17 +364,15 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
         size = float(np.max(np.linalg.norm(missed, axis=1) / scale[::SOME]))
         rate = float(np.clip(size / before, FASTEST_RATE, SLOWEST_RATE)) if np.isfinite(before) else FIRST_RATE
         left, before = RATE_SAFETY * rate / (1 - rate), size
-        # what charge a piece lacks another of its magnet has: seen from afar it is none
-        steps = [replace(part, coefficients=left * part.coefficients * whole_moments) for part in step]
+        steps = [replace(part, coefficients=left * part.coefficients) for part in step]
         watch("charges on the surfaces", k / len(NODES))
         if left * size <= accuracy.rtol / 4:
             break
-    doubts = {"discretisation": nonzero(steps), "tail": nonzero(extrapolated_tail(whole, float(ratio)))}
+    tail = extrapolated_tail(whole, min(ratios, default=CONVERGENCE))
+    known = {cause: nonzero(parts) for cause, parts in (("discretisation", steps), ("tail", tail)) if nonzero(parts)}
     polarized = tuple(one for one in carriers if one.polarization.any())
-    known = {cause: parts for cause, parts in doubts.items() if parts}
-    table = _trimmed(
-        RotorTable("surface", magnets, polarized, tuple(whole), known), accuracy, BETWEEN / 20, 1.0, FITTED
-    )
+    table = RotorTable("surface", magnets, polarized, tuple(whole), known)
+    table = _trimmed(table, accuracy, BETWEEN / 20, 1.0, FITTED)
     _warn_beyond(table, accuracy, points, scale)
     return replace(table, provenance={"nodes": count, "seconds": time.perf_counter() - start})
 
