@@ -98,7 +98,7 @@ def _as_sealed(content: bytes) -> bool:
 
 
 def user() -> int:
-    """Number of this user; 0 on systems without numbers, where files are told by folders that are the user's own."""
+    """Number of this user; 0 on systems without numbers, where files are trusted by folders that are the user's own."""
     return os.getuid() if hasattr(os, "getuid") else 0
 
 

@@ -101,7 +101,7 @@ def _least_in_a_turn(
 
 
 def apart(first: Solid, second: Solid) -> bool:
-    """Whether the spheres about two bodies do not touch, which is told at once: a search for a gap takes 10 ms."""
+    """Whether the spheres about two bodies do not touch, which is decided at once: a search for a gap takes 10 ms."""
     return bool(np.linalg.norm(second.center - first.center) > first.circumradius + second.circumradius)
 
 

@@ -40,7 +40,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """One model's answers."""
+    """One model's results."""
 
     name: str
     levitation: Levitation
@@ -192,7 +192,7 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
 
 
 def compare_words(rows: Sequence[Compared]) -> list[str]:
-    """The answer in a sentence or two, the table, and its conditions."""
+    """The conclusion in a sentence or two, the table, and its conditions."""
     best, dipole = rows[-1], rows[0]
     scene = best.levitation.scene
     name = best.name.replace("fem", "finite elements").replace("+ mutual", "with mutual magnetisation")
@@ -265,7 +265,7 @@ def compare_figure(result: xr.Dataset) -> Figure:
 
 
 def compare_job(scene: Scene, asked: Models, spin: float, frequencies: Array | None, out: Path) -> Answer:
-    """Every model's answers about a `scene`; writes compare.nc, compare.json and the figure to `out`."""
+    """Every model's results for a `scene`; writes compare.nc, compare.json and the figure to `out`."""
     rows = compared(scene, asked, spin)
     best = rows[-1]
     result = compared_dataset(rows, frequencies)

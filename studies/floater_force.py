@@ -1,4 +1,4 @@
-"""Force and torque of the rotor's field on a floater that is held: a sphere, a cuboid or a cylinder in any pose."""
+"""Force and torque of the rotor's field on a fixed floater: a sphere, a cuboid or a cylinder in any pose."""
 
 import numpy as np
 import xarray as xr
@@ -30,7 +30,7 @@ def floater_force(
     rtol: float = Models.rtol,
     progress: bool = False,
 ) -> xr.Dataset:
-    """Force and torque of the rotor's field on the floater held in any pose: a sphere, a cuboid or a cylinder.
+    """Force and torque of the rotor's field on the floater fixed in any pose: a sphere, a cuboid or a cylinder.
 
     The floater's own multipoles in the rotor's field, those of its permeability as well; what rotor and floater induce
     in each other is left out. Gravity, plate and motion do not enter.

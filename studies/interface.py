@@ -94,7 +94,7 @@ def compare(
     plate_rtol: float = Models.plate_rtol,
     progress: bool = False,
 ) -> xr.Dataset:
-    """Every field model's answers about one scene, under the same conditions: may the point dipole be used for it?
+    """Every field model's results for one scene, under the same conditions: may the point dipole be used for it?
 
     Parameters
     ----------

@@ -80,12 +80,12 @@ class Levitation:
         self.spin = finite("spin", spin)
         self.searched = True  # whether the equilibria were searched for; else they were carried here from scenes nearby
         self._tables = SharedTables()
-        # The plate's currents for all of a flight's way, where it left the range of `plate`.
+        # The plate's currents for all of a trajectory's way, where it left the range of `plate`.
         self.wider: PlateMemory | None = None
         self.no_wider = ""  # why they could not be known, if so
-        self._nearest: Array | None = None  # to the plate, of a flight that had begun without its currents
-        self.flown: dict[float, Trajectory] = {}  # by duration, s: flights that were simulated together with others
-        self._ahead = 0.0  # duration of the flight that is asked for, s
+        self._nearest: Array | None = None  # to the plate, of a trajectory that had begun without its currents
+        self.flown: dict[float, Trajectory] = {}  # by duration, s: those simulated together with others
+        self._ahead = 0.0  # duration of the trajectory that is asked for, s
 
     # Sharing with other scenes
 
@@ -265,7 +265,7 @@ class Levitation:
 
     @cached_property
     def stability(self) -> Equilibrium:
-        """The equilibrium at which a flight begins, with its modes; if none will do, the nearest of all.
+        """The equilibrium at which a trajectory begins, with its modes; if none will do, the nearest of all.
 
         Raises
         ------
@@ -322,7 +322,7 @@ class Levitation:
         return PlateMemory(asked.plate, made, share, plan.model, plan.edges)
 
     def _foreseen(self) -> PlateMemory | None:
-        """An infinite slab for where a flight goes at first, if that is far, and what it misses without edges.
+        """An infinite slab for where a trajectory goes at first, if that is far, and what it misses without edges.
 
         Its tables take seconds, the finite elements' minutes.
         """
@@ -333,7 +333,7 @@ class Levitation:
         try:
             flown = slab.flight(min(self._ahead, AHEAD))
         except FlightStopped:
-            raise KeyboardInterrupt from None  # it is not the flight that was asked for
+            raise KeyboardInterrupt from None  # it is not the simulation that was stopped
         except SpinlevError:
             return None  # the plate is no slab for it
         found = slab.wider
@@ -345,11 +345,11 @@ class Levitation:
         edges = cached_edge_error(found.plate, np.array([worst, rotor]), self.scene.frequency, note)
         return replace(found, neglected=min(1.0, edges))
 
-    # The flight, which the plate's table follows
+    # The trajectory, which the plate's table follows
 
     @property
     def absolute(self) -> bool:
-        """Whether a flight begins where the scene says, and needs no equilibrium."""
+        """Whether a trajectory begins where the scene says, and needs no equilibrium."""
         return isinstance(self.scene.start, AbsoluteStart)
 
     def _place(self, known: Sequence[Equilibrium]) -> Array | None:
@@ -367,7 +367,7 @@ class Levitation:
 
     @property
     def flight_plate(self) -> PlateMemory | None:
-        """The plate's currents as a flight has them: by a table for all of its way, where that about its place ends."""
+        """The plate's currents along a trajectory: by a table for all of its way, where that about its place ends."""
         return self.wider or self.plate
 
     @property
@@ -383,7 +383,7 @@ class Levitation:
 
     @property
     def _known_for_flight(self) -> Sequence[Equilibrium]:
-        """The equilibria at which a flight may begin, with the currents of its own table."""
+        """The equilibria at which a trajectory may begin, with the currents of its own table."""
         if self.absolute:
             return ()
         if self.wider is None:
@@ -394,14 +394,14 @@ class Levitation:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
 
         A floater that leaves the range of the plate's table begins anew with one for where it goes: states of other
-        currents know nothing of what these remember.  Where none can be made, the flight ends there as lost
+        currents begin without the earlier ones.  Where none can be made, the trajectory ends there as lost
         (`Trajectory.left_plate_table`).
 
         Raises
         ------
         EquilibriumError : it shall begin at an equilibrium, and there is none that will do
-        InputError : `duration` is not positive, or the flight would begin in contact
-        FlightStopped : the user stopped it; the error holds what was flown
+        InputError : `duration` is not positive, or the trajectory would begin in contact
+        FlightStopped : the user stopped it; the error holds what was simulated
         """
         positive("duration", duration)
         if duration in self.flown:
@@ -433,7 +433,7 @@ class Levitation:
         return flown
 
     def live_flight(self) -> LiveFlight:
-        """A flight to play with, from where the scene says. Raises what `flight` raises."""
+        """A live simulation, from where the scene says. Raises what `flight` raises."""
         memory = self.plate
         if memory is not None:
             begins = initial_state(self.scene, self.table, self._known_for_flight, memory)[0].position
@@ -492,5 +492,5 @@ def _seen(plate: Plate, flown: Trajectory, most: int | None = None) -> Array:
 
 
 def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:
-    """The equilibrium at which a flight begins, or else the nearest."""
+    """The equilibrium at which a trajectory begins, or else the nearest."""
     return starting_point(known) or next(iter(known), None)

@@ -1,7 +1,7 @@
 """Processes of this machine that work for this one, each over a pair of sockets that nobody else can open.
 
 No port and no shared memory is needed, and no guard in the user's script: a process begins as `python -P`, so that it
-loads nothing from the folder it happens to be in, and is then told where this one looks for modules.
+loads nothing from the folder it happens to be in, and then gets where this one looks for modules.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def results(
     number : of processes, at most
     function : gives an iterable
     items : who iterates may append others
-    showing : whether they only draw, by whichever version of the program, and nobody hears what libraries print there
+    showing : whether they only draw, by whichever version of the program, and nobody reads what libraries print there
 
     Raises
     ------

@@ -45,7 +45,7 @@ def _family(levitation: Levitation) -> tuple[str, str, float]:
 
 def _find_together(members: Sequence[tuple[Levitation, str, float, tuple[int, ...]]]) -> None:
     """Search scenes of one family, each with its configuration, measure and place in the grid of what is varied."""
-    same: dict[str, list[Levitation]] = {}  # scenes that differ in where a flight begins have one survey
+    same: dict[str, list[Levitation]] = {}  # scenes that differ in where a trajectory begins have one survey
     chosen = []
     for member in members:
         one = member[0]
@@ -75,7 +75,7 @@ def _find_together(members: Sequence[tuple[Levitation, str, float, tuple[int, ..
 def _fly_together(levitations: Sequence[Levitation], duration: float) -> None:
     """Simulate `duration` (s) of motion in SIMD batches of scenes with one field.
 
-    Over a plate whose currents may be modelled, and in a field so short that balls do not pay, each flies alone.
+    Over a plate whose currents may be modelled, and in a field so short that balls do not pay, each is simulated alone.
     """
     groups: dict[tuple[object, ...], list[Levitation]] = {}
     for one in levitations:
@@ -153,7 +153,7 @@ class Question:
                 jobs[k] = partial(self._answer, point, one)
                 made.append(one)
                 one.share(first.setdefault(one.equations_key, one))
-                # Flights begin at equilibria, or have a plate whose table is made about one.
+                # Trajectories begin at equilibria, or have a plate whose table is made about one.
                 asked = self.ask == "equilibria" or (
                     self.ask == "flight" and (one.scene.plate is not None or not one.absolute)
                 )

@@ -17,7 +17,7 @@ SPREADS = {"offset_mm": 1e-3, "velocity_mm_s": 1e-3, "moment_deg": np.pi / 180, 
 
 
 def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> State:
-    """States (n, 3) at t = 0 from the keys of a scene's `[start]`, each three numbers a flight, or three for all.
+    """States (n, 3) at t = 0 from the keys of a scene's `[start]`, each three numbers a trajectory, or three for all.
 
     Raises
     ------

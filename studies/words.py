@@ -26,7 +26,7 @@ DIGITS = 4  # significant digits of a number, at most
 SAME = 1e-6
 CLEAR = 0.5  # share of the decay rate that must be gone without the plate before it is called the plate's
 FINEST = 0.01  # of distances from the axis, mm
-SWINGS = 0.1  # polar angles that differ by more in a turn (°) are told with their extremes
+SWINGS = 0.1  # polar angles that differ by more in a turn (°) are given with their extremes
 COLUMNS = (
     "distance (mm)", "lateral offset (mm)", "polar angle (°)", "phase lag (°)", "least stable mode",
     "growth rate (s⁻¹)", "",

@@ -30,7 +30,7 @@ WHOLE, PART = 64, 8
 # of it, as the field changes: with 0.3 rad and radii they are more than twice as many, and an eighth of the starts
 # misses several times as much.
 REACH, FAR = 0.8, 1.0
-TOGETHER = 8  # Searches that are made side by side: enough that NumPy's calls cost less than what they compute
+TOGETHER = 8  # Searches that are made as one batch: enough that NumPy's calls cost less than what they compute
 MARGIN = 0.3  # Sheets are followed so far beyond the range (radii): what its border cuts into pieces is whole there
 
 

@@ -237,7 +237,7 @@ def _mutual_magnetisation(scene: Scene, parts: Sequence[Part], interaction: str,
         if interaction == "mutual":
             raise InputError(
                 "Input interaction must be rigid or auto for a family of rotors whose magnets move against each other, "
-                "because their answers to the floater change with their distance; instead received mutual. Take one "
+                "because their mutual magnetisation changes with their distance; instead received mutual. Take one "
                 "scene a distance (spinlev.sweep over rotor.displacement_mm), which makes a table for each."
             )
         return []

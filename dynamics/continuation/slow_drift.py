@@ -30,10 +30,10 @@ from .frequencies import BORDER, HIGHEST, LONG_STEPS, LOWEST, at_frequency, by_f
 
 BALANCE, DURATION, INSTABILITY, CONTACT = "balance", "duration", "instability", "contact"
 SETTLED = 1e-3  # A balance is reached where ds/dt has fallen to this part of what it was at the start
-E_FOLDS = 7.0  # Growth after which a disturbance has ended the flight, unless it is given: from 3 µm to 3 mm
+E_FOLDS = 7.0  # Growth after which a disturbance has ended the trajectory, unless it is given: from 3 µm to 3 mm
 SAMPLES = 400
 ESCAPE = 3.40922  # Where the solution of y'' = t + y² that comes from y = -√(-t) becomes infinite; found numerically
-# Frequencies along the branch at which flights are tried first: what lasts only between two of them is missed.
+# Frequencies along the branch at which trajectories are tried first: what lasts only between two of them is missed.
 POINTS = 16
 
 
@@ -68,7 +68,7 @@ class SlowTorque:
 
         Raises InputError for a floater that is no sphere.
         """
-        scene.floater.must_be("sphere", where="for its slow drift", instead="Fly it (`simulate`).")
+        scene.floater.must_be("sphere", where="for its slow drift", instead="Simulate it (`simulate`).")
         return cls(rates, parameters(scene, Scales.of(scene)), scene.floater.radius, not (stokes or scene.drag.air))
 
     def __call__(self, state: Array) -> float:
@@ -88,7 +88,7 @@ class SlowTorque:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """An averaged flight."""
+    """An averaged trajectory."""
 
     time: Array  #: (n,) s
     spin: Array  #: (n,) body spin s
@@ -96,7 +96,7 @@ class Drift:
     growth_per_s: Array  #: (n,) largest growth of a mode
     ended_by: str  #: "balance", "fold", "instability", "contact" or "duration"
     balance_spin: float  #: the spin s* at which the slow torques balance, if the branch reaches it, else NaN
-    last_fall_s: float = 0.0  #: time from the fold to the loss, s; 0 unless the flight ended by a fold
+    last_fall_s: float = 0.0  #: time from the fold to the loss, s; 0 unless the trajectory ended by a fold
 
     @property
     def levitated_s(self) -> float:
@@ -104,13 +104,13 @@ class Drift:
         return np.inf if self.ended_by == BALANCE else float(self.time[-1]) + self.last_fall_s
 
     def fall_rate(self, start: float, end: float) -> float:
-        """Mean rate at which the distance grows between two parts (0 to 1) of the flight, m/s."""
+        """Mean rate at which the distance grows between two parts (0 to 1) of the trajectory, m/s."""
         times = np.array([start, end]) * self.time[-1]
         return float(np.diff(np.interp(times, self.time, self.distance))[0] / np.diff(times)[0])
 
 
 def _steady(start: BranchPoint, duration: float, e_folds: float) -> Drift:
-    """A flight on which nothing moves the spin."""
+    """A trajectory on which nothing moves the spin."""
     growth = max(0.0, start.growth_per_s - start.doubt_per_s)
     ended = INSTABILITY if growth * duration > e_folds else DURATION
     time = np.array([0.0, e_folds / growth if ended == INSTABILITY else duration])
@@ -119,7 +119,7 @@ def _steady(start: BranchPoint, duration: float, e_folds: float) -> Drift:
 
 
 def _averaged(torque: SlowTorque, points: list[BranchPoint], duration: float, end: str, e_folds: float) -> Drift:
-    """The flight along the points of a branch, to its `end` or to what comes first."""
+    """The trajectory along the points of a branch, to its `end` or to what comes first."""
     places = np.array([np.concatenate([p.state[:3], p.state[6:9], [p.spin]]) for p in points])
     arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
     slopes = [(p.tangent[6], p.tangent[:3] @ p.position / np.linalg.norm(p.state[:3])) for p in points]
@@ -193,7 +193,7 @@ def drift(
     rates : `Rates` of the same table, to compile them once for many scenes
     start : the equilibrium at `spin`, if it is known; else the one whose modes grow the slowest
     stokes : drag proportional to spin unless the scene's drag is that of real air, as in `simulate`
-    e_folds : growth of a mode after which it has ended the flight
+    e_folds : growth of a mode after which it has ended the trajectory
 
     Raises
     ------
@@ -226,13 +226,13 @@ def drift(
 
 @dataclass(frozen=True)
 class Lasting:
-    """The lowest interval of frequencies in which averaged flights last."""
+    """The lowest interval of frequencies in which averaged trajectories last."""
 
     # low, high: Hz; NaN where none lasts
     low: float = np.nan
     high: float = np.nan
-    ended_by: str = ""  # what ends flights above `high`, see `Drift`; or "border" of what was looked at; "" without one
-    growth_per_s: float = np.nan  # largest growth of a mode during the flight at `high`
+    ended_by: str = ""  # of trajectories above `high`, see `Drift`; or "border" of what was searched; "" without one
+    growth_per_s: float = np.nan  # largest growth of a mode during the trajectory at `high`
 
 
 def lasting_frequencies(
@@ -247,7 +247,7 @@ def lasting_frequencies(
 ) -> Lasting:
     """Where a floater let go with body spin 0 remains levitated, by its averaged motion along a branch of equilibria.
 
-    A flight is over where a mode has grown by `e_folds`: seven are 3 µm, what is left of a launch over a plate,
+    A trajectory is over where a mode has grown by `e_folds`: seven are 3 µm, what is left of a launch over a plate,
     to 3 mm.  Growth is added up along the drift of the body spin.
 
     Parameters

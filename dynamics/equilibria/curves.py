@@ -86,7 +86,7 @@ def newton_search(
     far: float = np.inf,
     watch: Watch = unwatched,
 ) -> tuple[Indices, Array]:
-    """Solutions that Newton's method finds from starts, in one problem or in several side by side, each once.
+    """Solutions that Newton's method finds from starts, in one problem or in several as a batch, each once.
 
     Parameters
     ----------

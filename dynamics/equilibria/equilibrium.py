@@ -28,7 +28,7 @@ MARGINAL = 0.004
 
 # The slower and the faster of each kind, in the rotor's frame.
 SIDE, TILT = ("side, backward", "side, forward"), ("precession", "nutation")
-# What a reader is told of modes whose names in data are older.
+# Names on the console of modes whose names in data are older.
 MODE_NAMES = {"bounce": "axial", SIDE[0]: "backward whirl", SIDE[1]: "forward whirl"}
 
 
@@ -127,7 +127,7 @@ class Mode:
     # bounce (along the axis), side (across it; forward or backward of the rotor), precession or nutation (slower and
     # faster turning of the moment)
     name: str
-    growth_per_s: float  # 1/s; negative where it dies out
+    growth_per_s: float  # 1/s; negative where it decays
     frequency_hz: float  # in the rotor's frame; 0 where it does not oscillate
 
 
@@ -191,7 +191,7 @@ class Equilibrium:
 
     @property
     def efolding_s(self) -> float | None:
-        """Time in which the least stable mode grows e-fold, s; None where none grows."""
+        """Time in which the least stable mode grows by a factor e, s; None where none grows."""
         return None if self.stable else 1 / self.growth_per_s
 
     @property

@@ -206,7 +206,7 @@ def with_plate(
 ) -> Survey:
     """The equilibria of a survey with the plate's currents: periodic motions, followed from those without.
 
-    Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate undoes or
+    Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate removes or
     pushes against a body, and those that overlap one, are left out.
 
     Parameters

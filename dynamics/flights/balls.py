@@ -1,7 +1,7 @@
-"""Balls about a floater's place in which the rotor's field is a short sum of harmonics: 3.5 times faster flights.
+"""Balls about a floater's place in which the rotor's field is a short sum of harmonics: 3.5 times faster trajectories.
 
 A table by finite elements is written with 1e7 characters of expressions, a ball of degree 7 with 2e5.  A ball is a set
-of runtime parameters, so that the code is compiled once, and depends on its cell of a lattice alone, so that a flight
+of runtime parameters, so that the code is compiled once, and depends on its cell of a lattice alone: a trajectory
 can be repeated.
 """
 
@@ -118,7 +118,7 @@ class Balls:
         """The ball of a coarse lattice in which a floater at a `place` (3,) m stays longest; None where that is short.
 
         Its velocity is `drift` (3,) as seen from the rotor, m in a unit of time, which turns it about `place` - `arm`;
-        `arm` is zero where it flies straight on.
+        `arm` is zero where it goes straight on.
         """
         speed = float(np.linalg.norm(drift))
         near = min(_room(self.scene, place, lost), FITTED * self._distance(place))

@@ -1,8 +1,8 @@
-"""Many trajectories at once, in the lanes of one core's vector registers.
+"""Many trajectories at once, as SIMD batches in one core's vector registers.
 
-Taylor steps of the lanes are taken together, but each lane has its own time and step, and no lane's numbers enter
-another's: a trajectory is the same to the last bit whichever fly beside it, in one worker or in many, where BLAS has
-one thread (the default).
+Taylor steps of a batch are taken together, but each trajectory has its own time and step, and no numbers of one enter
+another's: it is the same to the last bit whichever are in its batch, in one worker or in many, where BLAS has one
+thread (the default).
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from .balls import LARGE, SMALL
 from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight, IntegrationError, Recorder
 from .trajectory import DURATION, Trajectory
 
-LANES = 8  # Measured: a flight in eight lanes takes a quarter of the time of one alone, in four a half, in 16 a third
-TOGETHER = 200  # Steps between two looks for lanes whose flights have ended; a hundred are about 16 turns
-STEP_ERROR = 1e-9  # Of a launch, which is chaotic: single flights depend on the error of a step, but not their shares
+BATCH = 8  # Measured: a trajectory in a batch of 8 takes a quarter of the time of one alone, of 4 a half, of 16 a third
+TOGETHER = 200  # Steps between two looks for trajectories that have ended; a hundred are about 16 turns
+STEP_ERROR = 1e-9  # Of a launch, which is chaotic: a trajectory depends on the error of a step, but not the shares
 FLAT = 1e-9  # Sine of the angle to the horizontal that a plate may have
 
 
 class _Passenger(Course):
-    """A trajectory on a lane for balls of one kind."""
+    """A trajectory on a slot for balls of one kind."""
 
     over = False
     left = False  # Whether it was ever beyond the range of the plate's table
@@ -52,7 +52,7 @@ class _Passenger(Course):
         self.recorder.add(times, self.flight.balanced(self.values, times, states), self.over)
 
     def follow(self, meaning: str) -> bool:
-        """After what interrupted it, with time and state as they are then: whether it goes on on its lane."""
+        """After what interrupted it, with time and state as they are then: whether it goes on on its slot."""
         if meaning == DURATION:
             self.ended_by, self.over = DURATION, True
             if self.recorder:
@@ -71,7 +71,7 @@ class _Passenger(Course):
 
 
 class _Launch(_Passenger):
-    """A launch over a plate's currents; each leg of the plate's way is flown for itself."""
+    """A launch over a plate's currents; each leg of the plate's way is integrated for itself."""
 
     def __init__(self, course: Course, left: bool) -> None:
         super().__init__(**vars(course))
@@ -84,7 +84,7 @@ class _Launch(_Passenger):
         return self._end
 
     def follow(self, meaning: str) -> bool:
-        """Beyond the table it flies on; at the end of a leg the next one begins."""
+        """Beyond the table it goes on; at the end of a leg the next one begins."""
         if meaning == BEYOND:
             self.left = True
         elif meaning != DURATION or (leg := next(self._legs, None)) is None:
@@ -114,7 +114,7 @@ class Lanes:
         self._integrator = compiled(
             hy.taylor_adaptive_batch,
             system,
-            np.zeros((len(system), LANES)),
+            np.zeros((len(system), BATCH)),
             tol=tolerance,
             compact_mode=True,
             opt_level=1,
@@ -122,24 +122,24 @@ class Lanes:
         )
 
     def fly(self, passengers: Sequence[_Passenger]) -> None:
-        """Fly each until it does not go on here. Raises IntegrationError: a state became infinite."""
-        integrator, waiting, ends = self._integrator, iter(passengers), np.zeros(LANES)
+        """Integrate each until it does not go on here. Raises IntegrationError: a state became infinite."""
+        integrator, waiting, ends = self._integrator, iter(passengers), np.zeros(BATCH)
         integrator.set_time(ends)
-        for lane in range(LANES):  # one that stays empty must be finite too: the equations are not, where all is zero
-            self._put(lane, passengers[0])
-        flying = {lane: first for lane in range(LANES) if (first := self._next(lane, waiting, ends))}
-        while flying:
-            recorded = any(one.recorder for one in flying.values())
+        for slot in range(BATCH):  # one that stays empty must be finite too: the equations are not, where all is zero
+            self._put(slot, passengers[0])
+        active = {slot: first for slot in range(BATCH) if (first := self._next(slot, waiting, ends))}
+        while active:
+            recorded = any(one.recorder for one in active.values())
             found, _ = integrator.propagate_until(ends, max_steps=TOGETHER, c_output=recorded)
             if recorded:
-                self._record(flying, ends, found)
-            for lane, (outcome, _, _, steps) in enumerate(integrator.propagate_res):
-                if lane not in flying:
+                self._record(active, ends, found)
+            for slot, (outcome, _, _, steps) in enumerate(integrator.propagate_res):
+                if slot not in active:
                     continue
-                one = flying[lane]
+                one = active[slot]
                 one.steps += int(steps)
-                one.time, one.state = (float(integrator.time[lane]), 0.0), one.state.copy()
-                one.state[: self._count] = integrator.state[:, lane]
+                one.time, one.state = (float(integrator.time[slot]), 0.0), one.state.copy()
+                one.state[: self._count] = integrator.state[:, slot]
                 if outcome in (hy.taylor_outcome.success, hy.taylor_outcome.step_limit):
                     continue
                 if outcome == hy.taylor_outcome.err_nf_state:
@@ -150,46 +150,46 @@ class Lanes:
                 timed = outcome == hy.taylor_outcome.time_limit
                 meaning = DURATION if timed else self._meanings[-outcome.value - 1]
                 if one.follow(meaning):
-                    ends[lane] = one.end
-                    self._put(lane, one, meaning == LEFT)  # else what it has crossed must not count again
-                elif following := self._next(lane, waiting, ends):
-                    flying[lane] = following
+                    ends[slot] = one.end
+                    self._put(slot, one, meaning == LEFT)  # else what it has crossed must not count again
+                elif following := self._next(slot, waiting, ends):
+                    active[slot] = following
                 else:
-                    del flying[lane]
+                    del active[slot]
 
-    def _next(self, lane: int, waiting: Iterator[_Passenger], ends: Array) -> _Passenger | None:
-        """Put the next one on a lane; an empty lane stays where it is."""
+    def _next(self, slot: int, waiting: Iterator[_Passenger], ends: Array) -> _Passenger | None:
+        """Put the next one on a slot; an empty slot stays where it is."""
         following = next(waiting, None)
-        ends[lane] = following.end if following else self._integrator.time[lane]
+        ends[slot] = following.end if following else self._integrator.time[slot]
         if following is None:
             return None
         whole, rest = (part.copy() for part in self._integrator.dtime)
-        whole[lane], rest[lane] = following.time
+        whole[slot], rest[slot] = following.time
         self._integrator.set_dtime(whole, rest)
-        self._put(lane, following)
+        self._put(slot, following)
         return following
 
-    def _put(self, lane: int, one: _Passenger, anew: bool = True) -> None:
-        self._integrator.state[:, lane] = one.state[: self._count]
-        self._integrator.pars[:, lane] = one.values[: len(self._integrator.pars)]
+    def _put(self, slot: int, one: _Passenger, anew: bool = True) -> None:
+        self._integrator.state[:, slot] = one.state[: self._count]
+        self._integrator.pars[:, slot] = one.values[: len(self._integrator.pars)]
         if anew:
-            self._integrator.reset_cooldowns(lane)
+            self._integrator.reset_cooldowns(slot)
 
-    def _record(self, flying: Mapping[int, _Passenger], ends: Array, found: Any) -> None:
+    def _record(self, active: Mapping[int, _Passenger], ends: Array, found: Any) -> None:
         now, due = self._integrator.time, dict[int, Array]()
-        for lane, one in flying.items():
+        for slot, one in active.items():
             if one.recorder:
-                due[lane] = one.recorder.due(one.time[0], float(now[lane]), float(ends[lane]))
+                due[slot] = one.recorder.due(one.time[0], float(now[slot]), float(ends[slot]))
         most = max(len(times) for times in due.values())
         if not most:
             return
         grid = np.tile(now, (most, 1))
-        for lane, times in due.items():
-            grid[: len(times), lane] = times
+        for slot, times in due.items():
+            grid[: len(times), slot] = times
         states = found(grid)
-        for lane, times in due.items():
+        for slot, times in due.items():
             if len(times):
-                flying[lane].record(times, states[: len(times), :, lane])
+                active[slot].record(times, states[: len(times), :, slot])
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +225,7 @@ def ensemble(
     mapped: Callable[[Callable[[State], Endings], Iterable[State]], Iterable[Any]] = map,
     together: int = 512,
 ) -> Endings:
-    """Fly a scene's floater from many starts for `duration` (s) each, or until contact or loss.
+    """Simulate a scene's floater from many starts for `duration` (s) each, or until contact or loss.
 
     Raises InputError: `duration` is not positive, there is
     no start, or the floater is no sphere; IntegrationError: a state became infinite.
@@ -235,9 +235,9 @@ def ensemble(
     scene, table : the problem
     starts : states (n, 3) at t = 0, SI units; the moments are made unit vectors
     mapped : as the built-in `map`; `concurrent.futures.ProcessPoolExecutor(2).map` uses two cores
-    together : flights that a worker gets at once
+    together : trajectories that a worker gets at once
 
-    Accuracy: that of a flight in balls, whose field errs by 1e-6 of its gradient.
+    Accuracy: that of a trajectory in balls, whose field errs by 1e-6 of its gradient.
     """
     _check(scene, starts, duration)
     pieces = [slice(first, first + together) for first in range(0, len(starts.position), together)]
@@ -246,7 +246,7 @@ def ensemble(
 
 
 def _check(scene: Scene, starts: State, duration: float) -> None:
-    scene.floater.must_be("sphere", where="where many fly side by side", instead="Fly them one by one.")
+    scene.floater.must_be("sphere", where="where many are simulated as one batch", instead="Simulate them one by one.")
     if not duration > 0:
         raise InputError(f"Input duration must be positive; instead received {duration} s.")
     if not len(starts.position):
@@ -308,7 +308,7 @@ def _begun(flight: Flight, start: State, duration: float, recorded: bool) -> _Pa
 
 
 def _fly(courses: Sequence[_Passenger]) -> None:
-    """In lanes, in small balls first, then in large ones; at last one by one near bodies, and where it is too fast."""
+    """In slots, in small balls first, then in large ones; at last one by one near bodies, and where it is too fast."""
     for formula in (SMALL, LARGE):
         here = [f for f in courses if not f.over and f.flight.degree(f.values) == formula.degree]
         if here:
@@ -328,10 +328,10 @@ def launched(
     step_error: float = STEP_ERROR,
     currents: Array | None = None,
 ) -> Endings:
-    """Fly a scene's floater over its plate from many starts, for `duration` (s) each, or until contact or loss.
+    """Simulate a scene's floater over its plate from many starts, for `duration` (s) each, or until contact or loss.
 
-    Contact with the rotor is that of `flight_events`; where a step misses an edge, contact is told at the latest where
-    the sphere meets the largest one inside the magnet.  The plate is an obstacle without edges.  The field is the
+    Contact with the rotor is that of `flight_events`; where a step misses an edge, contact is noticed at the latest
+    where the sphere meets the largest one inside the magnet.  The plate is an obstacle without edges.  The field is the
     table's own expressions, so that a short one (dipoles, closed forms) is fast. Raises InputError: `duration` is not
     positive, there is no start, the plate does not lie flat, or the floater is no sphere.
 
@@ -342,10 +342,10 @@ def launched(
     memory : the plate's currents
     starts : states (n, 3) at t = 0, SI units
     step_error : relative, of a Taylor step
-    currents : (n, k) the plate's states then, √J; if not given, those under a floater long held at rest
+    currents : (n, k) the plate's states then, √J; if not given, those under a floater long at rest
 
     Accuracy: that of the tables; beyond the range of the plate's the currents' field is continued as it is, and
-    `Endings.left_plate_table` says which flights went there.
+    `Endings.left_plate_table` says which trajectories went there.
     """
     _check(scene, starts, duration)
     flight, count = Flight(scene, table, duration, memory=memory, in_balls=False), len(starts.position)

@@ -124,7 +124,7 @@ class Flight:
     def part(self, degree: int) -> Part:
         """The compiled motion in balls of a degree, or, 0, in the table's own field."""
         if degree not in self.parts:
-            # in small balls most of a long flight is spent: straight code is for them, or where there are none
+            # in small balls most of a long trajectory is spent: straight code is for them, or where there are none
             began = perf_counter()
             equations, events = self.equations(degree)
             falling = hy.event_direction.negative
@@ -403,7 +403,7 @@ def integrate(
     currents: Array | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> Trajectory:
-    """Fly from `start` (rotor's frame, t = 0) until `duration` (s), contact or loss.
+    """Integrate from `start` (rotor's frame, t = 0) until `duration` (s), contact or loss.
 
     Raises FlightStopped: by a keyboard interrupt; it has what is finished, and so has the checkpoint; IntegrationError:
     the state became infinite.
@@ -455,8 +455,8 @@ def simulate(
 ) -> Trajectory:
     """Simulate the trajectory of a scene's floater for `duration` (s), or until contact or loss.
 
-    Raises EquilibriumError: the flight shall begin near a stable equilibrium and there is none; StartError: it would
-    begin in contact, or `duration` is not positive; FlightStopped: by a keyboard interrupt; it has what is finished.
+    Raises EquilibriumError: the trajectory is to begin near a stable equilibrium and there is none; StartError: it
+    begins in contact, or `duration` is not positive; FlightStopped: by a keyboard interrupt; it has what is finished.
 
     Parameters
     ----------
@@ -464,7 +464,7 @@ def simulate(
     tolerance, compact : see `Flight`
     progress : called with the finished part, 0 to 1, a few times a second
     memory : the plate's currents; left out, the plate is only an obstacle
-    checkpoint : where the flight is kept while it lasts; it goes on from there if there is something
+    checkpoint : where the trajectory is kept while it lasts; it goes on from there if there is something
     """
     if not duration > 0:
         raise StartError(f"Input duration must be positive; instead received {duration} s.")
@@ -475,11 +475,11 @@ def simulate(
     return integrate(flight, start, duration, progress, currents, checkpoint)
 
 
-SLOWLY = 1 / 3  # Growth (1/s) with which a flight may still begin: an e-fold in the shortest flight that counts, 3 s
+SLOWLY = 1 / 3  # Growth rate (1/s) with which a trajectory may still begin: by e in the shortest one that counts, 3 s
 
 
 class StartError(InputError):
-    """The flight cannot begin where it was asked to."""
+    """The trajectory cannot begin where the scene says."""
 
 
 def initial_state(
@@ -528,7 +528,7 @@ def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, mome
 
 
 def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """The nearest stable equilibrium, or else the nearest that only the plate, or only slowly something, undoes.
+    """The nearest stable equilibrium, or else the nearest that only the plate destabilises, or something else slowly.
 
     The floater's own eddy currents do so slowly, in minutes.
     """
@@ -539,9 +539,9 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 
 
 def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """Where a flight begins, or, where none may, the equilibrium whose modes grow least; None without any.
+    """Where a trajectory begins, or, where none may, the equilibrium whose modes grow least; None without any.
 
-    A brake undoes those near the rotor the most.
+    A brake destabilises those near the rotor the most.
     """
     return starting_point(equilibria) or min(equilibria, key=lambda e: e.growth_per_s, default=None)
 

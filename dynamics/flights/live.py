@@ -1,4 +1,4 @@
-"""A flight that goes on piece by piece, and whose floater can be pushed and put elsewhere on the way."""
+"""A trajectory that goes on piece by piece, and whose floater can be pushed and put elsewhere on the way."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,17 +19,17 @@ FEWEST, MOST, A_SECOND = 8, 256, 400  # Samples of a piece at least and at most,
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Samples of a piece of a flight."""
+    """Samples of a piece of a trajectory."""
 
     time: Array  # (n,) s
     lab: State  # motion (n, 3) along the laboratory's axes, SI units
     angle: float  # of the rotor at the last sample, rad
-    # "duration" where the flight can go on, else "contact", "lost", or "beyond" the range of the plate's table
+    # "duration" where the trajectory can go on, else "contact", "lost", or "beyond" the range of the plate's table
     ended_by: str
 
 
 class LiveFlight:
-    """A flight of a scene's floater, with the plate's currents if they are modelled.
+    """A trajectory of a scene's floater, with the plate's currents if they are modelled.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class LiveFlight:
         return self._course.flight.scales.unpack(self.state).to_lab(self.scene.angular_velocity * self.time)
 
     def onward(self, seconds: float) -> Piece:
-        """Fly on so long (s), or to contact or loss, after which there is nothing to fly.
+        """Integrate on so long (s), or to contact or loss, after which nothing is left to integrate.
 
         Raises InputError: `seconds` is not positive; IntegrationError: the state became infinite.
         """
@@ -97,7 +97,7 @@ class LiveFlight:
         self._become(replace(self.now, velocity=self.now.velocity + velocity))
 
     def put(self, position: Array) -> None:
-        """Hold the floater at a position (3,) m, rotor's frame, at rest there, and let go; moment and spin stay.
+        """Put the floater at a position (3,) m, rotor's frame, at rest there, and release it; moment and spin stay.
 
         Raises StartError: it would overlap a magnet or the plate, or the field of the plate's currents is not known
         there; nothing is changed.

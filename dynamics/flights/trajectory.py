@@ -1,4 +1,4 @@
-"""Samples of a flight, how it ended, what kind of flight it was, and the file in which it is kept while it lasts."""
+"""Samples of a trajectory, how it ended, of what kind it was, and the file in which it is kept while it lasts."""
 
 import hashlib
 import io
@@ -20,7 +20,7 @@ DURATION, STOPPED = "duration", "stopped"
 
 @dataclass(frozen=True)
 class FieldChanges:
-    """What changes of the field's representation did in a flight through balls."""
+    """What changes of the field's representation did in a trajectory through balls."""
 
     count: int = 0  # of the changes
     # Their sum U_new - U_old, each at the place of the change; relative, as the error of the energy balance
@@ -31,7 +31,7 @@ class FieldChanges:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Samples of a flight and how it ended."""
+    """Samples of a trajectory and how it ended."""
 
     time: Array  #: (n,) s, at equal intervals but for the last
     lab: State  #: motion (n, 3) along the laboratory's axes, SI units
@@ -76,7 +76,7 @@ class Trajectory:
 
 
 class FlightStopped(KeyboardInterrupt):
-    """The user stopped a flight; `flown` is what is finished of it. Who does not catch it is stopped as well."""
+    """The user stopped a trajectory; `flown` is what is finished of it. Who does not catch it is stopped as well."""
 
     def __init__(self, flown: Trajectory) -> None:
         self.flown = flown
@@ -85,10 +85,10 @@ class FlightStopped(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """The file in which a flight is kept while it lasts."""
+    """The file in which a trajectory is kept while it lasts."""
 
     path: Path  #: where it is
-    identity: str  #: everything that the flight depends on, as text; another flight's checkpoint is refused
+    identity: str  #: everything that the trajectory depends on, as text; another trajectory's checkpoint is refused
     every: float = 5.0  #: seconds between two writings
 
     @property
@@ -104,7 +104,7 @@ class Checkpoint:
     def read(self) -> dict[str, Any] | None:
         """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
 
-        Raises InputError: the file is damaged, or belongs to another flight.
+        Raises InputError: the file is damaged, or belongs to another trajectory.
         """
         if not os.path.lexists(self.path):
             return None
@@ -129,20 +129,20 @@ class Checkpoint:
 STABLE, LINEAR_FALL, OSCILLATING_LOSS = "stable", "linear fall", "oscillating loss"
 DRIFTING, GROWING, NOT_HELD = "drifting", "growing oscillation", "not held"
 NOT_FOLLOWED = "not followed"  # To its end: it left the range of the plate's table
-# Parts into which a flight is divided; the last one, in which the floater may already fall freely, is left out.
+# Parts into which a trajectory is divided; the last one, in which the floater may already fall freely, is left out.
 WINDOWS = 20
 FEWEST = 4  # Samples in a part: a trend takes three
-VISIBLE = 2e-5  # Smallest drift or oscillation that counts while the floater is still up, m
-# A loss before this time, s, is no flight: the floater had no time for a few bounces; nor is a trend seen in less.
+VISIBLE = 2e-5  # Smallest drift or oscillation that counts while the floater still levitates, m
+# A loss before this time, s, is no levitation: too short for a few axial oscillations; nor is a trend seen in less.
 HELD = 0.5
 
 
 def flight_kind(flight: Trajectory) -> str:
-    """How a flight went.
+    """How a trajectory went.
 
     By the mean distance, and from the size of the oscillation in the rotor's frame about its trend, in twenty
-    parts of the flight.  Lost or in contact: "not held" from the beginning; an "oscillating loss" if the oscillation
-    grew more than the mean distance changed, in the whole flight or in its last part; else a "linear fall".  Still up
+    parts of the time.  Lost or in contact: "not held" from the beginning; an "oscillating loss" if the oscillation
+    grew more than the mean distance changed, in all of the time or in its last part; else a "linear fall".  Levitating
     at the end: "growing oscillation" if it became more than twice as large, or "drifting" if the distance goes on
     changing steadily in the second half, both by 0.02 mm at least; else "stable".
     """

@@ -88,7 +88,7 @@ class Placeable(Effect, Protocol):
 
 @runtime_checkable
 class Fittable(Placeable, Protocol):
-    """One that flights have in balls."""
+    """One that has a form of its own in balls."""
 
     def in_ball(self, ball: BallField, first: int) -> Fittable:
         """The same with numbers from the runtime parameter `first` on, in a ball that other parameters tell."""

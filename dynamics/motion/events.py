@@ -1,4 +1,4 @@
-"""What ends a flight: contact with a magnet or the plate, and loss.
+"""What ends a trajectory: contact with a magnet or the plate, and loss.
 
 The distance of the floater's centre from a box is exact, faces, edges and corners.  A Taylor step knows only the part
 of the box that was nearest when it began; a contact that this may miss is found by `clearance` at the samples.

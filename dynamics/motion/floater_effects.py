@@ -376,7 +376,7 @@ def _contracted(a: Matrix, b: Matrix) -> hy.expression:
     return hy.sum([a[i][j] * b[i][j] for i in range(3) for j in range(3)])
 
 
-# The effects that a scene alone decides: `of(scene)` is one, or None where the scene is without it. Searches, flights,
+# The effects that a scene alone decides: `of(scene)` is one, or None where the scene is without it. Searches, motion,
 # lists of effects and the keys of shared equations take from here what there is. Scenes that differ in frequency alone
 # share their equations: what depends on it an effect takes from the runtime parameters.
 OF_SCENE = FloaterCurrents, RealAir

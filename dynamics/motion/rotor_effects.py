@@ -8,7 +8,7 @@ what polynomials of degree 3 alone do.
 Mutual magnetisation has one energy.  With M = m + α B0 the floater's whole moment, the magnetisation that it induces in
 the rotor and what the floater's own currents of magnetisation do have the energy u(x) + V(x)·M + ½ M·H(x)·M.  About one
 pose (searches, modes) the table's values and first and second derivatives are all that counts: u, V and H are
-polynomials of degree 2, 1 and 0, and M is counted from the pose's.  In a ball (flights) they are q⁻³ times polynomials.
+polynomials of degree 2, 1 and 0, and M is counted from the pose's.  In balls they are q⁻³ times polynomials.
 
 The currents are in metal that turns with the rotor.  A rate u_k = d/dt m·c_k is linear in eight numbers, the five of
 the traceless symmetric part of m ⊗ (drift) and the three of the rate of m, by the five of ∇c_k and the three of c_k. So

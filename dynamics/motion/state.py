@@ -78,7 +78,7 @@ WEIGHTLESS = 1e-9  # Gravity, m/s², that sets no unit of time
 class State:
     """Motion of the floater at one instant (3,) or at many (n, 3), in SI units.
 
-    Velocity and spin are those seen from the laboratory; only their components are taken along the axes of the
+    Velocity and spin are those seen from the laboratory; only their components are along the axes of the
     laboratory or of the frame that turns with the rotor.
     """
 

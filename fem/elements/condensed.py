@@ -1,4 +1,4 @@
-"""Solutions of condensed finite-element systems, their memory known before they are begun, and open boundaries.
+"""Solutions of condensed finite-element systems, with their memory estimated beforehand, and open boundaries.
 
 Element matrices with what static condensation keeps of them take Σ N² numbers, N the unknowns of an element.  The
 factor of nested dissection is mostly that of its last separators, planes across the mesh: with s unknowns on such a

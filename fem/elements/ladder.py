@@ -367,7 +367,7 @@ def refined(
     solve : solution at an order
     points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
     settings : of the mesh, as given to `refinement_of`
-    watch : hears of the progress, as far as the rate of convergence foretells it
+    watch : called with the progress, as far as the rate of convergence foretells it
 
     Returns
     -------

@@ -185,7 +185,7 @@ def _real_values(degree: int) -> Array:
 
 @dataclass(frozen=True)
 class LocalField:
-    """The field about a place, both told by runtime parameters: B and its first three derivatives are right there."""
+    """The field about a place, both given by runtime parameters: B and its first three derivatives are right there."""
 
     first: int  # number of the first of these parameters: the place (m), then `entries` of the derivatives
 

@@ -278,7 +278,7 @@ class _Source:
 
 
 def read_field_map(path: str | Path, reading: MapReading | None = None) -> FieldMap:
-    """Read a map of B, told apart by the name of the file and by what it begins with.
+    """Read a map of B, its format recognised by the name of the file and by what it begins with.
 
     - netCDF: variables Bx, By, Bz (and Bx_err ...), or B (and B_err) with one more dimension of three components, over
       coordinates x, y, z, each with its `units`; grids and lists of points alike.

@@ -64,7 +64,7 @@ def mutual_errors(
     ----------
     table, floater : that are compared with both bodies
     coarse, rotor : finite elements of two degrees, which tell the table's error and their own
-    watch : hears of the progress
+    watch : called with the progress
     """
     generator = np.random.default_rng(4)
     errors = []
@@ -130,7 +130,7 @@ def mutual_table(
     magnets : of the rotor
     floater : whose radius, remanence and recoil permeability count
     order : of the finite elements; errors are estimated with the next
-    watch : hears of the progress
+    watch : called with the progress
 
     Raises
     ------
@@ -260,7 +260,7 @@ def cached_mutual_table(
     Parameters
     ----------
     magnets, floater, watch : see `mutual_table`
-    report : hears of a damaged cache
+    report : called with a message where the cache is damaged
     """
     upright = alike(magnets)
     table, found = MUTUAL.cached(_inputs(upright, floater), lambda: mutual_table(upright, floater, watch=watch), report)

@@ -79,7 +79,7 @@ def response_products(rotor: RotorResponse, fine: RotorResponse, places: Array, 
     ----------
     rotor, fine : with elements of a degree, whose points tell which fields are alike, and of one more
     places : no nearer to the magnets than the floater's centre can be
-    watch : hears of the progress
+    watch : called with the progress
 
     Returns
     -------
@@ -126,7 +126,7 @@ def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch:
     ----------
     rotor, floater : each alone
     places : (n, 3) m of the floater's centre
-    watch : hears of the progress
+    watch : called with the progress
 
     Returns
     -------
@@ -170,7 +170,7 @@ def returned_samples(
     rotor, floater : each alone
     grids, inner, coupling : points (n, 3) m and weights that respond for the rotor, see `MutualTable`
     places : (n, 3) m of the floater's centre
-    watch : hears of the progress
+    watch : called with the progress
 
     Returns
     -------

@@ -114,7 +114,7 @@ def point_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any]
     answer = (0.5 * UNIT**2) * (inverse * inverse * inverse * square)
     ratio, axial = radius * radius * inverse, hy.sum([j * x for j, x in zip(axis, d, strict=True)])
     pointing = hy.sum([j * m for j, m in zip(axis, moment, strict=True)])
-    # Horner's scheme in (R/d)²: every operation of a flight's equations costs
+    # Horner's scheme in (R/d)²: every operation of a trajectory's equations costs
     flat = v4 + ratio * (v5 + s5 * pointing + ratio * (v6 + s6 * pointing))
     steep = w4 * axial + ratio * (w5 * axial + t5 * along + ratio * (w6 * axial + t6 * along))
     return -answer - ratio * ratio * ratio * ratio * (flat + inverse * axial * steep)

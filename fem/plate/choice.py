@@ -51,7 +51,7 @@ class PlateChoice(NamedTuple):
 def resolve_plate_model(
     scene: Scene, model: str, place: Array | None, rtol: float, report: Callable[[str], None] = lambda text: None
 ) -> PlateChoice:
-    """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` is told what is worked out.
+    """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` is called with what is worked out.
 
     `auto` (to `rtol`) is none where a perfect conductor's image would not matter, an infinite slab where a bound or
     else a coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite
@@ -220,7 +220,7 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
     return found
 
 
-@lru_cache(1)  # a flight and what is said of it ask for the same
+@lru_cache(1)  # a trajectory and what is said of it ask for the same
 def rotor_nearby(
     table: RotorTable, rotor: tuple[Magnet, ...], place: tuple[float, ...], radius: float, rtol: float
 ) -> RotorTable:

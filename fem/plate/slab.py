@@ -284,7 +284,7 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
 
 
 def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Callable[[str], None]) -> float:
-    """`measured_edge_error` of `plate`, places and frequency rounded to 0.1 mm and 1 Hz; cached, told to `report`."""
+    """`measured_edge_error` of `plate`, places and frequency rounded to 0.1 mm and 1 Hz; cached, `report` gets it."""
     places, frequency = np.round(places, 4), float(round(frequency))
     inputs = plate.body.shape_numbers, plate.conductivity, frequency, plate.box.to_body(places)
     return EDGE_ERROR.cached(inputs, lambda: measured_edge_error(plate, places, frequency), report)[0]

@@ -100,7 +100,7 @@ def rotor_table(
         surfaces or by finite elements), or "auto", see `resolve_model`
     rtol, nearest : relative accuracy of B asked of "moments", "surface" and "fem", and the distance from the magnets'
         faces from which on it holds, m (None: 0.8 of the largest magnet's edge, if it were a cube)
-    watch : hears of the progress of "surface" and "fem"
+    watch : called with the progress of "surface" and "fem"
 
     "dipole", "moments" and "cuboid" have the moment J V/μ0 of the remanence alone, as the article does; a cube with
     μr = 1.05 has 0.984 of it, so that their field is 1.6 % too strong by convention ("fem" has the true one, and the
@@ -152,7 +152,7 @@ def cached_rotor_table(
     Parameters
     ----------
     rotor, model, rtol, nearest, watch : as of `rotor_table`
-    report : hears of a damaged cache
+    report : called with a message where the cache is damaged
     """
     lone = alike(rotor)
     make = partial(rotor_table, lone, model, rtol, nearest, watch)

@@ -78,7 +78,7 @@ def floater_sources(
     Parameters
     ----------
     floater : a sphere is one dipole
-    report : hears of a damaged cache
+    report : called with a message where the cache is damaged
     degree : of the polynomials over the body that are integrated exactly
     """
     magnet = floater.magnet(np.zeros(3), np.array([0.0, 0.0, 1.0]))

@@ -217,7 +217,7 @@ def fem_table(
     magnets : of the rotor, m and T in its frame
     accuracy : asked for; by default 3e-6 from 0.8 edges on
     settings : of the mesh
-    watch : hears of the progress
+    watch : called with the progress
     """
     accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
     clearance = accuracy.clearance(magnets)
@@ -323,7 +323,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     ----------
     magnets : compact cuboids, cylinders, rings and spheres, m and T in the rotor's frame
     accuracy : asked for
-    watch : hears of the progress
+    watch : called with the progress
 
     Raises
     ------

@@ -18,7 +18,7 @@ from ..harmonics.expansion import MultipoleExpansion, summed_derivatives, withou
 from ..harmonics.expressions import FieldExpressions
 from ..harmonics.solid import rotated_harmonics, tensors
 
-DEEP = 0.1  # of the radius of a doubt's sources: its terms are told no nearer to its centre
+DEEP = 0.1  # of the radius of a doubt's sources: its terms are evaluated no nearer to its centre
 BLUR = 0.5  # share of the root mean square of a doubt that is added to its field
 ROUND_OFF = 1e-13  # of a field and its gradient, relative
 KNOWN = "truncation"  # what is cut off an expansion is known exactly
@@ -282,7 +282,7 @@ def _off_center(doubt: MultipoleExpansion, points: Array) -> Array:
     return np.asarray(doubt.center + offset)
 
 
-FARTHER = 20e-3  # distance from the rotor's origin, down its axis, at which a table's error is told, m
+FARTHER = 20e-3  # distance from the rotor's origin, down its axis, at which a table's error is stated, m
 
 
 def error_below(table: FieldTable) -> list[str]:

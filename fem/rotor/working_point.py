@@ -2,7 +2,7 @@
 
     h = μ0 H · e,        e the easy axis, along the polarisation;        the knee: h = -μ0 × coercivity.
 
-Where h is below the knee a magnet loses polarisation; that is told here, not followed (no hysteresis).  On an edge
+Where h is below the knee a magnet loses polarisation; that is reported here, not followed (no hysteresis).  On an edge
 the field can be infinite, so that h has no lowest value in a whole magnet.  What converges is the lowest value at
 places that keep a stated distance from all edges, and the share of the volume that is below the knee.
 """

@@ -33,7 +33,7 @@ OTHERWISE = (1.0, 0.5, 0.0)
 FEW, SMALL = 8, 1.5
 LONGEST = 60.0  # Seconds of processor time for a mesh of a part
 SAME = 1e-7  # Distance of corners of facets that are one, in sizes of the solid
-WITHIN = 1e-9  # Relative difference of volumes by which a cavity that lies within a body is told from one that does not
+WITHIN = 1e-9  # Relative difference of volumes above which a cavity does not lie within the body
 # The time, and a count of the files that the process has written: the rest is the same for the same solid.
 OWN_WORDS = re.compile(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'|(?<=translator )[\d. ]+(?=')")
 SIMPLER = "Leave out small features of the part, or export it again."

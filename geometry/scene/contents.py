@@ -231,7 +231,7 @@ class Scene:
     text : the scene file as it was read, for the record
     conductors : metal beside the magnets that turns with the rotor
     files : path of each file that it names, with the SHA-256 of its content when the scene was read
-    parts : the solids of the STEP files that its keys name, at home, also those that are computed as another shape
+    parts : the solids of the STEP files that its keys name, in canonical pose, also of those computed as another shape
     keys : the tables of a scene file that it was made of, and the scene that they made: what of that was not replaced
         since is as they say. None of a scene that was put together from its parts
     """

@@ -257,7 +257,7 @@ def scene_text(scene: Scene) -> str:
 
 
 def startless_text(scene: Scene) -> str:
-    """The scene file of a scene as if it did not say where a flight begins: the same for all flights of one scene."""
+    """The scene file of a scene as if it did not say where a trajectory begins: the same for all of one scene."""
     return scene_text(replace(scene, start=OffsetStart()))
 
 

@@ -17,7 +17,7 @@ LONGEST = 60  # Characters of a key in a message
 LONGEST_SOURCE = 300  # Characters of a file's name in a message
 # Beyond these a scene is unusual: remanence, T, and sizes of magnets and floater, m
 STRONGEST, SIZES = 2.0, (1e-4, 1.0)
-MOST = 20  # Faults of a scene that are told; the rest are counted
+MOST = 20  # Faults of a scene that are listed; the rest are counted
 # The kinds of error of pydantic.
 RULES = {
     "greater_than": "greater than {gt:g}",

@@ -29,8 +29,8 @@ WEIGHT = FLOATER.mass * 9.81  # Of the floater, N
 PLATE_SIZE, PLATE_CONDUCTIVITY = (0.1, 0.24, 0.03), 3.5e7  # Of the aluminium plate: edges, m; S/m
 CONTACT = EDGE / 2 + FLOATER.radius  # Distance on the axis at which floater and a cube that is not tilted touch, m
 LOWEST, HIGHEST = 40.0, 250.0
-"""Frequencies that are looked at, Hz: the article flew from below 50 Hz to what its motor gave."""
-FLIGHT = 250.0  # The longest flight of the experiment, s
+"""Frequencies that are looked at, Hz: the article's floaters levitated from below 50 Hz to what its motor gave."""
+FLIGHT = 250.0  # The longest trajectory of the experiment, s
 RTOL = 1e-4
 """Relative accuracy of B asked of the finite elements, from contact on: it moves the equilibria by less than 1 µm."""
 MODELS = ("dipole", "fem")
@@ -86,7 +86,7 @@ def levitated_rotors(quick: bool) -> list[Point]:
 
 
 def stable_in_flight(growth: ArrayLike) -> NDArray[np.bool_]:
-    """Where no disturbance grows e-fold within `FLIGHT`; False where there is no equilibrium (NaN)."""
+    """Where no disturbance grows by a factor e within `FLIGHT`; False where there is no equilibrium (NaN)."""
     return np.asarray(np.asarray(growth) <= 1 / FLIGHT)
 
 

@@ -304,9 +304,9 @@ FORCE_CURVE = Study(
 
 # The circle on which the floater goes with the rotor: its radius in the finite magnets' field, simulated, by formula.
 KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
-"""Speed upwards with which the flight begins, m/s; its duration, s; samples of its last turns that are kept."""
+"""Speed upwards with which the trajectory begins, m/s; its duration, s; samples of its last turns that are kept."""
 FLOWN_HZ, TURNS = 170.0, 3
-"""Of the flight of `ROTOR` in the article's figure: Hz, and how many of its last turns are shown."""
+"""Of the trajectory of `ROTOR` in the article's figure: Hz, and how many of its last turns are shown."""
 TYPICAL = (0.1, 0.3)  # Radii that the article calls typical, mm
 SIDE_COLUMNS: Columns = {
     "radius": (("frequency",), "m", "radius of the floater's circle"),
@@ -331,7 +331,7 @@ def side_points(quick: bool) -> list[Point]:
 
 
 def side_mode(point: Point) -> xr.Dataset:
-    """Radius of the circle of one rotor's floater at all frequencies, and for δx = 1 mm a flight at `FLOWN_HZ`."""
+    """Radius of the circle of one rotor's floater at all frequencies, and for δx = 1 mm a trajectory at `FLOWN_HZ`."""
     grid = np.arange(article.LOWEST, article.HIGHEST + 1e-9, point["step_hz"])
     scene = article.rotor_scene(point["configuration"], point["value"], article.HIGHEST)
     levitation = article.levitation_of(scene, point["model"])
@@ -354,13 +354,13 @@ def side_mode(point: Point) -> xr.Dataset:
 
 
 def _predicted(simulated: xr.Dataset) -> float:
-    """The article's radius at the mean distance of the flight, mm."""
+    """The article's radius at the mean distance of the trajectory, mm."""
     return 1e3 * float(side_radius(-float(simulated["flight_z"].mean()), FLOWN_HZ))
 
 
 @styled
 def orbit_figure(result: xr.Dataset) -> Figure:
-    """The orbit of rotor and floater seen from above, and their coordinates, in one flight."""
+    """The orbit of rotor and floater seen from above, and their coordinates, in one trajectory."""
     figure, ((above, *others),) = panels(1, 3, 2.9)
     simulated = case_with(result, model="fem", **ROTOR)
     circle, radius = np.linspace(0, 2 * np.pi, 200), _predicted(simulated)

@@ -1,4 +1,4 @@
-"""The article's figures of levitation distances and of flights."""
+"""The article's figures of levitation distances and of trajectories."""
 
 from dataclasses import replace
 from typing import Any
@@ -32,9 +32,9 @@ from .showing import by_configuration, by_rotor, drawn, explain, rotor_panels, s
 # their metal do not move an equilibrium, and are left out.
 SIDES = ("near", "far")
 FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
-FLOWN = "dipole"  # The field of the simulated flights, which are spread over a rotor's stable frequencies
+FLOWN = "dipole"  # The field of the simulated trajectories, which are spread over a rotor's stable frequencies
 DISTANCE_KICK, SECONDS = 0.01, 1.0
-"""Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the flight."""
+"""Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the trajectory."""
 BOTH: tuple[str, ...] = ("frequency", "side")
 DISTANCE_COLUMNS: Columns = {
     "distance": (BOTH, "m", "levitation distance"),
@@ -99,14 +99,14 @@ def _in_field(point: Point, grid: Array) -> dict[str, Any]:
 
 
 def mean_height(scene: Scene, field: FieldTable, point: BranchPoint) -> tuple[float, float]:
-    """Mean distance along the axis (m) of a flight that a kick began, and by how much its halves differ.
+    """Mean distance along the axis (m) of a trajectory that a kick began, and by how much its halves differ.
 
     Parameters
     ----------
     scene, field : of which the frequency is that of `point`
     point : the equilibrium in which it begins
 
-    Means are weighted by sin², which takes out the axial mode; NaN where the flight did not last.
+    Means are weighted by sin², which takes out the axial mode; NaN where the trajectory did not last.
     """
     flight = simulate(kicked(scene, point, DISTANCE_KICK), field, SECONDS, [])
     if flight.ended_by != "duration":
@@ -144,7 +144,7 @@ def models_figure(result: xr.Dataset) -> Figure:
 
 @drawn
 def formulas_figure(result: xr.Dataset) -> Figure:
-    """The article's formulas and simulated flights beside the dipole's equilibrium, for the rotors that levitated."""
+    """The article's formulas and simulated trajectories beside the dipole's equilibrium, for rotors that levitated."""
     levitated = [k for k, one in enumerate(each_case(result)) if _levitated(one.expand_dims("case"))]
     figure, rotors = rotor_panels(result.isel(case=levitated), 3.4, *AXES)
     for axes, rotor, color in rotors:
@@ -215,21 +215,21 @@ LEVITATION_DISTANCE = Study(
 )
 
 
-# Linear fall, stable and unstable flight: levitation distance against time, the article's last supplementary figure.
+# Linear fall, stable and unstable trajectory: distance against time, the article's last supplementary figure.
 #
-# Its experiment had δx = 1 mm and fell at 115 Hz, stayed at 140 Hz and was lost in oscillations at 150 Hz.  Each flight
-# is simulated in full, from equilibrium with spin s = 0, and compared with the averaged flight along the branch of
-# equilibria.  In the motion are real air, eddy currents in floater and rotor, and mutual magnetisation; in that of
+# Its experiment had δx = 1 mm and fell at 115 Hz, stayed at 140 Hz and was lost in oscillations at 150 Hz.  Each
+# trajectory is simulated in full, from equilibrium with spin s = 0, and compared with the averaged one along the branch
+# of equilibria.  In the motion are real air, eddy currents in floater and rotor, and mutual magnetisation; in that of
 # `quick` Stokes drag and the floater's currents alone.
 FREQUENCIES = np.array([115.0, 140.0, 150.0, 160.0, 170.0, 200.0])
 DISPLACEMENTS = (1.0, 1.5, 2.0)
 """δx in mm: as in the experiment, what gives its fall at 115 Hz, and what is lost in oscillations within these."""
-KICK = 1e-3  # Speed with which a flight begins upwards, m/s
+KICK = 1e-3  # Speed with which a trajectory begins upwards, m/s
 PARTS, SAMPLES = 400, 100
-SHORTEST = 3.0  # What stays up for less, the article does not call levitation, s
+SHORTEST = 3.0  # What lasts for less, the article does not call levitation, s
 REPORTED = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
-"""The article's three flights, by frequency in Hz."""
-NONE, SHORT = "no equilibrium", "lost within 3 s"  # Of a flight that is none
+"""The article's three trajectories, by frequency in Hz."""
+NONE, SHORT = "no equilibrium", "lost within 3 s"  # Of a trajectory that is none
 FLIGHT_COLUMNS: Columns = {
     "levitated": (("frequency",), "s", "time until the loss in the simulated flight, or its duration"),
     "averaged_levitated": (("frequency",), "s", "the same in the averaged flight; infinite for a balance"),
@@ -247,13 +247,13 @@ FLIGHT_COLUMNS: Columns = {
 
 
 def flight_points(quick: bool) -> list[Point]:
-    """The displacements, flown for 60 s in the field of finite elements, `quick` in the dipole's."""
+    """The displacements, simulated for 60 s in the field of finite elements, `quick` in the dipole's."""
     asked = {"configuration": "horizontal", "model": "dipole" if quick else "fem", "duration_s": 60.0}
     return [{**asked, "complete": not quick, "value": value} for value in DISPLACEMENTS]
 
 
 def trajectories(point: Point) -> xr.Dataset:
-    """The flights of one rotor, simulated and averaged, see `FLIGHT_COLUMNS`; and what became of each."""
+    """The trajectories of one rotor, simulated and averaged, see `FLIGHT_COLUMNS`; and what became of each."""
     complete = point.get("complete", False)
     scene = article.rotor_scene(point["configuration"], point["value"], article.HIGHEST)
     scene = replace(scene, **article.losses(scene, complete, complete))
@@ -296,7 +296,7 @@ def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, second
 
 @drawn
 def flight_figure(result: xr.Dataset) -> Figure:
-    """The distance in each flight, one panel for each displacement."""
+    """The distance in each trajectory, one panel for each displacement."""
     rotors = {article.rotor_label("horizontal", float(rotor["value"])): rotor for rotor in each_case(result)}
     figure, rows = small_multiples(rotors, 3.6, 3, "time (s)", "levitation distance (mm)", sharey=True)
     explain(rows[0][0], {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(result["frequency"].values)})
@@ -309,7 +309,7 @@ def flight_figure(result: xr.Dataset) -> Figure:
             panel.fill_between(time, 1e3 * one["lowest"], 1e3 * one["highest"], color=color, alpha=0.3, lw=0)
             panel.plot(time, mean, color=color)
             panel.plot(one["averaged_time"], 1e3 * one["averaged_distance"], "--", color="k", lw=0.7)
-            # an averaged flight that ends at the fold falls; what is lost otherwise is lost in an oscillation
+            # an averaged trajectory that ends at the fold falls; what is lost otherwise is lost in an oscillation
             if one["kind"] not in ("stable", "drifting"):
                 last = int(np.flatnonzero(np.isfinite(mean))[-1])
                 mark = "v" if one["averaged_end"] == "fold" else "x"

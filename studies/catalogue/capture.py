@@ -41,7 +41,7 @@ SPEED = 0.02  # Standard deviation of each component of the velocity with which 
 BELOW = 0.018
 """Face of the plate below where the floater levitates without it, m: 35 mm below the rotor is 10 to 20 of these."""
 SETTLED, LOWERED, LOWERING_SPEED, AFTER = 1.0, 0.055, 0.01, 1.0
-"""The plate goes down after (s), by (m), at (m/s: the article's), and the flight goes on for (s)."""
+"""The plate goes down after (s), by (m), at (m/s: the article's), and the trajectory goes on for (s)."""
 PLATE_RTOL = 1e-2  # Of the plate's tables: capture is decided by the field's attraction, the plate only brakes
 
 
@@ -136,11 +136,11 @@ def seed_of(configuration: str, measure: float, part: float, batch: int) -> list
 
 
 HELD, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)
-"""Up at the end; touched the plate; touched the rotor; far away; never flown, as no frequency is stable."""
+"""Up at the end; touched the plate; touched the rotor; far away; never simulated, as no frequency is stable."""
 WORDS = ("held", "touched the plate", "touched the rotor", "lost to the side", "no stable frequency")
 PARTS = (1 / 6, 1 / 2, 5 / 6)  # Places in the range of stable frequencies
-TOGETHER, BATCHES = 2000, 5  # Flights of a point, and points for each rotor and frequency: ten thousand flights
-CHECKED = 8  # Launches of each rotor and frequency that are flown on while the plate goes down
+TOGETHER, BATCHES = 2000, 5  # Trajectories of a point, and points for each rotor and frequency: 10 000 in all
+CHECKED = 8  # Launches of each rotor and frequency that are simulated on while the plate goes down
 FEW = 24  # Launches of a point in the quick setting
 FLIGHTS = ("flight",)
 COLUMNS: Columns = {

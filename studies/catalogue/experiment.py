@@ -255,7 +255,7 @@ def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, Surrogat
 
 
 def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
-    """The variants with their own facts side by side, NaN where one has not a fact; how many rotors were computed."""
+    """The variants with their own facts as columns, NaN where one has not a fact; how many rotors were computed."""
     variants = [part for part in parts if "variant" in part.dims]
     rotors = variable((), np.array(len(parts) - len(variants)), "1", "rotors of the designs")
     if not variants:

@@ -79,15 +79,15 @@ def scene_of(inputs: Mapping[str, float], permeability: float = 1.0) -> Scene:
 
 
 EFFECTS = ("floater", "magnets", "steel", "air")
-"""What may make a small motion grow: currents in the floater, the rotor's magnets and the holder's steel, and air."""
+"""What may make a normal mode grow: currents in the floater, the rotor's magnets and the holder's steel, and air."""
 MOTIONS = ("precession", "side")
-"""Small motions that currents may make grow: a turning of the moment, and a circle about the axis."""
+"""Normal modes that currents may make grow: a turning of the moment, and a circle about the axis."""
 QUANTITIES = (
     *("frequency", "eddy", "air", "circle", "bounce", "bare"),
     *(f"{motion} {name}" for motion in MOTIONS for name in ("frequency", *EFFECTS)),
 )
 """Of a node: frequency of the rotor, Hz; ds/dt by the floater's currents and by air, 1/s; distance from the axis, m;
-frequency of the bounce, Hz; growth without losses, 1/s; of two motions the frequency, Hz, and growth by each effect."""
+frequency of the axial mode, Hz; growth without losses, 1/s; frequency of two modes, Hz, and growth by each effect."""
 ITERATIONS, CLOSE = 40, 1e-10
 OFF = [Parameter.LINEAR_DRAG, Parameter.TILT_DRAG, Parameter.SPIN_DRAG, Parameter.TILT_EDDY, Parameter.SPIN_EDDY]
 AIR, EDDY = OFF[:3], OFF[3:]
@@ -177,7 +177,7 @@ class Levitating:
 
 
 def _first_order(state: Array, slope: Array, added: Sequence[Array]) -> tuple[Array, Array]:
-    """(Scaled, angular) frequency of two small motions, and what each of the effects (12, 12) adds to their growth.
+    """(Scaled, angular) frequency of two normal modes, and what each of the effects (12, 12) adds to their growth.
 
     They are the two that the first two effects make grow most; the side motion is the one that moves the place more.
     """

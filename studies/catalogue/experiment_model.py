@@ -5,9 +5,9 @@ gravity, whose ranges are narrow, enter to first order.  Their stated error is t
 one: with H the projection onto the polynomials and r the residuals, the rows B of one rotor are then missed by
 (1 - H_BB)⁻¹ r_B (R. D. Cook, S. Weisberg, Residuals and Influence in Regression, 1982).
 
-A flight falls through the fold, stays for the experiment's 250 s, is lost in oscillations, or has no equilibrium: each
-has a probability, soft by the surrogate's error and by how the residual motion differs from flight to flight.  One
-flight in fifty may end for a reason that nobody thought of, so that no fact can rule out everything.
+A trajectory falls through the fold, lasts for the experiment's 250 s, is lost in oscillations, or has no equilibrium:
+each has a probability, soft by the surrogate's error and by how the residual motion differs from one to the next.  One
+trajectory in fifty may end for a reason that nobody thought of, so that no fact can rule out everything.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ WITH_STRENGTH = -0.78  # The frequency goes about as this power of it
 FASTEST = 300.0  # Nodes of faster rotors are left out, Hz: no fact asks for more than 200
 STABLE = 0.02  # Growth without losses that is taken as none, 1/s
 APART = 0.03, 0.004
-"""Squared distances of bounce and side motion from precession, over the frequency, from which on growth is its own."""
+"""Squared distances of axial and lateral mode from precession, over the frequency, from which on growth is its own."""
 
 
 def strength(name: str, inputs: Array) -> Array:
@@ -64,7 +64,7 @@ def targets(name: str, design: xr.Dataset) -> Array:
     """What is fitted (rotor, height, spin, fitted) of a design's nodes: smooth functions, NaN where one has no sense.
 
     The frequency goes as [(1 - part)(1 - spin)]^(-1/2), and a power of `strength`: its logarithm is fitted
-    without these.  "meeting" is the square of the distance of bounce and precession over the frequency squared,
+    without these.  "meeting" is the square of the distance of axial mode and precession over the frequency squared,
     negative where they have met and grow;
     "lateral" that of the side motion from the rotor.  Growth by currents is over the drift by those in the floater,
     that of the side motion over drift by (1 - spin) times the root of "lateral".
@@ -199,9 +199,9 @@ LONGEST = 250.0
 SLOWEST = 1e-7  # Drift slower than this, 1/s, is a balance
 TURNS = 4  # Corrections of the spin at a height, of which each leaves a tenth of its error or less
 WINDOW, DWELL = 0.2, 10.0
-"""A floater is lost where twice the bounce is so near to precession (Hz) for so long (s), see docs/learned.md."""
+"""A floater is lost where twice the axial mode is so near to precession (Hz) for so long (s), see docs/learned.md."""
 NARROWEST = 1e-4  # Of "lateral": nearer to zero the side motion is lost before it grows by currents
-Course = Mapping[str, Array]  # What becomes of n flights, by name, see `simulated`
+Course = Mapping[str, Array]  # What becomes of n trajectories, by name, see `simulated`
 
 
 def simulated(
@@ -221,10 +221,10 @@ def simulated(
     -------
     margin : (n,) logarithm of the frequency over the lowest at which there is an equilibrium with the spin at release
     fall : (n,) time until the fold, s; infinite where a balance comes before
-    growth, doubt : (n,) e-folds of small motions until the fold or the longest time, and their error by the surrogate's
-    shaken : (n,) time until bounce and precession meet, or two bounces take as long as a precession for long enough, s
+    growth, doubt : (n,) log of the growth of modes until the fold or the longest time, and its error by the surrogate's
+    perturbed : (n,) time until axial mode and precession meet, or 2 axial periods equal one of precession for long, s
     circle : (n,) distance from the axis at release, m
-    clock, folds : (n, k) times on the way, s, and e-folds up to them
+    clock, folds : (n, k) times on the way, s, and logarithmic growth up to them
     """
     longest, air = longest[:, None], 1e-3 * strengths[:, 3:]
     part = np.linspace(*KINDS[surrogate.name][1:], STEPS)
@@ -247,7 +247,7 @@ def simulated(
     begun = np.concatenate([np.zeros((len(time), 1)), time[:, :-1]], axis=1)
     spent = np.clip(np.minimum(time, longest) - begun, 0.0, None)
     flying = (way > 0) & (begun < longest)
-    # What growth of each small motion is fitted over, see `targets`.
+    # What growth of each normal mode is fitted over, see `targets`.
     lateral = np.sqrt(np.maximum(known["lateral"], NARROWEST))
     each, doubts = [], []
     for motion, over in zip(MOTIONS, (eddy, eddy / rest / lateral), strict=True):
@@ -258,7 +258,7 @@ def simulated(
         each.append(np.cumsum(np.maximum(_middle(growth), 0.0) * spent, axis=1))
         doubts.append(np.sum(_middle(np.sqrt(error)) * spent, axis=1))
     folds, which = np.max(each, axis=0), np.argmax([one[:, -1] for one in each], axis=0)
-    # Two bounces come to take as long as a precession, and stay so for long enough.
+    # Two axial oscillations come to take as long as a precession, and stay so for long enough.
     twice = 2 * np.sqrt(np.maximum(known["squared bounce"], 0.0))
     apart = (twice - known["precession"]) * frequency[:, None]
     lingers = np.minimum(spent, longest) * 2 * WINDOW / np.maximum(np.abs(np.diff(apart, axis=1)), WINDOW) > DWELL
@@ -270,7 +270,7 @@ def simulated(
         "fall": np.where(balanced, np.inf, time[:, -1]),
         "growth": folds[:, -1],
         "doubt": np.take_along_axis(np.array(doubts), which[None], 0)[0],
-        "shaken": np.where(met.any(axis=1), _first(begun, met), np.inf),
+        "perturbed": np.where(met.any(axis=1), _first(begun, met), np.inf),
         "circle": np.exp(_first(known["circle"][:, :-1], way > 0)),
         "clock": np.minimum(time, longest),
         "folds": folds,
@@ -286,16 +286,16 @@ def _middle(values: Array) -> Array:
     return (values[:, 1:] + values[:, :-1]) / 2
 
 
-UNFORESEEN = 0.02  # Probability that a flight's end has a reason outside of the model
-WAYS = 4  # In which a flight may end
+UNFORESEEN = 0.02  # Probability that a trajectory's end has a reason outside of the model
+WAYS = 4  # In which a trajectory may end
 LARGE = 3e-3  # Motion with which a floater is lost, m
-SCATTER = 0.7  # Of the logarithm of the residual motion from flight to flight
+SCATTER = 0.7  # Of the logarithm of the residual motion from one trajectory to the next
 TIMES = 0.1  # Of the logarithm of computed times
-SOFT = 0.003  # Of the logarithm of frequencies, which are told in whole Hz
+SOFT = 0.003  # Of the logarithm of frequencies, which the article gives in whole Hz
 TOLD = 0.1  # Of the logarithm of a made-up time
-DAY, SHORTEST = 86400.0, 3.0  # Longest flight of the experiment, and the shortest that counts, s
+DAY, SHORTEST = 86400.0, 3.0  # Longest trajectory of the experiment, and the shortest that counts, s
 NOT_CAUGHT = 0.05
-"""Probability that all launches fail below a rotor that can hold a floater: some half of them are held (`capture`)."""
+"""Probability that all launches fail below a rotor that can levitate a floater: about half are captured (`capture`)."""
 Values = Mapping[str, Array]
 Flight = tuple[str, float, float, float]  # Kind of rotor, its δx or δz (mm), frequency (Hz) and longest time (s)
 Known = Mapping[Flight, Course]
@@ -311,7 +311,7 @@ class Models:
     effects: Sequence[str] = ("floater", "rotor", "air")
 
     def conditions(self, values: Values, flight: Flight) -> tuple[Array, ...]:
-        """One flight of each of the rotors with drawn unknowns, as `simulated` takes them."""
+        """One trajectory of each of the rotors with drawn unknowns, as `simulated` takes them."""
         kind, distance, frequency, longest = flight
         rotor, known, box = _rotor(values, kind, distance), likeness(values), KINDS[kind].box
         scaled = {name: rotor[name] / known["edge"] for name in ("displacement", "stack") if name in rotor}
@@ -326,18 +326,18 @@ class Models:
 
 
 def ends(models: Models, flight: Flight, course: Course, values: Values) -> dict[str, Array]:
-    """Probabilities (n,) of how flights end: "nothing" (no equilibrium), "falls", "stays", "oscillates".
+    """Probabilities (n,) of how trajectories end: "nothing" (no equilibrium), "falls", "stays", "oscillates".
 
     Parameters
     ----------
     models : surrogates
-    flight, course : kind of rotor and longest time; what becomes of the flights
+    flight, course : kind of rotor and longest time; what becomes of the trajectories
     values : the unknowns (n,)
     """
     kind, _, _, longest = flight
     there = ndtr(course["margin"] / np.hypot(models.error(kind, "frequency"), SOFT))
     grown = ndtr((course["growth"] - needed(values)) / np.hypot(SCATTER, course["doubt"]))
-    loose = 1 - (1 - grown) * (1 - _before(models, kind, course["shaken"], longest))
+    loose = 1 - (1 - grown) * (1 - _before(models, kind, course["perturbed"], longest))
     falls, up = _before(models, kind, course["fall"], longest), there * (1 - loose)
     return {"nothing": 1 - there, "falls": up * falls, "stays": up * (1 - falls), "oscillates": there * loose}
 
@@ -352,7 +352,7 @@ def _logarithm(time: Array) -> Array:
 
 
 def needed(values: Values) -> Array:
-    """E-folds (n,) from the motion at release to that with which a floater is lost."""
+    """Logarithmic growth (n,) from the motion at release to that with which a floater is lost."""
     return np.asarray(np.log(LARGE / (1e-6 * values["motion"])))
 
 
@@ -382,7 +382,7 @@ def log_likelihoods(models: Models, values: Values, facts: Mapping[str, Fact]) -
 
 
 def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[Flight, Course]:
-    """Flights of all rotors, for unknowns (n,) by name; those of one kind are flown in one call."""
+    """Flights of all rotors, for unknowns (n,) by name; those of one kind are simulated in one call."""
     found: dict[Flight, Course] = {}
     for kind, surrogate in models.surrogates.items():
         own = [flight for flight in flights if flight[0] == kind]
@@ -402,7 +402,7 @@ class Fact(NamedTuple):
 
     says: str  # what is reported
     flights: tuple[Flight, ...]  # that it is about
-    likelihood: Likelihood  # its probability (n,) from the surrogates, the unknowns (n,) and these flights
+    likelihood: Likelihood  # its probability (n,) from the surrogates, the unknowns (n,) and these trajectories
 
 
 LOW, MIDDLE, HIGH, BEYOND = (("single", 1.0, frequency, LONGEST) for frequency in (115.0, 140.0, 150.0, 165.0))
@@ -411,7 +411,7 @@ LOWEST = ("stack", 10.0, 50.0, LONGEST)
 
 
 def ended(flight: Flight, way: str, lasted: float | None = None) -> Likelihood:
-    """That a flight ended in one of the ways of `ends`, and for a fall after which time (s), if it is known."""
+    """That a trajectory ended in one of the ways of `ends`, and for a fall after which time (s), if it is known."""
 
     def likelihood(models: Models, values: Values, known: Known) -> Array:
         found = ends(models, flight, known[flight], values)[way]
@@ -444,7 +444,7 @@ def _peak(models: Models, values: Values, known: Known) -> Array:
     for course in (known[LOW], known[BEYOND]):
         over = course["folds"] >= needed(values)[:, None]
         loose = np.where(over.any(axis=1), _first(course["clock"], over), np.inf)
-        lasts = np.minimum(np.minimum(course["fall"], course["shaken"]), loose)
+        lasts = np.minimum(np.minimum(course["fall"], course["perturbed"]), loose)
         times.append(np.log(np.clip(lasts, 1.0, LONGEST)))
     return np.asarray(ndtr((times[0] - times[1]) / 0.3))
 

@@ -1,4 +1,4 @@
-"""What finite and permeable magnets change: levitation by dipoles and by the true field, and mutual magnetisation."""
+"""Effects of finite and permeable magnets: levitation by dipoles and by their field, mutual magnetisation."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -258,7 +258,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     Dataset over `distance`: force and torque by part with error, relative difference of the rigid dipole; over `level`
     and `quantity`: the distance from which on the rigid dipole is good to that level; and the levitation shift. The
     moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the
-    stable equilibrium (along -x if there is none) and held where no balance is near.
+    stable equilibrium (along -x if there is none), fixed where no balance is near.
     """
     rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
     alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))

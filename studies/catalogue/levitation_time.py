@@ -41,10 +41,10 @@ CASES = {
     "vertical 16 mm": DriftCase("vertical", 16.0, 95.0, 68.0, 110.0),
     "tilt 5 deg": DriftCase("tilt", 5.0, 185.0, 130.0, 250.0),
     "tilt 10 deg": DriftCase("tilt", 10.0, 110.0, 75.0, 180.0),
-}  # Rotors of the article, and two whose displacement is chosen so that they fly where the article's did
+}  # Rotors of the article, and two whose displacement is chosen so that they levitate where the article's did
 TOLERANCES = {"horizontal": 0.2, "vertical": 0.5, "tilt": 0.5}  # Of the displacement or tilt, mm or degrees
 QUICK = ("horizontal 1 mm", "vertical 14 mm")
-OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")  # How a flight may end
+OUTCOMES = ("contact", "fold", "instability", "levitates", "no equilibrium")  # How a trajectory may end
 LEVITATES, NO_EQUILIBRIUM = 3, 4  # Numbers of two of these
 
 
@@ -56,9 +56,9 @@ class Variant:
     remanence: float = REMANENCE  # of all magnets, T
     conductivity: float = MAGNET_CONDUCTIVITY  # of the floater, S/m
     stokes: bool = False  # whether the air's drag is Stokes's
-    e_folds: float = E_FOLDS  # growth of an oscillation that ends the flight
+    e_folds: float = E_FOLDS  # growth of an oscillation that ends the trajectory
     misplaced: float = 0.0  # error of the rotor's displacement, in units of its tolerance
-    # "rigid": closed form of μr = 1, and no answers; "permeable": by finite elements with μr = 1.05, rotor and
+    # "rigid": closed form of μr = 1, no mutual magnetisation; "permeable": by finite elements with μr = 1.05, rotor and
     # floater magnetise each other; "conducting": and there are eddy currents in the rotor's magnets
     rotor: str = "rigid"
 
@@ -93,7 +93,7 @@ def scene_of(case: DriftCase, variant: Variant) -> Scene:
     return replace(scene, floater=replace(scene.floater, conductivity=variant.conductivity))
 
 
-CAP, SHORTEST = 250.0, 3.0  # The article stopped a flight after 250 s, and did not count one of less than 3 s
+CAP, SHORTEST = 250.0, 3.0  # The article stopped a trajectory after 250 s, and did not count one of less than 3 s
 SAMPLES = 60
 STEP = ("case", "variant", "step")
 COLUMNS: Columns = {
@@ -120,10 +120,10 @@ def time_points(quick: bool) -> list[Point]:
 
 
 def levitation_times(point: Point) -> xr.Dataset:
-    """Levitation time, start and end of the averaged flights of one rotor with one variant, over `step` of frequency.
+    """Levitation time, start and end of one rotor's averaged trajectories with one variant, over `step` of frequency.
 
-    Recoil permeability is 1.05 in the floater and, but in the variants that say so, left out in the rotor. Flights are
-    at those frequencies that the branch of equilibria reaches, from that of point dipoles both ways.
+    Recoil permeability is 1.05 in the floater and, but in the variants that say so, left out in the rotor. They are at
+    those frequencies that the branch of equilibria reaches, from that of point dipoles both ways.
     """
     case, variant, model = CASES[point["case"]], VARIANTS[point["variant"]], point["model"]
     grid, scene = np.linspace(case.lowest, case.highest, point["steps"]), scene_of(case, variant)
@@ -235,7 +235,7 @@ def times_figure(result: xr.Dataset) -> Figure:
 
 @styled
 def flights_figure(result: xr.Dataset) -> Figure:
-    """Distance against time in some nominal flights of each rotor, their frequencies by colour."""
+    """Distance against time in some nominal trajectories of each rotor, their frequencies by colour."""
     figure, rows = small_multiples(_rotors(result), 2.2, 3, "time (s)", "distance (mm)")
     for panel, rotor in rows:
         nominal, frequency = rotor.sel(variant="nominal"), rotor["frequency"].values

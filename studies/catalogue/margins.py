@@ -267,10 +267,10 @@ SENSITIVITY = Study(
 )
 
 
-# The search for the displacement or tilt that holds the floater at a wanted distance and frequency.
+# The search for the displacement or tilt that levitates the floater at a wanted distance and frequency.
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A rotor that holds the floater where it is wanted."""
+    """A rotor that levitates the floater where it is wanted."""
 
     measure: float  # displacement, mm, or tilt, °
     here: BranchPoint  # the equilibrium
@@ -351,7 +351,7 @@ def designed(configuration: str, edge: float, distance: float, frequency: float)
 
 EDGES = [6.0, 8.0, 10.0, 12.7, 16.0]  # Edges of the cubes that are tried, mm
 RTOL = 1e-4
-CLOSE_ENOUGH = 1e-6  # To which the true field shall meet the wanted distance, m
+CLOSE_ENOUGH = 1e-6  # To which the field of the finite magnets shall meet the wanted distance, m
 NAMES: Columns = {
     "measure": (("edge",), "mm or °", "displacement or tilt"),
     "margin": (("edge",), "1", "smallest relative change of frequency that ends stable levitation; 0 where unstable"),
@@ -386,7 +386,7 @@ def design_points(quick: bool) -> list[Point]:
 def _checked_by_elements(
     configuration: str, edge: float, distance: float, frequency: float, first: float, rtol: float, close: float
 ) -> Array:
-    """Measure (mm or °) corrected for the true field, and what a forward search then gives.
+    """Measure (mm or °) corrected for the field of the finite magnets, and what a forward search then gives.
 
     That is distance (m) and its error (m) of the equilibrium nearest to the wanted distance, 1 if it is stable, its
     growth (1/s). Raises EquilibriumError where there is none, or the corrections do not settle.
@@ -397,12 +397,12 @@ def _checked_by_elements(
         scene = article.rotor_scene(configuration, measure, frequency, drag=False, edge=edge)
         found = article.levitation_of(scene, "fem", rtol).equilibria
         if not found:
-            raise EquilibriumError("The true field has no equilibrium there.")
+            raise EquilibriumError("The field of the finite magnets has no equilibrium there.")
         best = min(found, key=lambda e: abs(e.distance - distance))
         if abs(best.distance - distance) < close:
             return np.array([measure, best.distance, best.position_error, float(best.stable), best.growth_per_s])
         measure -= (best.distance - distance) / slope
-    raise EquilibriumError("The correction of the measure for the true field did not settle.")
+    raise EquilibriumError("The correction of the measure for the field of the finite magnets did not converge.")
 
 
 def design(point: Point, rtol: float = RTOL, close: float = CLOSE_ENOUGH) -> xr.Dataset:
@@ -429,7 +429,7 @@ def design(point: Point, rtol: float = RTOL, close: float = CLOSE_ENOUGH) -> xr.
 
 
 def wishes(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
-    """What was asked for, and what the configurations answer."""
+    """The goals, and what the configurations reach."""
     pairs = zip(result["wanted_distance"].values, result["wanted_frequency"].values, strict=True)
     return [
         (f"{1e3 * d:g} mm at {f:g} Hz", cases_with(result, wanted_distance=d, wanted_frequency=f))

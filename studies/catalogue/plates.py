@@ -129,7 +129,7 @@ def plate_damping(point: Point) -> xr.Dataset:
     Returns
     -------
     Dataset over `case`: growth and frequency of each mode, displacement, mean force, torque and loss; NaN where the
-    plate undoes the equilibrium.  Plates are infinite slabs but for those called real.
+    plate destabilises the equilibrium.  Plates are infinite slabs but for those called real.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Where floaters levitate: regions in frequency and displacement, and the frequency until which flights last."""
+"""Where floaters levitate: regions in frequency and displacement, and the frequency until which trajectories last."""
 
 from dataclasses import replace
 from typing import Any
@@ -27,7 +27,7 @@ from . import article, showing
 # Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
 #
 # Regions: the motion without losses, of a rigid floater in the dipole's field, and in that of finite elements with
-# mutual magnetisation.  Where flights last, every effect takes part: the currents in the floater, real air, and
+# mutual magnetisation.  Where trajectories last, every effect takes part: the currents in the floater, real air, and
 # those in the rotor's magnets or not.
 MEASURES = {
     "horizontal": (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0),
@@ -65,9 +65,9 @@ LASTING: Columns = {
 
 
 def map_points(quick: bool) -> list[Point]:
-    """All rotors with both models; with the plate, and flights, the rotors that levitated in the article.
+    """All rotors with both models; with the plate, and trajectories, the rotors that levitated in the article.
 
-    `quick` leaves out the mutual magnetisation and the flights.
+    `quick` leaves out the mutual magnetisation and the trajectories.
     """
     rotors = {name: (value,) for name, value in article.QUICK_ROTORS} if quick else MEASURES
     return [
@@ -220,14 +220,14 @@ STABILITY_MAP = Study(
 
 # The upper frequency: until when a floater stays above it, with and without currents in the rotor's metal.
 #
-# For each rotor that levitated in the article: averaged flights along its stable frequencies with body spin 0 at
+# For each rotor that levitated in the article: averaged trajectories along its stable frequencies with body spin 0 at
 # release, below a rotor that does not conduct (as one of ferrite or of powder in plastic, of the same field), one whose
 # magnets do, and for displaced cubes one that also has the steel with which the article balances them.
 # Closed form of μr = 1, rigid floater with its own currents, real air.
 VARIANTS = ("does not conduct", "magnets conduct", "magnets and spacers conduct")
 STEEL_CONDUCTIVITY, STEEL_DENSITY, MAGNET_DENSITY = 1.4e6, 7900.0, 7500.0
 """Of non-magnetic steel (AISI 304), S/m and kg/m³; of NdFeB."""
-STEPS, LONGEST = 16, 3600.0  # Frequencies of flights; how long they are followed, s
+STEPS, LONGEST = 16, 3600.0  # Frequencies of trajectories; how long they are followed, s
 COLUMNS: Columns = {
     "low": ((), "Hz", "lowest stable frequency without losses"),
     "high": ((), "Hz", "highest stable frequency without losses"),
@@ -272,7 +272,7 @@ def scene_of(point: Point) -> Scene:
 
 
 def upper_limit(point: Point) -> xr.Dataset:
-    """How long flights last at each frequency (`step`), and between which they last for the article's 250 s."""
+    """How long trajectories last at each frequency (`step`), and between which they last for the article's 250 s."""
     scene = scene_of(point)
     bare = article.rotor_scene(point["configuration"], point["measure"], permeability=1.0, drag=False)
     alone, whole = article.levitation_of(bare, "cuboid"), article.levitation_of(scene, "cuboid")
@@ -314,7 +314,7 @@ def limit_lines(result: xr.Dataset) -> list[str]:
             low, high, start, end = (f"{float(one[name]):.1f}" for name in ENDS)
             lasts = "none" if np.isnan(one["lasts_to"]) else f"{start} to {end} ± 0.5"
             rows.append((f"{label}, {one['variant'].item()}", f"{low} to {high}", lasts, one["ended_by"].item()))
-        # what conduction changes where it changes the most: the end in Hz, and a flight in s
+        # what conduction changes where it changes the most: the end in Hz, and a trajectory in s
         first, second = each_case(rotor)[:2]
         less, lost = max(0.0, float(first["lasts_to"] - second["lasts_to"])), second["end"].values == "instability"
         if not lost.any():
@@ -331,7 +331,7 @@ def limit_lines(result: xr.Dataset) -> list[str]:
 
 
 def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
-    """Ends of lasting flights by rotor and variant as numbers: `limits`."""
+    """Ends of lasting trajectories by rotor and variant as numbers: `limits`."""
     names = {"configuration": "configuration", "value": "measure", "variant": "variant"}
     return {"limits": showing.records(result, names | {f"{name}_hz": name for name in ENDS})}
 

@@ -42,7 +42,7 @@ def cite_job(path: Path) -> list[str]:
 
 
 def used_references(result: xr.Dataset) -> set[str]:
-    """Keys of the entries in references.bib that a result used, told from its attributes."""
+    """Keys of the entries in references.bib that a result used, by its attributes."""
     study, attrs = str(result.attrs["study"]), result.attrs
     keys = {"effect", "program", *STUDIES.get(study, ())}
     if attrs.get("model") not in ("dipole", "cuboid", "map"):
@@ -130,7 +130,7 @@ def _part(path: Path) -> dict[str, Any]:
 
 
 def _view(result: xr.Dataset) -> dict[str, str]:
-    """The end of a flight as the viewer takes it, or why there is none; nothing for a result without a flight."""
+    """The end of a trajectory as the viewer takes it, or why there is none; nothing for a result without one."""
     if "scene" not in result.attrs or "position_rotor_frame" not in result:
         return {}
     scene, motion = flight_of(result, "scene")

@@ -160,7 +160,7 @@ def failure_lines(result: xr.Dataset) -> list[str]:
 
 
 def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
-    """Write NAME-scene.png, NAME-flight.gif and, if `html`, NAME-view.html of a flight; returns the files.
+    """Write NAME-scene.png, NAME-flight.gif and, if `html`, NAME-view.html of a trajectory; returns the files.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
 
 
 def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
-    """The scene at the end of the flight that a result holds, and its motion along the rotor's axes."""
+    """The scene at the end of the trajectory that a result holds, and its motion along the rotor's axes."""
     scene = parse_scene(str(result.attrs["scene"]), source)
     if (plate := scene.plate) is not None and plate.lowering is not None:
         down = np.array([0.0, 0.0, float(plate.lowering.depth(result["time"].values[-1]))])

@@ -48,7 +48,7 @@ def small_multiples(
     ----------
     parts : what the panels show, by their titles, which stand behind their letters
     height : of a row, inches
-    columns : panels side by side, at most
+    columns : panels in a row, at most
     xlabel, ylabel : of the lowest panel of each column, and of the first of each row
     shared : as of `Figure.subplots`
     """

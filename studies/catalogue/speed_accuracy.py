@@ -210,7 +210,7 @@ def _at_points(table: FieldTable) -> tuple[Array, Array, Array]:
 
 
 def _peak_memory() -> float:
-    """The most that the process has held, bytes (Linux)."""
+    """Peak memory of the process, bytes (Linux)."""
     return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 

@@ -172,7 +172,7 @@ def compare(
     spin: Spin = 0.0,
     output: Output = Output(),
 ) -> Answer:
-    """May the point dipole be used? Every field model's answers about one scene, under the same conditions.
+    """May the point dipole be used? Every field model's results for one scene, under the same conditions.
 
     Dipole, dipole of the true moment, cuboid (μr = 1), finite elements, and those with mutual magnetisation: a table,
     a figure over the frequency, compare.nc and compare.json.

@@ -183,7 +183,7 @@ def note(text: str) -> None:
 
 
 def detail(text: str) -> None:
-    """A message that is heard only where the user wants to know everything (`--verbose`)."""
+    """Print a message if the user wants to know everything (`--verbose`)."""
     LOG.debug(text)
 
 
@@ -223,7 +223,7 @@ def heard(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
 
 @contextmanager
 def progress(label: str) -> Iterator[Callable[..., None]]:
-    """A progress bar where messages are heard; gives a function that takes the finished fraction and a new label."""
+    """A progress bar where messages are printed; gives a function that takes the finished fraction and a new label."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     shown = LOG.handlers and (ERRORS.is_interactive or ERRORS.is_jupyter)
     with Progress(*columns, console=ERRORS, transient=True, disable=not shown) as bar:
@@ -261,7 +261,7 @@ def answers_only() -> Iterator[TextIO]:
     try:
         stream = os.fdopen(os.dup(kept), "w", encoding=sys.stdout.encoding, errors=READABLE)
         yield stream
-        with suppress(OSError):  # who prints flushes, and is told then
+        with suppress(OSError):  # who prints flushes, and gets the error then
             stream.close()
     finally:
         sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""What is shown of a flight in three dimensions: its end, its frames, the field, and the currents in the plate."""
+"""What is shown of a trajectory in three dimensions: its end, its frames, the field, and the currents in the plate."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from ...geometry.scene.contents import Plate, Scene
 from .view import FieldPlane, Frames, View, field_lines, frame_times
 
 ORDER = 3  # Of the elements: a picture needs no more
-PATH = 12  # Turns of the rotor at the end of a flight whose path is drawn
-LATEST = 200  # Samples at the end of a flight among which one is shown
+PATH = 12  # Turns of the rotor at the end of a trajectory whose path is drawn
+LATEST = 200  # Samples at the end of a trajectory among which one is shown
 ANGLES = 8  # Of the rotor, from which the part of its field at the rotor's frequency is taken
 
 
 def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> View:
-    """The end of a flight (n, 3) along the rotor's axes at times (n,) s, with its path and the field."""
+    """The end of a trajectory (n, 3) along the rotor's axes at times (n,) s, with its path and the field."""
     view, field = seen_from(scene, time, motion), drawn_field(scene, table)
     depth = max(abs(1e3 * float(view.position[2])), 10.0)
     width = max(1.6 * depth, 30.0)
@@ -36,7 +36,7 @@ def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> Vi
 
 
 def seen_from(scene: Scene, time: Array, motion: State) -> View:
-    """The end of a flight (n, 3) along the rotor's axes at times (n,) s, with its path.
+    """The end of a trajectory (n, 3) along the rotor's axes at times (n,) s, with its path.
 
     A floater that gravity across the axis keeps on one side of it does not turn with the rotor: its path is that in the
     laboratory, and it stands where it is at an instant near the end at which the rotor's axes are the laboratory's.
@@ -69,7 +69,7 @@ def drawn_field(scene: Scene, table: FieldTable) -> Callable[[Array], Array]:
 
 
 def flight_frames(scene: Scene, time: Array, motion: State) -> Frames:
-    """The frames of an animation of a flight (n, 3) along the rotor's axes at times (n,) s."""
+    """The frames of an animation of a trajectory (n, 3) along the rotor's axes at times (n,) s."""
     instants = frame_times(scene, float(time[-1]))
     position, moment = (
         np.stack([np.interp(instants, time, component) for component in vectors.T], axis=-1)

@@ -17,7 +17,7 @@ from ...geometry.common import ComputationError
 from ..processes import Death, results
 from .view import Sample
 
-Told = Callable[[float], None]  # hears of the finished part of all
+Told = Callable[[float], None]  # called with the finished part of all
 
 
 class RenderError(ComputationError):
@@ -37,7 +37,7 @@ def render(pictures: Mapping[Path, Picture], progress: Told = lambda fraction: N
     Parameters
     ----------
     pictures : by the file that each becomes
-    progress : is told the part of all that is done
+    progress : called with the part of all that is done
 
     Raises
     ------

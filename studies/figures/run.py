@@ -31,10 +31,10 @@ MARKS = (
     (True, 0, "D", "white", "unstable, with the plate"),
 )  # Of equilibria: whether the plate's currents act, whether it is stable, marker, its face, and what it means
 PARTS = 120  # Intervals of an envelope: more than a printed figure tells apart
-SHOWN = 200  # Samples of a flight that are drawn one by one
+SHOWN = 200  # Samples of a trajectory that are drawn one by one
 COARSE = 0.05
-"""Interval of samples (s) that lets a bounce pass unseen: a line through them would show slow motions that are none."""
-HOURS = 7200.0  # Flights that take longer are drawn over hours, s
+"""Interval of samples (s) longer than an axial oscillation: a line through them would show false slow motions."""
+HOURS = 7200.0  # Trajectories that take longer are drawn over hours, s
 MODE_MARKERS = "osD^v"
 FAMILY = 6  # curves that a panel tells apart, at most
 APART = 0.3  # of the distance: farther from the last point of a branch the next is of another one
@@ -120,7 +120,7 @@ def force_figure(result: xr.Dataset) -> Figure:
     weight = -1e3 * float(result.attrs["weight_N"])
     felt = result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1  # older results do not say
     depth = -1e3 * result["equilibrium_position"].sel(axis="z")
-    curves = result[["curve_model", "curve_number", "curve_position", "curve_force"]]  # not the flight's many samples
+    curves = result[["curve_model", "curve_number", "curve_position", "curve_force"]]  # without the trajectory
     peaks = [3.5 * weight]
     for panel in (axes, near):
         panel.axhline(weight, color="0.3", lw=0.8, label="weight of the floater")

@@ -1,4 +1,4 @@
-"""What VTK draws: a scene as a picture, a flight as an animation, and a scene that a page lets its reader turn.
+"""What VTK draws: a scene as a picture, a trajectory as an animation, and a scene that a page lets its reader turn.
 
 Lengths are mm here. Only the process that draws loads this module.
 """

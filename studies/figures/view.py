@@ -58,7 +58,7 @@ class View:
     scene: Scene
     position: Array  # of the floater, (3,) m
     moment: Array  # (3,) its direction
-    path: Array  # (n, 3) positions of the flight, m, in `frame`
+    path: Array  # (n, 3) positions of the trajectory, m, in `frame`
     plane: FieldPlane | None = None  # the field's size
     lines: Sequence[Array] = ()  # of the field, (n, 3) m each
     currents: Currents | None = None  # in the plate
@@ -74,7 +74,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """A flight in the laboratory frame, frame by frame: time (n,) s, the floater's position and moment (n, 3)."""
+    """A trajectory in the laboratory frame, frame by frame: time (n,) s, the floater's position and moment (n, 3)."""
 
     scene: Scene
     time: Array
@@ -110,7 +110,7 @@ def current_places(box: Solid, floater: Array) -> Array:
 
 
 def frame_times(scene: Scene, duration: float) -> Array:
-    """Instants of the frames, s: three turns at the flight's beginning, its middle and its end."""
+    """Instants of the frames, s: three turns at the trajectory's beginning, its middle and its end."""
     shown = TURNS / scene.frequency if scene.frequency else duration
     steps = np.arange(TURNS * FRAMES) / (TURNS * FRAMES) * min(shown, duration)
     begins = [0.0, (duration - shown) / 2, duration - shown] if duration > 3 * shown else [0.0]

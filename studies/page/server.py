@@ -1,6 +1,6 @@
 """The server of the pages: on this machine alone, unless one says otherwise, and for those with the token.
 
-A page is a file with its program, and a line (WebSocket) over which it is told what to show. Whatever else is asked for
+A page is a file with its program, and a line (WebSocket) over which it gets what to show. Whatever else is asked for
 is not there.
 """
 

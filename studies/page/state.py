@@ -34,7 +34,7 @@ SIZES = {"edge_mm": "edge (mm)", "diameter_mm": "diameter (mm)", "height_mm": "h
 
 @dataclass(frozen=True, eq=False)
 class PageState:
-    """All that decides what a page shows, but for the flight."""
+    """All that decides what a page shows, but for the trajectory."""
 
     scene: Scene
     model: FieldModel = "dipole"  # of the field
@@ -125,7 +125,7 @@ class PageState:
 
 
 def first_state(scene: Scene, source: str = "scene") -> PageState:
-    """Where a page begins: everything by what can be told at once, the plate as an infinite slab if that can be."""
+    """Where a page begins: everything by what takes no time, the plate as an infinite slab if that can be."""
     model: FieldModel = "map" if scene.field_map else "dipole"
     felt = scene.plate is not None and scene.floater.body is None
     return PageState(scene, model, "slab" if felt else "none", source=source)

@@ -52,7 +52,7 @@ FILES = {
 class Shown:
     """The numbers of a scene by some models."""
 
-    headline: str  # where the floater floats and whether it stays there
+    headline: str  # where the floater levitates and whether it remains there
     rows: list[tuple[str, ...]]  # of the table of equilibria, the head first; as the command line prints them
     modes: list[tuple[str, ...]]  # of the eigenvalues of the first equilibrium, the head first
     sign: str  # by which models
@@ -72,7 +72,7 @@ def become(state: PageState, method: str, arguments: tuple[Any, ...]) -> tuple[P
 
 
 def preview(state: PageState) -> Shown:
-    """All equilibria by what can be told while a slider moves: the point dipole without the plate's currents."""
+    """All equilibria by what can be computed while a slider moves: the point dipole without the plate's currents."""
     models = Models("map" if state.model == "map" else "dipole", "none")
     levitation = Levitation(state.scene, models, state.spin)
     # Not from the cache, which would get a file for every step of a slider.
@@ -127,7 +127,7 @@ def has_map(state: PageState) -> bool:
 
 
 def map_key(state: PageState) -> str:
-    """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
+    """All that a map depends on: neither its own axes, nor the plate, nor where a trajectory begins."""
     whole = canonical_keys(state.scene)
     keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
     open_ones = ("displacement_mm", "angle_deg")
@@ -158,20 +158,20 @@ def regions(
 
 
 Frame: TypeAlias = "dict[str, Any]"
-"""A moment of a flight: `samples` (3, n) since the last, time s, height mm and polar angle °; the floater's `pose`, its
-position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's `angle`,
-rad; how the flight has `ended`, in words; a `message` of what was wrong with a wish."""
+"""A moment of a trajectory: `samples` (3, n) since the last, time s, height mm, polar angle °; the floater's `pose`,
+its position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's
+`angle`, rad; how the trajectory has `ended`, in words; a `message` of what was wrong with a wish."""
 _flights: list[LiveFlight] = []  # The one of this process
 
 
 def begin_flight(state: PageState) -> Frame:
-    """The first frame of a flight."""
+    """The first frame of a trajectory."""
     _flights[:] = [Levitation(state.scene, state.models, state.spin).live_flight()]
     return _frame()
 
 
 def fly(seconds: float) -> Frame:
-    """The flight, so much later."""
+    """The trajectory, so much later."""
     try:
         return _frame(_flights[0].onward(seconds))
     except SpinlevError as error:
@@ -179,7 +179,7 @@ def fly(seconds: float) -> Frame:
 
 
 def wish(what: str, vector: list[float]) -> Frame:
-    """The flight after its floater got a "push", m/s, or was "put" elsewhere, m."""
+    """The trajectory after its floater got a "push", m/s, or was "put" elsewhere, m."""
     try:
         getattr(_flights[0], what)(np.array(vector))
     except SpinlevError as error:
@@ -189,7 +189,7 @@ def wish(what: str, vector: list[float]) -> Frame:
 
 def _frame(piece: Piece | None = None) -> Frame:
     flight = _flights[0]
-    if piece is None:  # nothing was flown
+    if piece is None:  # nothing was simulated
         lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
         turned = flight.scene.angular_velocity * flight.time
         piece = Piece(np.array([flight.time]), lab, turned, flight.ended_by)

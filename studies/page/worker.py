@@ -40,7 +40,7 @@ def context() -> ForkServerContext:
 
 
 def _prepared(known: Callable[[str], dict[str, Any]], name: str) -> dict[str, Any]:
-    """What a process is told as it begins: not to run the user's script once more, which may have no guard, if ours."""
+    """Set as a process begins: not to run the user's script once more, which may have no guard, if ours."""
     return {key: value for key, value in known(name).items() if name != NAME or not key.startswith("init_main")}
 
 
@@ -50,7 +50,7 @@ class Worker:
     Parameters
     ----------
     words, seconds : what the work is, and after how long it is cut off; what takes longer is for the command line
-    failed : is told in a sentence why there is no answer
+    failed : called with a sentence that says why there is no answer
     patience : by how much others go first; such a process ends, with its memory, when no question waits
     """
 
@@ -127,7 +127,7 @@ class Worker:
         if self.process is None:
             self._connection, other = context().Pipe()
             process = context().Process(target=_serve, name=NAME, args=(other, self.patience), daemon=True)
-            # Not here: a signal stops this thread anywhere, and a process that is not told its task says so at length.
+            # Not here: a signal stops this thread anywhere, and a process that gets no task says so at length.
             begun = asyncio.get_running_loop().run_in_executor(None, process.start)
             try:
                 await asyncio.shield(begun)
@@ -152,7 +152,7 @@ class Worker:
 
 
 def _stopped(task: asyncio.Task[None]) -> None:
-    """A signal that stops the program may come while a task runs, whose fault it is not: nothing is told of it then."""
+    """A signal that stops the program may come while a task runs, whose fault it is not: no message then."""
     error = None if task.cancelled() else task.exception()
     if error is not None and not isinstance(error, KeyboardInterrupt):
         raise error
