@@ -133,7 +133,7 @@ def _say(reason: str) -> None:
     LOG.info("Compiled code is neither read nor kept, which costs seconds: %s.", reason)
 
 
-def _content(asked: object) -> bytes:
+def _content(requested: object) -> bytes:
     """What is asked for, all its expressions as one: what they share is written once, not in each."""
     import heyoka as hy
 
@@ -146,7 +146,7 @@ def _content(asked: object) -> bytes:
             expressions.append(thing)
             return len(expressions)
 
-    Writer(stream := io.BytesIO()).dump(asked)
+    Writer(stream := io.BytesIO()).dump(requested)
     return stream.getvalue() + pickle.dumps(hy.dfun("asked", expressions))
 
 

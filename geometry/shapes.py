@@ -44,10 +44,12 @@ METRES = {"units": "m"}  # of a field of a dataclass
 
 
 def at_origin() -> Array:
+    """(3,) m: the centre of a body that is given no other."""
     return np.zeros(3)
 
 
 def unturned() -> Array:
+    """(3, 3): the rotation of a body whose axes are the frame's."""
     return np.eye(3)
 
 

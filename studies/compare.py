@@ -66,10 +66,10 @@ class Compared:
         }
 
 
-def compared(scene: Scene, asked: Models, spin: float = 0.0) -> list[Compared]:
+def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compared]:
     """A `scene` by dipole, dipole of the true moment, closed form, finite elements, and with mutual magnetisation.
 
-    The plate's model and the tolerances are those `asked` for; a scene with a field map has that in the place of the
+    The plate's model and the tolerances are those `requested`; a scene with a field map has that in the place of the
     finite elements. What mutual magnetisation cannot be computed for is left out with a message.
 
     Raises
@@ -77,7 +77,7 @@ def compared(scene: Scene, asked: Models, spin: float = 0.0) -> list[Compared]:
     EquilibriumError : the rotor is at rest
     """
     best: FieldModel = "map" if scene.field_map else "fem"
-    alone = replace(asked, model=best, interaction="rigid")
+    alone = replace(requested, model=best, interaction="rigid")
     finest = Levitation(scene, alone, spin)
     rough = replace(alone, model="dipole")
     made = [
@@ -99,7 +99,7 @@ def compared(scene: Scene, asked: Models, spin: float = 0.0) -> list[Compared]:
             levitation.plate = None
             if (best_plate := found[0].levitation.plate) is not None:  # all have one network of its currents
                 model, edges, region = best_plate.model, best_plate.neglected, best_plate.table.region
-                plan = PlatePlan(model, edges, asked.plate_rtol, region)
+                plan = PlatePlan(model, edges, requested.plate_rtol, region)
                 levitation.plate = levitation.plate_about(np.zeros(3), plan)
         chosen = _nearest(worth_a_row(levitation.equilibria), found[0].found if found else None)
         found.append(_with_branch(Compared(name, levitation, chosen)))
@@ -264,9 +264,9 @@ def compare_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def compare_job(scene: Scene, asked: Models, spin: float, frequencies: Array | None, out: Path) -> Answer:
+def compare_job(scene: Scene, requested: Models, spin: float, frequencies: Array | None, out: Path) -> Answer:
     """Every model's results for a `scene`; writes compare.nc, compare.json and the figure to `out`."""
-    rows = compared(scene, asked, spin)
+    rows = compared(scene, requested, spin)
     best = rows[-1]
     result = compared_dataset(rows, frequencies)
     values: dict[str, Any] = {

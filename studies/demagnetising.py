@@ -129,9 +129,9 @@ def working_point_lines(answer: Mapping[str, Any]) -> list[str]:
             continue
         margin, share = one["lowest_mu0H_T"] - one["knee_mu0H_T"], one["share_below_knee"]
         safe = margin > one["error_T"] and share <= one["share_error"]
-        told = "it keeps its polarisation" if safe else f"{100 * share:.2g} % of its volume is beyond the knee"
+        state = "it keeps its polarisation" if safe else f"{100 * share:.2g} % of its volume is beyond the knee"
         side = "above" if margin > 0 else "below"
-        lines.append(f"{text}, {abs(margin):.3f} T {side} its knee of {one['knee_mu0H_T']:.3f} T: {told}.")
+        lines.append(f"{text}, {abs(margin):.3f} T {side} its knee of {one['knee_mu0H_T']:.3f} T: {state}.")
     return lines
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..dynamics.equilibria.equilibrium import Equilibrium
-from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_answers
-from ..dynamics.motion.effects import NOTHING_ANSWERS
+from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_mutual
+from ..dynamics.motion.effects import NOTHING_PERMEABLE
 from ..dynamics.motion.floater_effects import (
     FLOATER_CURRENTS,
     REAL_AIR,
@@ -68,14 +68,14 @@ def effects_summary(levitation: Levitation, effects: Sequence[ListedEffect]) -> 
     return {
         "interaction": levitation.interaction_model,
         "effects": [vars(effect) for effect in effects],
-        "not_modelled": missing + [f"{e}." for e in effects if not e.included and e.why != NOTHING_ANSWERS],
+        "not_modelled": missing + [f"{e}." for e in effects if not e.included and e.why != NOTHING_PERMEABLE],
     }
 
 
 def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     (answers, why), shift = levitation.answers, None
-    if first is not None and why != NOTHING_ANSWERS and levitation.scene.floater.body is None:
-        shift = 1e3 * shift_by_answers(levitation.scene, levitation.table, first, answers)
+    if first is not None and why != NOTHING_PERMEABLE and levitation.scene.floater.body is None:
+        shift = 1e3 * shift_by_mutual(levitation.scene, levitation.table, first, answers)
     return ListedEffect(MUTUAL, answers is not None, shift, None, why)
 
 

@@ -93,8 +93,8 @@ CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0
 AIR, ROTOR, FLOATER, PLATE = range(4)
 
 
-def export_job(scene: Scene, asked: Models, path: Path) -> Answer:
-    """Write B (T), H and M (A/m), J (A/m²) and the body's number of a `scene` with `asked` models to `path`.
+def export_job(scene: Scene, requested: Models, path: Path) -> Answer:
+    """Write B (T), H and M (A/m), J (A/m²) and the body's number of a `scene` with `requested` models to `path`.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def export_job(scene: Scene, asked: Models, path: Path) -> Answer:
     """
     if path.suffix != ".vtu":
         raise InputError(f"Input OUT must end in .vtu; instead received {path}.")
-    levitation = Levitation(scene, asked)
+    levitation = Levitation(scene, requested)
     state = _floater_state(levitation)
     corners = [magnet.box.corners for magnet in scene.rotor]
     if state is not None:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics.flights.batch import ensemble as flown
+from ..dynamics.flights.batch import ensemble as simulated
 from ..dynamics.motion.plate import PlateMemory
 from ..fem.cache import owned
 from ..fem.rotor.near_field import NEAR_RTOL, complete
@@ -23,12 +23,12 @@ from .catalogue.entries import CATALOGUE
 from .catalogue.runner import figures_of, question_study
 from .cli.console import missing_extra
 from .cli.options import (
-    Asked,
     FieldModel,
     InteractionModel,
     Models,
     PlateModel,
     Quantity,
+    Requested,
     Workers,
     check_steps,
     checked_values,
@@ -64,7 +64,7 @@ def equilibria(
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
     progress: bool = False,
-    **asked: Unpack[Asked],
+    **requested: Unpack[Requested],
 ) -> xr.Dataset:
     """All synchronous equilibria, the stable ones first, with errors, growth rate and frequency of each mode.
 
@@ -79,7 +79,7 @@ def equilibria(
     EquilibriumError
         The rotor is at rest and the floater does not spin about its moment.
     """
-    levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
+    levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
     found = Result(levitation, levitation.survey).dataset()
     return found.assign_attrs(study="equilibria", scene=scene_text(levitation.scene))
 
@@ -127,8 +127,8 @@ def compare(
     grid = None if frequencies is None else np.array(checked_values({"frequencies": frequencies})["frequencies"])
     if grid is not None and grid.min() <= 0:
         raise InputError(f"Input frequencies must be positive; instead received {grid.min():g}.")
-    asked = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
-    return compared_dataset(compared(given_scene(scene), asked, spin), grid)
+    requested = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
+    return compared_dataset(compared(given_scene(scene), requested, spin), grid)
 
 
 @documented
@@ -138,7 +138,7 @@ def stability(
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
     progress: bool = False,
-    **asked: Unpack[Asked],
+    **requested: Unpack[Requested],
 ) -> xr.Dataset:
     """The five modes of the equilibrium at which a trajectory begins, the nearest stable one if there is one.
 
@@ -154,7 +154,7 @@ def stability(
     EquilibriumError
         There is no equilibrium to begin at.
     """
-    levitation = Levitation(scene, Models(model, plate_model, **asked), spin)
+    levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
     found = found_dataset((levitation.stability,)).isel(equilibrium=0, drop=True).drop_vars("number")
     return found.assign_attrs(study="stability", scene=scene_text(levitation.scene), **levitation.labels)
 
@@ -166,7 +166,7 @@ def simulate(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     progress: bool = False,
-    **asked: Unpack[Asked],
+    **requested: Unpack[Requested],
 ) -> xr.Dataset:
     """Trajectory of the floater from where the scene says.
 
@@ -185,9 +185,9 @@ def simulate(
     EquilibriumError
         The scene starts from an equilibrium and has none.
     """
-    levitation = Levitation(scene, Models(model, plate_model, **asked))
-    flown = Result(levitation, flight=levitation.flight(duration)).dataset()
-    return flown.assign_attrs(scene=scene_text(levitation.scene))
+    levitation = Levitation(scene, Models(model, plate_model, **requested))
+    simulated = Result(levitation, flight=levitation.flight(duration)).dataset()
+    return simulated.assign_attrs(scene=scene_text(levitation.scene))
 
 
 @documented
@@ -263,7 +263,7 @@ def plate_table(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     progress: bool = False,
-    **asked: Unpack[Asked],
+    **requested: Unpack[Requested],
 ) -> PlateMemory | None:
     """The plate's currents around the place where the floater levitates.
 
@@ -273,7 +273,7 @@ def plate_table(
         Its `table` holds the network, `share` what the rotor drives, `error` the estimated relative error; None where
         no currents are modelled.
     """
-    return Levitation(scene, Models(model, plate_model, **asked)).plate
+    return Levitation(scene, Models(model, plate_model, **requested)).plate
 
 
 @documented
@@ -372,8 +372,8 @@ def ensemble(
     else:
         begun, drawn = drawn_starts(levitation, n, seed, spread or {}), {"seed": seed, "spread": repr(spread)}
     together = min(TOGETHER, -(-len(begun.position) // number))
-    asked = levitation.scene, levitation.interaction, begun, duration
-    found = flown(*asked, map if number == 1 else mapped(number), together)
+    requested = levitation.scene, levitation.interaction, begun, duration
+    found = simulated(*requested, map if number == 1 else mapped(number), together)
     last = found.last.to_lab(levitation.scene.angular_velocity * found.levitated_s)
     data = {
         "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),
@@ -403,7 +403,7 @@ def sweep(
     scheduler: str | None = None,
     out: str | Path = "out",
     progress: bool = False,
-    **asked: Unpack[Asked],
+    **requested: Unpack[Requested],
 ) -> xr.Dataset:
     """Any quantity of a scene over a grid of its parameters; each key becomes a dimension, `_` for its dots.
 
@@ -434,7 +434,7 @@ def sweep(
         No point could be computed.
     """
     loaded = given_scene(scene)
-    models = Models(model, plate_model, **asked).checked()
+    models = Models(model, plate_model, **requested).checked()
     where = tuple(finite("place", coordinate) for coordinate in place)
     if len(where) != 3:
         raise InputError(f"Input place must be three numbers, m; instead received {place!r}.")

@@ -84,7 +84,7 @@ class Levitation:
         self.wider: PlateMemory | None = None
         self.no_wider = ""  # why they could not be known, if so
         self._nearest: Array | None = None  # to the plate, of a trajectory that had begun without its currents
-        self.flown: dict[float, Trajectory] = {}  # by duration, s: those simulated together with others
+        self.simulated: dict[float, Trajectory] = {}  # by duration, s: those simulated together with others
         self._ahead = 0.0  # duration of the trajectory that is asked for, s
 
     # Sharing with other scenes
@@ -311,15 +311,15 @@ class Levitation:
         assert self.scene.plate is not None
         radius, frequency = self.scene.floater.radius, self.scene.frequency
         field = sources(self.table), place, radius, frequency
-        asked = plate_around(self.scene.plate, plan.model, *field, plan.rtol, plan.region)
+        requested = plate_around(self.scene.plate, plan.model, *field, plan.rtol, plan.region)
 
         def make(watch: Watch) -> tuple[tuple[PlateTable, RotorShare], bool]:
-            made, share, found = asked.made(note, watch)
+            made, share, found = requested.made(note, watch)
             detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
             return (made, share), found
 
-        made, share = self._tables.table(asked.key, "plate", "Eddy currents in the plate", make)
-        return PlateMemory(asked.plate, made, share, plan.model, plan.edges)
+        made, share = self._tables.table(requested.key, "plate", "Eddy currents in the plate", make)
+        return PlateMemory(requested.plate, made, share, plan.model, plan.edges)
 
     def _foreseen(self) -> PlateMemory | None:
         """An infinite slab for where a trajectory goes at first, if that is far, and what it misses without edges.
@@ -331,7 +331,7 @@ class Levitation:
         note("Trajectory over an infinite slab ...")
         slab = self.elsewhere(replace(self.models, plate_model="slab"))
         try:
-            flown = slab.flight(min(self._ahead, AHEAD))
+            simulated = slab.flight(min(self._ahead, AHEAD))
         except FlightStopped:
             raise KeyboardInterrupt from None  # it is not the simulation that was stopped
         except SpinlevError:
@@ -339,7 +339,7 @@ class Levitation:
         found = slab.wider
         if found is None:
             return None
-        way = _seen(found.plate, flown, PLACES)
+        way = _seen(found.plate, simulated, PLACES)
         worst = way[int(np.argmax([edge_error(found.plate, place) for place in way]))]
         rotor = np.mean([magnet.box.center for magnet in self.scene.rotor], axis=0)
         edges = cached_edge_error(found.plate, np.array([worst, rotor]), self.scene.frequency, note)
@@ -404,8 +404,8 @@ class Levitation:
         FlightStopped : the user stopped it; the error holds what was simulated
         """
         positive("duration", duration)
-        if duration in self.flown:
-            return self.flown[duration]
+        if duration in self.simulated:
+            return self.simulated[duration]
         self._ahead = duration
         kept = checkpoint.read() if checkpoint else None
         if kept is not None and self.plate is not None:
@@ -416,21 +416,23 @@ class Levitation:
             table, plate, known = self._with_effects(self.flight_table), self.flight_plate, self._known_for_flight
             note("Motion ...")
             with progress("Motion") as bar:
-                flown = simulate(self.scene, table, duration, known, progress=bar, memory=plate, checkpoint=checkpoint)
-            if flown.left_plate_table:
-                again = self._followed(flown.lab.position[-1], flown.levitated_s)
+                simulated = simulate(
+                    self.scene, table, duration, known, progress=bar, memory=plate, checkpoint=checkpoint
+                )
+            if simulated.left_plate_table:
+                again = self._followed(simulated.lab.position[-1], simulated.levitated_s)
             else:
-                again = self._plate_matters(flown)
+                again = self._plate_matters(simulated)
             if not again:
                 break
             if checkpoint:
                 checkpoint.remove()
         memory, place = self.wider, self._flight_place
         if memory is not None and place is not None and memory.neglected:  # a slab's missing edges, for where it went
-            there = max(edge_error(memory.plate, seen) for seen in _seen(memory.plate, flown, PLACES))
+            there = max(edge_error(memory.plate, seen) for seen in _seen(memory.plate, simulated, PLACES))
             there /= edge_error(memory.plate, place)
             self.wider = replace(memory, neglected=min(1.0, memory.neglected * max(1.0, there)))
-        return flown
+        return simulated
 
     def live_flight(self) -> LiveFlight:
         """A live simulation, from where the scene says. Raises what `flight` raises."""
@@ -459,12 +461,12 @@ class Levitation:
             return False
         return True
 
-    def _plate_matters(self, flown: Trajectory) -> bool:
+    def _plate_matters(self, simulated: Trajectory) -> bool:
         """Include a plate that was neglected at the start if it matters on the way; False if it does not."""
         plate = self.scene.plate
         if plate is None or self.plate is not None or self.models.plate_model != "auto" or self._nearest is not None:
             return False
-        way = _seen(plate, flown)
+        way = _seen(plate, simulated)
         self._nearest = way[int(np.argmin(plate.body.distance(way)))]
         if plate_plan(self.scene, self.models, self._nearest).model == "none":
             return False
@@ -484,10 +486,10 @@ class Levitation:
             self.wider = self.plate_about(place, replace(plan, rtol=looser(plan.rtol)))
 
 
-def _seen(plate: Plate, flown: Trajectory, most: int | None = None) -> Array:
+def _seen(plate: Plate, simulated: Trajectory, most: int | None = None) -> Array:
     """Places (n, 3) m of a trajectory, `most` or some more, as the plate at its start would see them."""
-    height = plate_depth(plate, flown.time)  # the plate may be lowered
-    places = flown.lab.position + np.column_stack([np.zeros((len(height), 2)), height])
+    height = plate_depth(plate, simulated.time)  # the plate may be lowered
+    places = simulated.lab.position + np.column_stack([np.zeros((len(height), 2)), height])
     return np.asarray(places[:: max(1, len(places) // most) if most else 1])
 
 

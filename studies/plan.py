@@ -61,7 +61,7 @@ class SharedTables:
     def table(self, key: str, name: str, title: str, make: Callable[[Watch], tuple[Made, bool]]) -> Made:
         """A table under its `key`, reported by `title`; `make` says whether it was cached, as which `name` is noted."""
 
-        def told() -> Made:
+        def announced() -> Made:
             note(f"{title} ...")
             begun = perf_counter()
             with stages(title) as watch:
@@ -71,7 +71,7 @@ class SharedTables:
                 self.from_cache.append(name)
             return made
 
-        return self.once(key, told)
+        return self.once(key, announced)
 
 
 def given_scene(scene: SceneLike) -> Scene:

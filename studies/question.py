@@ -15,7 +15,7 @@ import xarray as xr
 from ..dynamics.continuation.map import surveys
 from ..dynamics.continuation.rotor_family import rotor_family
 from ..dynamics.flights.balls import is_long
-from ..dynamics.flights.batch import fly_together
+from ..dynamics.flights.batch import simulate_together
 from ..dynamics.flights.flight import initial_state
 from ..fem.rotor.table import canonical
 from ..geometry.common import Array, InputError, SpinlevError
@@ -72,7 +72,7 @@ def _find_together(members: Sequence[tuple[Levitation, str, float, tuple[int, ..
             one.adopt(survey, searched)
 
 
-def _fly_together(levitations: Sequence[Levitation], duration: float) -> None:
+def _simulate_together(levitations: Sequence[Levitation], duration: float) -> None:
     """Simulate `duration` (s) of motion in SIMD batches of scenes with one field.
 
     Over a plate whose currents may be modelled, and in a field so short that balls do not pay, each is simulated alone.
@@ -92,10 +92,10 @@ def _fly_together(levitations: Sequence[Levitation], duration: float) -> None:
                 ready.append((one, initial_state(one.scene, one.interaction, known)[0]))
         with suppress(SpinlevError):
             starts = [start for _, start in ready]
-            flown = fly_together([one.scene for one, _ in ready], alike[0].interaction, starts, duration)
-            for (one, _), flight in zip(ready, flown, strict=True):
+            simulated = simulate_together([one.scene for one, _ in ready], alike[0].interaction, starts, duration)
+            for (one, _), flight in zip(ready, simulated, strict=True):
                 if flight is not None:
-                    one.flown[duration] = flight
+                    one.simulated[duration] = flight
 
 
 CHOICES = (*NAMES, "spin")  # what can be varied beside the keys of the scene file
@@ -125,8 +125,8 @@ class Question:
     @property
     def settings(self) -> Point:
         """All that decides the answers, in types that JSON knows: not how the scene's file is called."""
-        asked = vars(self) | {"scene": scene_digest(self.scene), "models": asdict(self.models)}
-        return {key: value for key, value in asked.items() if key != "source"}
+        requested = vars(self) | {"scene": scene_digest(self.scene), "models": asdict(self.models)}
+        return {key: value for key, value in requested.items() if key != "source"}
 
     def levitation(self, point: Point) -> Levitation:
         """The scene of a point with the models of a point. Raises SceneError, and InputError for an unknown model."""
@@ -154,10 +154,10 @@ class Question:
                 made.append(one)
                 one.share(first.setdefault(one.equations_key, one))
                 # Trajectories begin at equilibria, or have a plate whose table is made about one.
-                asked = self.ask == "equilibria" or (
+                requested = self.ask == "equilibria" or (
                     self.ask == "flight" and (one.scene.plate is not None or not one.absolute)
                 )
-                if asked and one.scene.frequency and one.scene.floater.body is None:
+                if requested and one.scene.frequency and one.scene.floater.body is None:
                     key, *family = _family(one)
                     place = tuple(axis.index(point[name]) for name, axis in axes.items())
                     families.setdefault(key, []).append((one, *family, place))
@@ -166,7 +166,7 @@ class Question:
                 with suppress(SpinlevError):
                     _find_together(members)
         if self.ask == "flight":
-            _fly_together(made, self.duration)
+            _simulate_together(made, self.duration)
         return jobs
 
     def batches(self, points: Mapping[int, Point]) -> list[list[int]]:
@@ -202,8 +202,8 @@ class Question:
         joined = joined.rename(names)
         for key, name in names.items():
             joined[name].attrs |= label_of_key(key)
-        asked = {f"asked_{name}": value for name, value in asdict(self.models).items()}
-        return joined.assign_attrs(scene=scene_text(self.scene), ask=self.ask, varied=list(names.values()), **asked)
+        requested = {f"asked_{name}": value for name, value in asdict(self.models).items()}
+        return joined.assign_attrs(scene=scene_text(self.scene), ask=self.ask, varied=list(names.values()), **requested)
 
 
 def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:

@@ -291,10 +291,10 @@ def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset
     """Equilibria of all models in one list; names begin with `equilibrium_`."""
     every = [(model, equilibrium) for model, equilibria in found.items() for equilibrium in equilibria]
     rows = found_dataset([equilibrium for _, equilibrium in every]).drop_vars(["number", "equilibrium"])
-    felt = np.array([e.currents is not None for _, e in every], bool)
+    acting = np.array([e.currents is not None for _, e in every], bool)
     return rows.rename({name: f"equilibrium_{name}" for name in rows.data_vars}).assign(
         equilibrium_model=(("equilibrium",), np.array([model for model, _ in every], dtype=object).astype(str)),
-        equilibrium_with_plate=variable(("equilibrium",), felt, "1", "whether the plate's currents act"),
+        equilibrium_with_plate=variable(("equilibrium",), acting, "1", "whether the plate's currents act"),
     )
 
 

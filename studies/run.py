@@ -38,18 +38,18 @@ from .figures.style import save_figures
 from .levitation import Levitation
 from .plan import sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
-from .words import flight_words, headline, left_out_words, tell_details
+from .words import flight_words, headline, left_out_words, note_details
 
 MODELS = ("dipole", "cuboid", "fem")
 SHOWN = 20  # points whose field is printed, at most
 DEEPEST = 0.05  # the field figure reaches this far below the rotor's origin, m
 
 
-def field_job(scene: Scene, points: Array, asked: Models, out: Path) -> Answer:
-    """B and its gradient of a `scene` at `points` (n, 3) m by `asked` models; writes field.csv to `out`."""
-    levitation = Levitation(scene, asked)
+def field_job(scene: Scene, points: Array, requested: Models, out: Path) -> Answer:
+    """B and its gradient of a `scene` at `points` (n, 3) m by `requested` models; writes field.csv to `out`."""
+    levitation = Levitation(scene, requested)
     table = levitation.table
-    known = complete(table, max(asked.rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
+    known = complete(table, max(requested.rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
     values = _field(known, points)
     b, gradient, error = values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"]
     slopes = (f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz")
@@ -170,28 +170,28 @@ def response(
     return model, tensor, edge_error(plate, place), []
 
 
-def equilibria_job(scene: Scene, asked: Models, spin: float, out: Path) -> Answer:
-    """All equilibria of a `scene` with body `spin` by `asked` models, with stability; writes to `out`."""
-    levitation = Levitation(scene, asked, spin)
+def equilibria_job(scene: Scene, requested: Models, spin: float, out: Path) -> Answer:
+    """All equilibria of a `scene` with body `spin` by `requested` models, with stability; writes to `out`."""
+    levitation = Levitation(scene, requested, spin)
     result = Result(levitation, levitation.survey)
     values = {**result.summary, "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
     return values, result.text()
 
 
-def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume: bool) -> Answer:
-    """Trajectory of a `scene` for `duration` (s) by `asked` models; writes trajectory.nc and its figure to `out`.
+def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, resume: bool) -> Answer:
+    """Trajectory of a `scene` for `duration` (s) by `requested` models; writes trajectory.nc and its figure to `out`.
 
     A checkpoint is kept while it lasts; `resume` goes on from there.
     """
-    asked_of = {"scene": scene_digest(scene), "duration_s": duration, **vars(asked)}
-    identity = to_json({**asked_of, "program": program_digest()})
+    request = {"scene": scene_digest(scene), "duration_s": duration, **vars(requested)}
+    identity = to_json({**request, "program": program_digest()})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)
     if not resume:
         checkpoint.remove()
     elif checkpoint.read() is None:
         note(f"No checkpoint in {out}: the trajectory begins at t = 0.")
-    levitation = Levitation(scene, asked)
+    levitation = Levitation(scene, requested)
     if isinstance(scene.start, OffsetStart):
         for line in left_out_words(levitation, levitation.survey.unknown):
             note(line)
@@ -202,33 +202,33 @@ def simulate_job(scene: Scene, asked: Models, duration: float, out: Path, resume
 
     def kept(flight: Trajectory) -> Result:
         result = Result(levitation, flight=flight)
-        flown = result.dataset().assign_attrs(headline=flight_words(levitation, flight))
-        write_dataset(flown, path, scene)
-        save_figures({"trajectory": trajectory_figure(flown)}, out)
+        simulated = result.dataset().assign_attrs(headline=flight_words(levitation, flight))
+        write_dataset(simulated, path, scene)
+        save_figures({"trajectory": trajectory_figure(simulated)}, out)
         return result
 
     try:
         flight = levitation.flight(duration, checkpoint)
     except FlightStopped as stop:
-        kept(stop.flown)
+        kept(stop.simulated)
         note(f"{stop} It is in {path}; --resume goes on from there.")
         raise
     result = kept(flight)
     checkpoint.remove()
-    tell_details(flight)
+    note_details(flight)
     values = {**result.summary, "trajectory": str(path), "tables_from_cache": levitation.from_cache}
     return values, [*result.text(), f"Trajectory in {path}, figure in {out / 'trajectory.png'}"]
 
 
-def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Path) -> Answer:
-    """Compute everything of a `scene` by `asked` models for a body `spin` and a trajectory of `duration` (s).
+def main_job(scene: Scene, requested: Models, spin: float, duration: float, out: Path) -> Answer:
+    """Compute everything of a `scene` by `requested` models for a body `spin` and a trajectory of `duration` (s).
 
     Writes result.nc, summary.json and the figures to `out`.
 
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
     curves, a trajectory that the user stops its beginning; then the error goes on to the caller.
     """
-    levitation = Levitation(scene, asked, spin)
+    levitation = Levitation(scene, requested, spin)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
     chosen = levitation.table.model
     failure: EquilibriumError | FlightStopped | None = None
@@ -255,11 +255,11 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         try:
             flight = levitation.flight(duration)
             result = replace(result, flight=flight)
-            tell_details(flight)
+            note_details(flight)
         except EquilibriumError as error:
             failure = error
         except FlightStopped as stop:
-            flight = (failure := stop).flown
+            flight = (failure := stop).simulated
     values: dict[str, Any] = {
         "headline": result.failed or headline(levitation, survey.equilibria, survey.left_out),
         **result.summary,
@@ -268,9 +268,9 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
     }
     lines = result.text()
     if any(magnet.coercivity is not None and magnet.polarization.any() for magnet in scene.rotor):
-        worked, told, _ = write_working_point(levitation, out)
+        worked, sentences, _ = write_working_point(levitation, out)
         values |= worked
-        lines += told
+        lines += sentences
     if failure:
         values["failed"] = str(failure)
         lines += [] if str(failure) in lines else [str(failure)]
@@ -278,8 +278,8 @@ def main_job(scene: Scene, asked: Models, spin: float, duration: float, out: Pat
         levitation.labels, body_spin=spin, left_out=left_out_text(survey.left_out)
     )
     if flight:
-        flown = Result(levitation, flight=flight).dataset().assign_attrs(study="run")
-        dataset = xr.merge([dataset, flown], combine_attrs="no_conflicts")
+        simulated = Result(levitation, flight=flight).dataset().assign_attrs(study="run")
+        dataset = xr.merge([dataset, simulated], combine_attrs="no_conflicts")
     _write(levitation, dataset, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
         raise failure

@@ -112,9 +112,9 @@ class Journal:
         # what computes a study's points: the program without the rooms that draw and say, and its own file
         own = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
         computing = f"{program_digest(*SHOWING)} {own}"
-        asked = {"study": study.name, "settings": study.settings, "points": points, "program": computing}
+        requested = {"study": study.name, "settings": study.settings, "points": points, "program": computing}
         self.folder = out / f"{study.name}.points"
-        self._sweep = hashlib.sha256(to_json(asked).encode()).hexdigest()[:16]
+        self._sweep = hashlib.sha256(to_json(requested).encode()).hexdigest()[:16]
 
     def files(self) -> list[Path]:
         """Those of this sweep."""
@@ -212,13 +212,13 @@ def attempts(
     compute, prepared : of the study
     missing, points : the numbers that are wanted, and points by number
     """
-    asked = list(points.values())
-    jobs: Sequence[Callable[[], xr.Dataset]] = [partial(compute, point) for point in asked]
-    if prepared is not None and len(asked) > 1:
+    requested = list(points.values())
+    jobs: Sequence[Callable[[], xr.Dataset]] = [partial(compute, point) for point in requested]
+    if prepared is not None and len(requested) > 1:
         try:
-            jobs = prepared(asked)
+            jobs = prepared(requested)
         except Exception as error:  # each for itself then, so that the others go on
-            note(f"{len(asked)} points cannot help each other: {type(error).__name__}: {error}")
+            note(f"{len(requested)} points cannot help each other: {type(error).__name__}: {error}")
     for k, job in zip(points, jobs, strict=True):
         if k in missing:
             try:
@@ -286,9 +286,9 @@ def _on_scheduler(
             yield from ((batch, attempt) for attempt in found or ())
 
 
-def answered(asked_by: str, job: Any, batch: Batch) -> list[Attempt] | None:
-    """The attempts of a worker at a `batch` by `job`; None where its program is not `asked_by`, the asking one's."""
-    return list(job(batch)) if program() == asked_by else None
+def answered(requesting: str, job: Any, batch: Batch) -> list[Attempt] | None:
+    """The attempts of a worker at a `batch` by `job`; None where its program is not `requesting`, the asking one's."""
+    return list(job(batch)) if program() == requesting else None
 
 
 def _workers_of_us(client: Client, address: str) -> list[str]:
@@ -296,9 +296,9 @@ def _workers_of_us(client: Client, address: str) -> list[str]:
 
     Raises InputError where there are workers, but no such.
     """
-    told = client.run(program, on_error="return")
-    of_us = [worker for worker, answer in told.items() if answer == program()]
-    others = sorted(set(told) - set(of_us))
+    versions = client.run(program, on_error="return")
+    of_us = [worker for worker, answer in versions.items() if answer == program()]
+    others = sorted(set(versions) - set(of_us))
     if others and not of_us:
         raise InputError(
             f"Input --scheduler must have workers of this version of the program; instead those of {address} "
@@ -306,7 +306,7 @@ def _workers_of_us(client: Client, address: str) -> list[str]:
             "spinlev and of its libraries there, or choose --workers."
         )
     if others:
-        note(f"{len(others)} of {len(told)} workers are of another version of the program and are not used.")
+        note(f"{len(others)} of {len(versions)} workers are of another version of the program and are not used.")
     return of_us
 
 

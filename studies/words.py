@@ -95,8 +95,8 @@ def _place(equilibrium: Equilibrium) -> str:
     angle = f"polar angle {_polar_angle(equilibrium, 1, '°')}"
     offset = equilibrium.lateral_offset / MILLI
     if math.hypot(*equilibrium.laboratory_position[:2]) / MILLI > max(offset / 2, FINEST):  # it stays on one side
-        aside = bracketed(offset, max(error, FINEST))
-        return f"{distance} mm along the axis from the rotor's centre, lateral offset {aside} mm, {angle}"
+        lateral = bracketed(offset, max(error, FINEST))
+        return f"{distance} mm along the axis from the rotor's centre, lateral offset {lateral} mm, {angle}"
     return f"{distance} mm {'below' if equilibrium.position[2] < 0 else 'above'} the rotor's centre, {angle}"
 
 
@@ -218,14 +218,14 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
 
 def plate_words(levitation: Levitation) -> list[str]:
     """Error of the plate's response, where it is larger than asked for."""
-    memory, asked = levitation.flight_plate, levitation.models.plate_rtol
-    if memory is None or memory.error <= asked:
+    memory, requested = levitation.flight_plate, levitation.models.plate_rtol
+    if memory is None or memory.error <= requested:
         return []
-    edges = "; an infinite slab leaves out the plate's edges" if memory.neglected > asked else ""
-    return [f"Estimated relative error of the plate's response: {memory.error:.2g} ({asked:g} was asked for{edges})."]
+    edges = "; an infinite slab leaves out the plate's edges" if memory.neglected > requested else ""
+    return [f"Estimated relative error of the plate's response: {memory.error:.2g} ({requested:g} requested{edges})."]
 
 
-def tell_details(flight: Trajectory) -> None:
+def note_details(flight: Trajectory) -> None:
     """Report how exactly a trajectory was integrated, with --verbose."""
     beyond, changes = flight.beyond_plate_table, flight.field_changes
     detail(

@@ -112,12 +112,12 @@ def hanging_distance(scene: Scene, table: FieldTable) -> float:
     grid = np.geomspace(*REACH, 60)
     nearest = next((d for d in grid if table.in_range([[0.0, 0.0, -d]])[0]), grid[-1])
     grid = grid[grid >= nearest]
-    carried = [k for k, d in enumerate(grid) if excess(d) > 0]
-    if not carried or carried[-1] == len(grid) - 1:
+    above = [k for k, d in enumerate(grid) if excess(d) > 0]
+    if not above or above[-1] == len(grid) - 1:
         raise EquilibriumError(
             f"Nowhere from {1e3 * nearest:.3g} to {1e3 * REACH[1]:.3g} mm does the attraction carry the weight."
         )
-    return float(scipy.optimize.brentq(excess, grid[carried[-1]], grid[carried[-1] + 1]))
+    return float(scipy.optimize.brentq(excess, grid[above[-1]], grid[above[-1] + 1]))
 
 
 def distance_error(scene: Scene, table: FieldTable, family: Family, point: BranchPoint) -> float:

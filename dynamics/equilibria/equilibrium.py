@@ -124,7 +124,7 @@ def tangent_spaces(states: Array) -> tuple[Array, Array]:
 class Mode:
     """One mode."""
 
-    # bounce (along the axis), side (across it; forward or backward of the rotor), precession or nutation (slower and
+    # "bounce" (axial), "side" (across it; forward or backward of the rotor), precession or nutation (slower and
     # faster turning of the moment)
     name: str
     growth_per_s: float  # 1/s; negative where it decays
@@ -132,7 +132,7 @@ class Mode:
 
 
 def named_modes(modes: Modes, time: float) -> tuple[Mode, ...]:
-    """The floater's five modes, bounce first; `time` is the unit of time of the eigenvalues, s.
+    """The floater's five modes, the axial one first; `time` is the unit of time of the eigenvalues, s.
 
     Of a pair that does not oscillate it is the one that grows more.
     """

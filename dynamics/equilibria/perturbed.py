@@ -113,7 +113,7 @@ def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) ->
     return {"force": lab.position.mean(axis=0), "torque": lab.moment.mean(axis=0), "loss": loss}
 
 
-def shift_by_answers(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
+def shift_by_mutual(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
     """Shift of an equilibrium by mutual magnetisation, m.
 
     To first order by the `answers` in the field `table` of the `scene`; without them to a factor of two.

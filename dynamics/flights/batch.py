@@ -95,7 +95,7 @@ class _Launch(_Passenger):
         return True
 
 
-class Lanes:
+class SimdBatch:
     """An integrator for many trajectories whose equations are the same but for runtime parameters.
 
     Parameters
@@ -214,7 +214,7 @@ class Endings:
         counts = ", ".join(f"{np.sum(self.ended_by == end)} by {end}" for end in np.unique(self.ended_by))
         left = int(np.sum(self.left_plate_table))
         beyond = f"; {left} left the range of the plate's table" if left else ""
-        return f"Endings of {len(self.ended_by)} flights: {counts}{beyond}"
+        return f"Endings of {len(self.ended_by)} trajectories: {counts}{beyond}"
 
 
 def ensemble(
@@ -255,23 +255,23 @@ def _check(scene: Scene, starts: State, duration: float) -> None:
 
 def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
     flight, count = _flight(scene, table, duration), len(starts.position)
-    flown = [_begun(flight, starts[k], duration, False) for k in range(count)]
-    _fly(flown)
-    return _endings(flown)
+    passengers = [_begun(flight, starts[k], duration, False) for k in range(count)]
+    _fly(passengers)
+    return _endings(passengers)
 
 
-def _endings(flown: Sequence[_Passenger]) -> Endings:
-    flight = flown[0].flight
+def _endings(passengers: Sequence[_Passenger]) -> Endings:
+    flight = passengers[0].flight
     return Endings(
-        np.array([f.ended_by for f in flown], dtype="<U8"),
-        np.minimum([f.seconds for f in flown], flown[0].duration),
-        flight.scales.unpack(np.array([f.state[:12] for f in flown])),
-        np.array([f.changes.count for f in flown]),
-        np.array([f.left for f in flown]),
+        np.array([f.ended_by for f in passengers], dtype="<U8"),
+        np.minimum([f.seconds for f in passengers], passengers[0].duration),
+        flight.scales.unpack(np.array([f.state[:12] for f in passengers])),
+        np.array([f.changes.count for f in passengers]),
+        np.array([f.left for f in passengers]),
     )
 
 
-def fly_together(
+def simulate_together(
     scenes: Sequence[Scene], table: FieldTable, starts: Sequence[State], duration: float
 ) -> list[Trajectory | None]:
     """Trajectories of `duration` (s) of `scenes` in the field of one `table`, from one of `starts` each.
@@ -282,15 +282,15 @@ def fly_together(
     Raises IntegrationError: a state became infinite.
     """
     began, known = perf_counter(), dict[str, Flight]()
-    flown = []
+    passengers = []
     for scene, start in zip(scenes, starts, strict=True):
         key = startless_text(scene)
         if key not in known:
             known[key] = _flight(scene, table, duration)
-        flown.append(_begun(known[key], start, duration, True))
-    _fly(flown)
-    speed = sum(f.seconds for f in flown) / (perf_counter() - began)
-    return [f.trajectory(speed) if f.recorder else None for f in flown]
+        passengers.append(_begun(known[key], start, duration, True))
+    _fly(passengers)
+    speed = sum(f.seconds for f in passengers) / (perf_counter() - began)
+    return [f.trajectory(speed) if f.recorder else None for f in passengers]
 
 
 def _flight(scene: Scene, table: FieldTable, duration: float) -> Flight:
@@ -313,7 +313,7 @@ def _fly(courses: Sequence[_Passenger]) -> None:
         here = [f for f in courses if not f.over and f.flight.degree(f.values) == formula.degree]
         if here:
             equations, events = here[0].flight.equations(formula.degree)
-            Lanes(equations, events, LOOSER * TOLERANCE, True).fly(here)
+            SimdBatch(equations, events, LOOSER * TOLERANCE, True).fly(here)
     for course in courses:
         if not course.over:
             course.alone()
@@ -363,16 +363,18 @@ def launched(
         silent = np.where(np.isin(np.arange(12), (6, 7, 8)), 0.0, states)
         own = force(now, states).signals - force(now, silent).signals
     outside = ~memory.in_range(starts.position, np.repeat(plate_depth(memory.plate, np.zeros(1)), count))
-    flown = []
+    passengers = []
     for k in range(count):
         course = flight.begin(starts[k], duration, None if currents is None else currents[k])
         if currents is None:
             course.state[12:-1] = own[k]
-        flown.append(_Launch(course, bool(outside[k])))
+        passengers.append(_Launch(course, bool(outside[k])))
     free = clearance(scene, np.zeros(count), starts.position) > 0
     if free.any():
-        Lanes(equations, events, step_error, False).fly([f for f, there in zip(flown, free, strict=True) if there])
-    return _endings(flown)
+        SimdBatch(equations, events, step_error, False).fly(
+            [f for f, there in zip(passengers, free, strict=True) if there]
+        )
+    return _endings(passengers)
 
 
 def _obstacles(scene: Scene, memory: PlateMemory, position: Vector) -> list[hy.expression]:

@@ -63,7 +63,7 @@ class Trajectory:
             "samples": str(len(self.time)),
             "energy balance": f"{self.energy_error:.1e}",
         }
-        return html_table(f"Flight of {self.levitated_s:.4g} s", rows)
+        return html_table(f"Trajectory of {self.levitated_s:.4g} s", rows)
 
     @property
     def levitated_s(self) -> float:
@@ -76,11 +76,11 @@ class Trajectory:
 
 
 class FlightStopped(KeyboardInterrupt):
-    """The user stopped a trajectory; `flown` is what is finished of it. Who does not catch it is stopped as well."""
+    """The user stopped a trajectory; `simulated` is what is finished of it. Uncaught it ends the program."""
 
-    def __init__(self, flown: Trajectory) -> None:
-        self.flown = flown
-        super().__init__(f"The simulation was stopped at {flown.levitated_s:.4g} s.")
+    def __init__(self, simulated: Trajectory) -> None:
+        self.simulated = simulated
+        super().__init__(f"The simulation was stopped at {simulated.levitated_s:.4g} s.")
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,8 @@ class Checkpoint:
             content = dict(data)
         if str(content.pop("key")) != self._key:
             raise InputError(
-                f"Input {self.path} must be a checkpoint of this flight; instead it was kept by another scene, model, "
-                "duration or version: delete it, choose another --out, or leave out --resume."
+                f"Input {self.path} must be a checkpoint of this trajectory; instead it was kept by another scene, "
+                "model, duration or version: delete it, choose another --out, or leave out --resume."
             )
         return content
 
@@ -134,7 +134,7 @@ WINDOWS = 20
 FEWEST = 4  # Samples in a part: a trend takes three
 VISIBLE = 2e-5  # Smallest drift or oscillation that counts while the floater still levitates, m
 # A loss before this time, s, is no levitation: too short for a few axial oscillations; nor is a trend seen in less.
-HELD = 0.5
+SHORTEST = 0.5
 
 
 def flight_kind(flight: Trajectory) -> str:
@@ -150,7 +150,7 @@ def flight_kind(flight: Trajectory) -> str:
         return NOT_FOLLOWED
     lasted = flight.ended_by in (DURATION, STOPPED)
     distance = np.linalg.norm(flight.lab.position, axis=1)
-    if len(distance) < FEWEST * WINDOWS or flight.levitated_s <= HELD:
+    if len(distance) < FEWEST * WINDOWS or flight.levitated_s <= SHORTEST:
         return STABLE if lasted else NOT_HELD
     whole = np.arange(len(distance))
     if not lasted:

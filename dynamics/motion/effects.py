@@ -14,28 +14,28 @@ from .equations import FORCE_ALONE
 from .floater_effects import FLOATER_SHAPE, FloaterShape, check_floater_metal, scene_effects
 from .rotor_effects import ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
 
-NOTHING_ANSWERS = "neither rotor nor floater is permeable"
+NOTHING_PERMEABLE = "neither rotor nor floater is permeable"
 LARGEST = 5000  # Points in a magnet with which mutual magnetisation is computed at all: minutes
 MOST_POINTS = 1000  # In a magnet, up to which mutual magnetisation is chosen: a floater of 3 mm below a cube of 10 mm
 NEAR = 2.0  # Distance from the rotor, in floater radii, at which induced forces are compared with `rtol`
 
 
-def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> tuple[bool, str]:
+def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) -> tuple[bool, str]:
     """Whether mutual magnetisation is in the motion of `scene` in the field of `table`, and why.
 
-    `asked` is "rigid", "mutual" or "auto": included where it is worth `rtol`.
+    `requested` is "rigid", "mutual" or "auto": included where it is worth `rtol`.
 
     Raises InputError: "mutual" is asked for with a measured map, or with magnets whose response is not known.
     """
-    if asked == "rigid":
+    if requested == "rigid":
         return False, "as asked"
     magnets, floater = scene.rotor, scene.floater
     if floater.body is not None:
-        if asked == "mutual":
+        if requested == "mutual":
             floater.must_be("sphere", where="for --interaction mutual", instead="Choose --interaction rigid.")
         return False, "known for spherical floaters alone"
     reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := without_response(magnet))}
-    if asked == "mutual":
+    if requested == "mutual":
         if table.model == "map":
             raise InputError(
                 "Input --interaction must be rigid or auto with a measured map, which does not tell what the "
@@ -47,9 +47,9 @@ def mutual_choice(scene: Scene, table: FieldTable, asked: str, rtol: float) -> t
                 f"{min(reasons)} is {reasons[min(reasons)]}"
             )
     if floater.recoil_permeability == 1 and all(magnet.contrast == 0 for magnet in magnets):
-        return False, NOTHING_ANSWERS
+        return False, NOTHING_PERMEABLE
     points = 0 if reasons else most_points(magnets, floater.radius)
-    if asked == "mutual":
+    if requested == "mutual":
         if points > LARGEST:
             raise InputError(
                 "Input --interaction must be rigid or auto for a floater so small beside its magnets; instead received "

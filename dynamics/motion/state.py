@@ -51,14 +51,17 @@ class Parameter(IntEnum):
 
 
 def dotted(a: Vector, b: Vector) -> hy.expression:
+    """Sum of the products of components, of vectors of any one length."""
     return hy.sum([x * y for x, y in zip(a, b, strict=True)])
 
 
 def dot(a: Vector, b: Vector) -> hy.expression:
+    """Scalar product of the first three components."""
     return hy.sum([a[i] * b[i] for i in range(3)])
 
 
 def cross(a: Vector, b: Vector) -> list[hy.expression]:
+    """Vector product of the first three components."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
@@ -68,6 +71,7 @@ def turned(vector: Vector) -> list[hy.expression]:
 
 
 def subtract(a: Vector, b: Vector) -> list[hy.expression]:
+    """Difference of the first three components."""
     return [a[i] - b[i] for i in range(3)]
 
 

@@ -261,7 +261,7 @@ def added_by_closed_form(
     degree, nodes : as of `induced_moments`
     cells : of every piece; None: every piece is one
     """
-    rests = [whole.polarization - carried.polarization for whole, carried in zip(magnets, carriers, strict=True)]
+    rests = [whole.polarization - carrier.polarization for whole, carrier in zip(magnets, carriers, strict=True)]
     pieces = [(piece, rest) for whole, rest in zip(cut, rests, strict=True) for piece in whole]
     known = cells or [cells_of(piece.body, np.inf) for piece, _ in pieces]
     found: list[Coefficients] = []

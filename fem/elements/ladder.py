@@ -221,9 +221,9 @@ def solve_rotor(
     solutions = []
     owners = [k for k, whole in enumerate(cut) for _ in whole]
     groups = [[magnet.polarization_in_rotor for magnet in group] for group in (magnets, carriers or magnets)]
-    for signs, (own, carried) in parity_parts(seen, planes, np.array(groups) @ symmetry.axes):
-        sources = [Magnet(m.body, m.body.rotation.T @ j) for m, j in zip(seen, carried, strict=True)]
-        rest = (own - carried)[owners]
+    for signs, (own, sourced) in parity_parts(seen, planes, np.array(groups) @ symmetry.axes):
+        sources = [Magnet(m.body, m.body.rotation.T @ j) for m, j in zip(seen, sourced, strict=True)]
+        rest = (own - sourced)[owners]
         solution = solve(system, sources, formulation, refinement.boundary_degree, signs, rest)
         solutions.append(solution)
         if formulation == "direct":
@@ -263,10 +263,10 @@ def _meshed_system(
     Two elements that touch edges of magnets near each other may be refined otherwise on the face between them; in
     another mesh of nearly the same size they are mostly not there.
     """
-    asked = refinement.mesh
+    requested = refinement.mesh
     reason = MeshError("The mesh of the magnets does not fit together; change their positions slightly.")
-    for layers, (size, smallest) in product(range(asked.hp_layers, -1, -1), SIZES):
-        settings = replace(asked, magnet_size=size * asked.magnet_size, smallest=smallest * asked.smallest)
+    for layers, (size, smallest) in product(range(requested.hp_layers, -1, -1), SIZES):
+        settings = replace(requested, magnet_size=size * requested.magnet_size, smallest=smallest * requested.smallest)
         try:
             mesh = mesh_magnets(bodies, replace(settings, hp_layers=layers), planes, edges_of)
         except MeshError as error:

@@ -216,14 +216,14 @@ def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) ->
     """
     known = known_columns(titles, reading, vectors)
     if reading.columns and any(c.is_field for c in known.values()):
-        told = {k: c for k, c in known.items() if _without(titles[k], reading.columns) is not None}
-        if not any(c.is_field for c in told.values()):
+        titled = {k: c for k, c in known.items() if _without(titles[k], reading.columns) is not None}
+        if not any(c.is_field for c in titled.values()):
             raise FieldMapError(
                 f"Input rotor.map_columns must be in the titles of the components of B to take; instead received "
                 f"{reading.columns!r}, which is in none of {shown(', '.join(titles), 200)}."
             )
-        names = {c.name for c in told.values()}
-        known = {k: c for k, c in known.items() if k in told or not (c.is_field or c.name in names)}
+        names = {c.name for c in titled.values()}
+        known = {k: c for k, c in known.items() if k in titled or not (c.is_field or c.name in names)}
     seen: dict[str, Column] = {}
     for column in known.values():
         for name in column.parts:

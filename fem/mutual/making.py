@@ -47,7 +47,7 @@ SMALL = 1e-9  # relative size of a singular value that is none
 # From so many magnets on, points of a class have one weight and magnets respond to each other by their centres
 MANY = 4
 # What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
-HELD, FREE = 1e-3, 1e-6
+SMALL, FREE = 1e-3, 1e-6
 # Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole
 GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
 DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end
@@ -82,8 +82,8 @@ def mutual_errors(
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
             _, force, torque = table.added(place[None], floater.moment * direction[None], field[None], gradient[None])
             missed = [
-                np.linalg.norm(told - true) + ELEMENTS * np.linalg.norm(step)
-                for told, true, step in zip(
+                np.linalg.norm(estimated - true) + ELEMENTS * np.linalg.norm(step)
+                for estimated, true, step in zip(
                     (force[0], torque[0]), (added.force, added.torque), (unsure.force, unsure.torque), strict=True
                 )
             ]
@@ -224,9 +224,9 @@ def _rotor_fit(
     rows = np.concatenate([*columns, together], axis=1) * counts[:, None]
     direct, beyond = (part[first, second] * size[first] * size[second] * counts for part in (direct, beyond))
     alone = rows.shape[1] - len(a)
-    held = np.arange(rows.shape[1]) >= alone
-    found = least_squares(rows, beyond, held)
-    found[:alone] += least_squares(rows[:, :alone], direct, held[:alone])
+    small = np.arange(rows.shape[1]) >= alone
+    found = least_squares(rows, beyond, small)
+    found[:alone] += least_squares(rows[:, :alone], direct, small[:alone])
     ends = np.cumsum([column.shape[1] for column in columns])
     parts = iter(np.split(found, ends))
     made = [
@@ -292,7 +292,7 @@ def sphere_fit(
     pairs = list(combinations(range(len(grids)), 2))
     sums = [pair_sum(grids[a], grids[b], images) for a, b in pairs]
     right = scaled(energy[None], -force[None], force)[0]
-    found, weights = _fitted(grids, OF_SPHERE, sums, places, scaled, right, HELD)
+    found, weights = _fitted(grids, OF_SPHERE, sums, places, scaled, right, SMALL)
     coupled = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         coupled[a, b] = coupled[b, a] = weight
@@ -322,7 +322,7 @@ def returned_fit(
     sums = [mixed_sum(grids[a], inner[b], images) for a, b in pairs]
     # the energy is -M·V
     right = -np.concatenate([(field / sizes[0]).ravel(), (change / sizes[1]).ravel()])
-    found, weights = _fitted(grids, OF_RETURN, sums, places, scaled, right, 10 * HELD)
+    found, weights = _fitted(grids, OF_RETURN, sums, places, scaled, right, 10 * SMALL)
     mixed = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         mixed[a, b] = weight
@@ -342,7 +342,7 @@ def _fitted(
 
     `scaled` makes the equations' columns (g, rows) of the energies' derivatives, and `right` is what they shall give.
     """
-    columns, held, kinds, still = list[Array](), list[Array](), list[Array](), np.zeros_like(places)
+    columns, small, kinds, still = list[Array](), list[Array](), list[Array](), np.zeros_like(places)
     single = 1 < len(grids) < MANY  # beside other magnets each point has a weight of its own, too
     for grid in grids:
         kind = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
@@ -350,11 +350,11 @@ def _fitted(
         kinds.append(np.concatenate([kind, alone], axis=1)[:, : None if grid.axis.any() else 0])
         for k in numbers:
             columns.append(scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, kinds[-1])))
-            held.append(np.arange(kinds[-1].shape[1]) >= kind.shape[1])
+            small.append(np.arange(kinds[-1].shape[1]) >= kind.shape[1])
     for one in sums:
         columns.append(scaled(*one.derivatives(places, still, np.ones((len(one.rows), 1)))))
-        held.append(np.zeros(1, bool))
-    found = least_squares(np.concatenate(columns).T, right, np.concatenate(held), cost)
+        small.append(np.zeros(1, bool))
+    found = least_squares(np.concatenate(columns).T, right, np.concatenate(small), cost)
     parts = iter(np.split(found, np.cumsum([len(column) for column in columns])[:-1]))
     each = [np.stack([kind @ next(parts) for _ in numbers], axis=1).reshape(len(kind), -1, 2) for kind in kinds]
     return each, np.array([float(part[0]) for part in parts])
@@ -372,7 +372,7 @@ def classes(grid: ResponseGrid, mirrored: bool) -> Array:
     return np.asarray(np.eye(number.max() + 1)[number])
 
 
-def least_squares(columns: Array, values: Array, held: Array, cost: float = HELD) -> Array:
+def least_squares(columns: Array, values: Array, small: Array, cost: float = SMALL) -> Array:
     """Weights (k,) of columns (n, k) of any sizes that give values (n,).
 
     Parameters
@@ -383,8 +383,8 @@ def least_squares(columns: Array, values: Array, held: Array, cost: float = HELD
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
     scaled = columns / size
-    if not held.any():
+    if not small.any():
         return np.asarray(np.linalg.lstsq(scaled, values, rcond=SMALL)[0] / size)
     square = scaled.T @ scaled
-    square[np.diag_indices_from(square)] += np.where(held, cost, FREE) ** 2
+    square[np.diag_indices_from(square)] += np.where(small, cost, FREE) ** 2
     return np.asarray(scipy.linalg.solve(square, scaled.T @ values, assume_a="pos") / size)

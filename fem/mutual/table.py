@@ -431,10 +431,10 @@ class MutualTable:
 
     def __repr__(self) -> str:
         points = sum(len(grid.points) for grid in self.grids)
-        told = ", ".join(
+        errors = ", ".join(
             f"{e:.1e} at {g * 1e3:.2g} mm" for g, e in zip(self.gaps, self.errors.max(axis=1), strict=True)
         )
-        return f"MutualTable: {points} points in {len(self.grids)} magnets; relative error {told} from contact"
+        return f"MutualTable: {points} points in {len(self.grids)} magnets; relative error {errors} from contact"
 
 
 def pair_sum(first: ResponseGrid, second: ResponseGrid, images: Array, weight: float = 1.0) -> EnergySum:

@@ -102,15 +102,15 @@ class PlateAround:
 
     @cached_property
     def key(self) -> str:
-        return self._kind.key(*deciding(*self._asked))
+        return self._kind.key(*deciding(*self._requested))
 
     def made(self, report: Callable[[str], None], watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
         """The table, the rotor's share in it, and whether they were cached. Raises what the models raise."""
-        make = partial(slab_and_rotor_table, *self._asked)
+        make = partial(slab_and_rotor_table, *self._requested)
         if self.model != "slab":
             solve = partial(cached_currents, report=report, watch=watch)
-            make = partial(plate_and_rotor_table, *self._asked, solve=solve, watch=watch)
-        (table, share), cached = self._kind.cached(deciding(*self._asked), make, report)
+            make = partial(plate_and_rotor_table, *self._requested, solve=solve, watch=watch)
+        (table, share), cached = self._kind.cached(deciding(*self._requested), make, report)
         return table, share, cached
 
     @property
@@ -118,7 +118,7 @@ class PlateAround:
         return SLAB if self.model == "slab" else DRIVEN
 
     @property
-    def _asked(self) -> tuple[Plate, RotorTable, Region, tuple[float, float], float]:
+    def _requested(self) -> tuple[Plate, RotorTable, Region, tuple[float, float], float]:
         return self.plate, self.rotor, self.region, self.frequencies, self.rtol
 
 
@@ -215,7 +215,7 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
         raise AccuracyError(
             f"Input region of a table of the plate's response must reach at most {WIDEST:g} times its distance from "
             f"the plate to the sides, {WIDEST * gap * 1e3:.3g} mm here; instead received {wide * 1e3:.3g} mm. "
-            "Begin the flight where it stays nearer, or simulate a shorter one."
+            "Begin the trajectory where it stays nearer, or simulate a shorter one."
         )
     return found
 

@@ -121,11 +121,11 @@ def rotor_table(
         return surface_table(lone, accuracy, watch).posed(rotor)
     if name == "fem":
         return fem_table(lone, accuracy, watch=watch).posed(rotor)
-    return _simple_table(_Asked(ROTOR.key(lone, name, rtol, nearest), lone), name, accuracy).posed(rotor)
+    return _simple_table(_Requested(ROTOR.key(lone, name, rtol, nearest), lone), name, accuracy).posed(rotor)
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Requested:
     """A rotor by its key."""
 
     key: str
@@ -133,8 +133,8 @@ class _Asked:
 
 
 @lru_cache(maxsize=64)  # sweeps and sliders that move a lone magnet ask for the same again
-def _simple_table(asked: _Asked, model: str, accuracy: Accuracy) -> RotorTable:
-    return MODELS[model](asked.rotor, accuracy)
+def _simple_table(requested: _Requested, model: str, accuracy: Accuracy) -> RotorTable:
+    return MODELS[model](requested.rotor, accuracy)
 
 
 def cached_rotor_table(

@@ -42,9 +42,9 @@ class SceneError(InputError):
         source = printable(source).replace("\n", "\\n")
         if len(source) > LONGEST_SOURCE:
             source = f"…{source[-LONGEST_SOURCE:]}"
-        told = [f"{source}: {fault}" for fault in self.faults[:MOST]]
-        more = len(self.faults) - len(told)
-        super().__init__("\n".join([*told, f"{source}: and {more} more faults."] if more else told))
+        listed = [f"{source}: {fault}" for fault in self.faults[:MOST]]
+        more = len(self.faults) - len(listed)
+        super().__init__("\n".join([*listed, f"{source}: and {more} more faults."] if more else listed))
 
 
 def described_faults(details: Sequence[ErrorDetails]) -> list[str]:

@@ -384,8 +384,8 @@ def _shape_faults(place: str, table: Any) -> list[str]:
     if getattr(table, "file", None):
         if table.shape != "cuboid":
             return [f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."]
-        told = " and ".join(given)
-        return [f"Input {place} must have no size beside file; instead received {told}."] if given else []
+        sizes = " and ".join(given)
+        return [f"Input {place} must have no size beside file; instead received {sizes}."] if given else []
     wanted = SIZES[table.shape]
     if place == "floater" and not given and table.shape == "sphere":
         return ["Input floater.diameter_mm must be given; instead it is missing."]

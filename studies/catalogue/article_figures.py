@@ -112,6 +112,7 @@ def _explain(axes: Axes, result: xr.Dataset, models: dict[str, str]) -> None:
 
 
 def components_lines(result: xr.Dataset) -> list[str]:
+    """The components by finite elements at both ends of each distance, and how far others deviate, as text."""
     rows = []
     for configuration, part in showing.by_configuration(result):
         true, off = _of(part, "fem"), deviations(part)
@@ -143,7 +144,7 @@ FIELD_COMPONENTS = Study(
 ROTOR = {"configuration": "horizontal", "value": 1.0}  # Of the article's figure; its text does not give the frequency
 FREQUENCIES = (165.0, 170.0, 185.0, 200.0)
 FORCE_MODELS = ("semi-analytic", "small angles", "dipole", "fem")
-TOLD_ANGLE, TOLD_DISTANCE = 9.0, 0.04
+REPORTED_ANGLE, REPORTED_DISTANCE = 9.0, 0.04
 """θ at the tipping point nearest to the rotor, °, in the article's text, and where that calls it almost zero, m."""
 BOTH, ONE = ("frequency", "distance"), ("frequency",)
 FORCE_COLUMNS: Columns = {
@@ -259,7 +260,7 @@ def net_figure(result: xr.Dataset) -> Figure:
     showing.explain(net, {text: style for style, text in list(STYLES.values())[:2]})
     net.axhline(0.0, color="0.3", lw=0.6)
     net.set(ylabel="net force, with gravity (mN)", ylim=(-60, 1.1e3 * float(_net(result).max())))
-    angle.axhline(TOLD_ANGLE, color="0.4", lw=0.8, ls="-.", label="near tipping point in the article")
+    angle.axhline(REPORTED_ANGLE, color="0.4", lw=0.8, ls="-.", label="near tipping point in the article")
     angle.set(ylabel="polar angle θ (°)", ylim=(0, 20))
     return figure
 
@@ -280,11 +281,12 @@ def _mark(axes: Axes, found: xr.Dataset, color: str) -> None:
 
 
 def force_lines(result: xr.Dataset) -> list[str]:
+    """Equilibria and polar angles of each model at every frequency, as text."""
     rows = []
     for k, frequency in enumerate(result["frequency"].values):
         for model, (_, text) in STYLES.items():
             found = case_with(result, model=model).isel(frequency=k)
-            far = np.interp(TOLD_DISTANCE, result["distance"], found["polar_angle"])
+            far = np.interp(REPORTED_DISTANCE, result["distance"], found["polar_angle"])
             places = [f"{1e3 * float(found[name]):.3f}" for name in POINTS]
             angles = [f"{np.degrees(float(a)):.2f}" for a in (found["angle_near"], found["angle_equilibrium"], far)]
             rows.append((f"{frequency:g} Hz, {text}", *places, *angles))
@@ -305,7 +307,7 @@ FORCE_CURVE = Study(
 # The circle on which the floater goes with the rotor: its radius in the finite magnets' field, simulated, by formula.
 KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
 """Speed upwards with which the trajectory begins, m/s; its duration, s; samples of its last turns that are kept."""
-FLOWN_HZ, TURNS = 170.0, 3
+SIMULATED_HZ, TURNS = 170.0, 3
 """Of the trajectory of `ROTOR` in the article's figure: Hz, and how many of its last turns are shown."""
 TYPICAL = (0.1, 0.3)  # Radii that the article calls typical, mm
 SIDE_COLUMNS: Columns = {
@@ -314,9 +316,9 @@ SIDE_COLUMNS: Columns = {
     "growth": (("frequency",), "1/s", "largest growth rate of a mode"),
     "article_radius": (("frequency",), "m", "𝒢/(μ_f ω²) at the same distance"),
     "flight_angle": (("sample",), "rad", "angle of the rotor"),
-    "flight_x": (("sample",), "m", "x of the floater in flight, laboratory frame"),
-    "flight_y": (("sample",), "m", "y of the floater in flight, laboratory frame"),
-    "flight_z": (("sample",), "m", "z of the floater in flight"),
+    "flight_x": (("sample",), "m", "x of the simulated floater, laboratory frame"),
+    "flight_y": (("sample",), "m", "y of the simulated floater, laboratory frame"),
+    "flight_z": (("sample",), "m", "z of the simulated floater"),
 }
 
 
@@ -331,7 +333,7 @@ def side_points(quick: bool) -> list[Point]:
 
 
 def side_mode(point: Point) -> xr.Dataset:
-    """Radius of the circle of one rotor's floater at all frequencies, and for δx = 1 mm a trajectory at `FLOWN_HZ`."""
+    """Radius of the circle of one rotor's floater at all frequencies, for δx = 1 mm a trajectory at `SIMULATED_HZ`."""
     grid = np.arange(article.LOWEST, article.HIGHEST + 1e-9, point["step_hz"])
     scene = article.rotor_scene(point["configuration"], point["value"], article.HIGHEST)
     levitation = article.levitation_of(scene, point["model"])
@@ -342,12 +344,12 @@ def side_mode(point: Point) -> xr.Dataset:
         if there is not None:
             row[:] = np.hypot(*there.position[:2]), -there.position[2], there.growth_per_s
     simulated = np.full((4, SAMPLES), np.nan)
-    (start,) = branch.side("near", np.array([FLOWN_HZ]))
+    (start,) = branch.side("near", np.array([SIMULATED_HZ]))
     if start is not None and ROTOR.items() <= point.items():
         flight = simulate(kicked(scene, start, KICK), field, SECONDS, [])
-        times = flight.time[-1] - np.linspace(TURNS / FLOWN_HZ, 0.0, SAMPLES)
+        times = flight.time[-1] - np.linspace(TURNS / SIMULATED_HZ, 0.0, SAMPLES)
         place = [np.interp(times, flight.time, column) for column in flight.lab.position.T]
-        simulated = np.array([2 * np.pi * FLOWN_HZ * times, *place])
+        simulated = np.array([2 * np.pi * SIMULATED_HZ * times, *place])
     frequency = variable(("frequency",), grid, "Hz", "frequency of the rotor")
     found = (*rows.T, side_radius(rows[:, 1], grid), *simulated)
     return recorded(point, SIDE_COLUMNS, found, {"frequency": frequency})
@@ -355,7 +357,7 @@ def side_mode(point: Point) -> xr.Dataset:
 
 def _predicted(simulated: xr.Dataset) -> float:
     """The article's radius at the mean distance of the trajectory, mm."""
-    return 1e3 * float(side_radius(-float(simulated["flight_z"].mean()), FLOWN_HZ))
+    return 1e3 * float(side_radius(-float(simulated["flight_z"].mean()), SIMULATED_HZ))
 
 
 @styled
@@ -370,8 +372,8 @@ def orbit_figure(result: xr.Dataset) -> Figure:
     above.plot(radius * np.cos(circle), radius * np.sin(circle), ":k", lw=1.6, label="radius a of the formula")
     above.plot(np.cos(turned[-1]), np.sin(turned[-1]), "o", color=PALETTE[1], ms=4, label="at one time")
     above.plot(x[-1], y[-1], "o", color=PALETTE[0], ms=4)
-    above.set(xlabel="x (mm)", ylabel="y (mm)", title=f"(a) from above, {FLOWN_HZ:g} Hz", aspect="equal")
-    time = 1e3 * (turned - turned[0]) / (2 * np.pi * FLOWN_HZ)
+    above.set(xlabel="x (mm)", ylabel="y (mm)", title=f"(a) from above, {SIMULATED_HZ:g} Hz", aspect="equal")
+    time = 1e3 * (turned - turned[0]) / (2 * np.pi * SIMULATED_HZ)
     for panel, name, floater, turn in zip(others, "xy", (x, y), (np.cos, np.sin), strict=True):
         panel.plot(time, turn(turned), color=PALETTE[1])
         panel.plot(time, floater, color=PALETTE[0])
@@ -403,7 +405,7 @@ def side_lines(result: xr.Dataset) -> list[str]:
     for simulated in (case_with(result, model=model, **ROTOR) for model in article.MODELS):
         radius = 1e3 * np.hypot(simulated["flight_x"].values, simulated["flight_y"].values)
         lines.append(
-            f"Flight of δx = 1 mm at {FLOWN_HZ:g} Hz, {simulated['model'].item()}: radius {radius.mean():.4f} mm "
+            f"Simulated δx = 1 mm at {SIMULATED_HZ:g} Hz, {simulated['model'].item()}: radius {radius.mean():.4f} mm "
             f"({showing.span(radius, '.4f')}) at {-1e3 * float(simulated['flight_z'].mean()):.3f} mm; "
             f"𝒢/(μ_f ω²) = {_predicted(simulated):.4f} mm."
         )

@@ -32,7 +32,7 @@ from .showing import by_configuration, by_rotor, drawn, explain, rotor_panels, s
 # their metal do not move an equilibrium, and are left out.
 SIDES = ("near", "far")
 FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
-FLOWN = "dipole"  # The field of the simulated trajectories, which are spread over a rotor's stable frequencies
+SIMULATED = "dipole"  # The field of the simulated trajectories, which are spread over a rotor's stable frequencies
 DISTANCE_KICK, SECONDS = 0.01, 1.0
 """Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the trajectory."""
 BOTH: tuple[str, ...] = ("frequency", "side")
@@ -43,9 +43,9 @@ DISTANCE_COLUMNS: Columns = {
     "polar_angle": (BOTH, "rad", "polar angle of the moment"),
     "fold_frequency": ((), "Hz", "lowest frequency with an equilibrium"),
     "fold_distance": ((), "m", "levitation distance there"),
-    "flight_frequency": (("flight",), "Hz", "frequency of a simulated flight"),
-    "flight_distance": (("flight",), "m", "mean levitation distance of a simulated flight"),
-    "flight_error": (("flight",), "m", "difference between the flight's halves"),
+    "flight_frequency": (("flight",), "Hz", "frequency of a simulated trajectory"),
+    "flight_distance": (("flight",), "m", "mean levitation distance of a simulated trajectory"),
+    "flight_error": (("flight",), "m", "difference between the trajectory's halves"),
 }
 
 
@@ -90,7 +90,7 @@ def _in_field(point: Point, grid: Array) -> dict[str, Any]:
             error = distance_error(scene, field, family, there)
             row[k] = -there.position[2], error, there.growth_per_s, article.polar_angle(there.state[6:9])
         stable = [there for _, there in known if article.stable_in_flight(there.growth_per_s)]
-        if side == "near" and point["model"] == FLOWN and stable:
+        if side == "near" and point["model"] == SIMULATED and stable:
             places = np.unique(np.linspace(0, len(stable) - 1, point["flights"]).astype(int))
             for k, place in enumerate(places):
                 flights[:, k] = stable[place].parameter, *mean_height(scene, field, stable[place])
@@ -152,11 +152,11 @@ def formulas_figure(result: xr.Dataset) -> Figure:
         for model, style in (("semi-analytic", ":"), ("analytic", "-.")):
             if model in rotor["model"]:
                 axes.plot(*_side(rotor, model, "near")[:2], style, color=color)
-        simulated = case_with(rotor, model=FLOWN)
+        simulated = case_with(rotor, model=SIMULATED)
         axes.plot(simulated["flight_frequency"], 1e3 * simulated["flight_distance"], "x", ms=4, color=color)
         axes.set_ylim(8, 62)
     key = {"point dipole, stable": "-", "unstable": "--", "semi-analytic formula": ":"}
-    explain(rotors[0][0], key | {"analytic formula, no gravity": "-.", "simulated flight, mean": "x"})
+    explain(rotors[0][0], key | {"analytic formula, no gravity": "-.", "simulated trajectory, mean": "x"})
     return figure
 
 
@@ -195,11 +195,11 @@ def distance_lines(result: xr.Dataset) -> list[str]:
                 )
     off_mean = [
         one["flight_distance"] - np.interp(one["flight_frequency"], one["frequency"], one["distance"].sel(side="near"))
-        for one in each_case(cases_with(result, model=FLOWN))
+        for one in each_case(cases_with(result, model=SIMULATED))
     ]
     if np.isfinite(off_mean).any():
         worst = 1e6 * np.nanmax(np.abs(off_mean))
-        lines.append(f"Means of simulated flights agree with the equilibria within {worst:.3g} µm.")
+        lines.append(f"Means of simulated trajectories agree with the equilibria within {worst:.3g} µm.")
     head = ("rotor, model", "lowest (Hz)", "stable (Hz)", "distance (mm)", "power of f")
     last = "Last columns: point dipole less finite elements, and each formula less the point dipole, in mm."
     return [*text_table((*head, "- fem (mm)", "semi-an.", "analytic"), rows), last, *lines]
@@ -207,7 +207,7 @@ def distance_lines(result: xr.Dataset) -> list[str]:
 
 LEVITATION_DISTANCE = Study(
     name="levitation-distance",
-    summary="distance against frequency for every rotor of the article: equilibria, its formulas, simulated flights",
+    summary="distance against frequency for every rotor of the article: equilibria, its formulas, simulations",
     points=distance_points,
     compute=levitation_distance,
     figures={"levitation-distance-models": models_figure, "levitation-distance-formulas": formulas_figure},
@@ -231,25 +231,25 @@ REPORTED = {115.0: "linear fall", 140.0: "stable", 150.0: "oscillating loss"}
 """The article's three trajectories, by frequency in Hz."""
 NONE, SHORT = "no equilibrium", "lost within 3 s"  # Of a trajectory that is none
 FLIGHT_COLUMNS: Columns = {
-    "levitated": (("frequency",), "s", "time until the loss in the simulated flight, or its duration"),
-    "averaged_levitated": (("frequency",), "s", "the same in the averaged flight; infinite for a balance"),
+    "levitated": (("frequency",), "s", "time until the loss in the simulated trajectory, or its duration"),
+    "averaged_levitated": (("frequency",), "s", "the same in the averaged trajectory; infinite for a balance"),
     "growth": (("frequency",), "1/s", "largest growth rate of a mode at the start"),
     "energy_error": (("frequency",), "1", "largest violation of the energy balance"),
-    "time": (("frequency", "part"), "s", "middle of a part of the simulated flight"),
+    "time": (("frequency", "part"), "s", "middle of a part of the simulated trajectory"),
     "lowest": (("frequency", "part"), "m", "least distance in the part"),
     "mean": (("frequency", "part"), "m", "mean distance in the part"),
     "highest": (("frequency", "part"), "m", "largest distance in the part"),
-    "averaged_time": (("frequency", "sample"), "s", "time of the averaged flight"),
-    "averaged_distance": (("frequency", "sample"), "m", "distance of the averaged flight"),
-    "kind": (("frequency",), "", "what became of the simulated flight"),
-    "averaged_end": (("frequency",), "", "what ended the averaged flight"),
+    "averaged_time": (("frequency", "sample"), "s", "time of the averaged trajectory"),
+    "averaged_distance": (("frequency", "sample"), "m", "distance of the averaged trajectory"),
+    "kind": (("frequency",), "", "what became of the simulated trajectory"),
+    "averaged_end": (("frequency",), "", "what ended the averaged trajectory"),
 }
 
 
 def flight_points(quick: bool) -> list[Point]:
     """The displacements, simulated for 60 s in the field of finite elements, `quick` in the dipole's."""
-    asked = {"configuration": "horizontal", "model": "dipole" if quick else "fem", "duration_s": 60.0}
-    return [{**asked, "complete": not quick, "value": value} for value in DISPLACEMENTS]
+    requested = {"configuration": "horizontal", "model": "dipole" if quick else "fem", "duration_s": 60.0}
+    return [{**requested, "complete": not quick, "value": value} for value in DISPLACEMENTS]
 
 
 def trajectories(point: Point) -> xr.Dataset:
@@ -315,7 +315,7 @@ def flight_figure(result: xr.Dataset) -> Figure:
                 mark = "v" if one["averaged_end"] == "fold" else "x"
                 panel.plot(time[last], np.clip(mean[last], 12, 34), mark, color=color, ms=5)
         panel.set_ylim(11, 40)
-    explain(rows[0][0], {"averaged flight": "--", "lost in a fall": "v", "lost in oscillations": "x"}, ms=4)
+    explain(rows[0][0], {"averaged trajectory": "--", "lost in a fall": "v", "lost in oscillations": "x"}, ms=4)
     return figure
 
 
@@ -339,7 +339,7 @@ def flight_lines(result: xr.Dataset) -> list[str]:
 
 TRAJECTORIES = Study(
     name="trajectories",
-    summary="linear fall, stable and unstable flight: the distance against time, simulated and averaged",
+    summary="linear fall, stable and unstable trajectory: the distance against time, simulated and averaged",
     points=flight_points,
     compute=trajectories,
     figures={"trajectories": flight_figure},

@@ -135,7 +135,7 @@ def seed_of(configuration: str, measure: float, part: float, batch: int) -> list
     return [crc32(f"{configuration} {measure:g} {part:.6f}".encode()), batch]
 
 
-HELD, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)
+CAPTURED, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)
 """Up at the end; touched the plate; touched the rotor; far away; never simulated, as no frequency is stable."""
 WORDS = ("held", "touched the plate", "touched the rotor", "lost to the side", "no stable frequency")
 PARTS = (1 / 6, 1 / 2, 5 / 6)  # Places in the range of stable frequencies
@@ -150,7 +150,7 @@ COLUMNS: Columns = {
     "high": ((), "Hz", "highest stable frequency without a plate"),
     "part": ((), "1", "place in the range of stable frequencies"),
     "batch": ((), "1", "number of the batch"),
-    "settled": ((), "1", "flights that were up when the plate began to go down"),
+    "settled": ((), "1", "trajectories that still levitated when the plate began to go down"),
     "stayed": ((), "1", "those of them that were up after it had gone down"),
     "farther": (FLIGHTS, "m", "farther from the rotor than where it levitates"),
     "sideways": (FLIGHTS, "m", "lateral offset"),
@@ -170,8 +170,8 @@ def capture_points(quick: bool) -> list[Point]:
         for batch, rotor, part in product(range(BATCHES), rotors, PARTS)
     ]
     names = ("configuration", "measure", "part", "batch", "flights", "checked")
-    asked = [(*rotor, 0.5, 0, FEW, 0) for rotor in article.QUICK_ROTORS] if quick else every
-    return [dict(zip(names, values, strict=True)) for values in asked]
+    requested = [(*rotor, 0.5, 0, FEW, 0) for rotor in article.QUICK_ROTORS] if quick else every
+    return [dict(zip(names, values, strict=True)) for values in requested]
 
 
 def capture(point: Point) -> xr.Dataset:
@@ -184,21 +184,21 @@ def capture(point: Point) -> xr.Dataset:
         found["outcome"] = np.full(count, float(NO_EQUILIBRIUM))
         return recorded(point, COLUMNS, found, {}, flight=count)
     how, states = launches(place, count, seed_of(*rotor, point["batch"]))
-    ended = _flown(place, states, SETTLED)
+    ended = _simulated(place, states, SETTLED)
     low = ended.last.position[:, 2] < -(place.distance + BELOW) / 2
     outcome = np.where(ended.ended_by == CONTACT, np.where(low, PLATE, ROTOR), LOST)
-    outcome[ended.ended_by == DURATION] = HELD
+    outcome[ended.ended_by == DURATION] = CAPTURED
     found |= {"rotor_frequency": place.scene.frequency, "distance": place.distance, "low": place.low}
     found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": outcome.astype(float)}
     found |= {**how, "left_plate_table": ended.left_plate_table.astype(float)}
     if point["checked"]:
         first = states[: point["checked"]]
-        later = _flown(place, first, SETTLED + LOWERED / LOWERING_SPEED + AFTER, lowered=True)
+        later = _simulated(place, first, SETTLED + LOWERED / LOWERING_SPEED + AFTER, lowered=True)
         found |= {"settled": np.sum(later.levitated_s >= SETTLED), "stayed": np.sum(later.ended_by == DURATION)}
     return recorded(point, COLUMNS, found, {}, flight=count)
 
 
-def _flown(place: Place, states: State, seconds: float, lowered: bool = False) -> Endings:
+def _simulated(place: Place, states: State, seconds: float, lowered: bool = False) -> Endings:
     memory = plate_under(place, lowered)
     return launched(replace(place.scene, plate=memory.plate), place.field, memory, states, seconds)
 
@@ -248,7 +248,11 @@ def share_figure(result: xr.Dataset) -> Figure:
             some = [one for one in every if one["part"] == part]
             label = f"{part:.0%} of the stable range"
             _shares(
-                axes, [one["measure"].item() for one in some], [one["outcome"] == HELD for one in some], color, label
+                axes,
+                [one["measure"].item() for one in some],
+                [one["outcome"] == CAPTURED for one in some],
+                color,
+                label,
             )
         for measure in article.CONFIGURATIONS[name].levitated:
             axes.axvline(measure, color="0.85", lw=4, zorder=0, label="levitated in the article")
@@ -273,7 +277,7 @@ def place_figure(result: xr.Dataset) -> Figure:
     side, height = np.linspace(0, SIDEWAYS, 5), np.linspace(-NEARER, FARTHER, 9)
     edges = np.degrees(np.linspace(0, LEAN, BINS + 1))
     for top, bottom, (label, one) in zip(maps, leans, chosen, strict=True):
-        at, hits = (one["sideways"].values, one["farther"].values), one["outcome"].values == HELD
+        at, hits = (one["sideways"].values, one["farther"].values), one["outcome"].values == CAPTURED
         mean = 100 * scipy.stats.binned_statistic_2d(*at, hits.astype(float), bins=(side, height)).statistic
         shades = top.pcolormesh(1e3 * side, 1e3 * height, mean.T, vmin=0, vmax=100, cmap="viridis")
         top.grid(False)
@@ -294,14 +298,14 @@ def capture_lines(result: xr.Dataset) -> list[str]:
         seen = "levitated" if _levitated(one) else "did not levitate"
         rest = sorted(_others(one).items(), key=lambda other: -other[1])
         ends = ", ".join(f"{100 * part:.0f} % {word}" for word, part in rest if part > 0)
-        name, held = f"{label}, {float(one['rotor_frequency']):.1f} Hz", share_text(one["outcome"] == HELD)
+        name, held = f"{label}, {float(one['rotor_frequency']):.1f} Hz", share_text(one["outcome"] == CAPTURED)
         rows.append((name, held, str(one.sizes["trial"]), seen, after, ends))
     head = ("rotor", "captured", "launches", "article", "stay, plate lowered", "others")
     lines = text_table(head, rows)
     every = xr.concat([one[["outcome", "left_plate_table"]] for _, one in found], "trial", coords="minimal")
     beyond = every["left_plate_table"] == 1
     if beyond.any():
-        captured, count = int((beyond & (every["outcome"] == HELD)).sum()), int(every["left_plate_table"].count())
+        captured, count = int((beyond & (every["outcome"] == CAPTURED)).sum()), int(every["left_plate_table"].count())
         lines.append(
             f"{int(beyond.sum())} of {count} trajectories, {captured} of them captured, were for a while beyond the "
             "range of the plate's table, where the field of its currents is a continuation of unknown error."
@@ -321,14 +325,14 @@ def _levitated(one: xr.Dataset) -> bool:
 
 def _others(one: xr.Dataset) -> dict[str, float]:
     """Shares of launches that ended otherwise, by name."""
-    return {word: float((one["outcome"] == k).mean()) for k, word in enumerate(WORDS) if k != HELD}
+    return {word: float((one["outcome"] == k).mean()) for k, word in enumerate(WORDS) if k != CAPTURED}
 
 
 def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
     """The shares as numbers: `shares`, one entry for each rotor and frequency; and what the plate's lowering loses."""
     rows = []
     for _, one in each_place(result):
-        value, low, high = share(one["outcome"] == HELD)
+        value, low, high = share(one["outcome"] == CAPTURED)
         frequency = float(one["rotor_frequency"])
         rows.append({
             "configuration": one["configuration"].item(),

@@ -277,7 +277,7 @@ def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
 SHOWN = ["displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "spin"]  # Unknowns of the corner
 SHARES = np.array([0.16, 0.5, 0.84])  # Ends of the middle 68 %, and the middle
 LEARNED = 0.7  # Worth a mark: a posterior narrower than this part of the prior, or off its middle by as many deviations
-NAMED, ASKED = 3, 0.25  # How many unknowns are named with a fact, and from which change on
+NAMED, REQUESTED = 3, 0.25  # How many unknowns are named with a fact, and from which change on
 CONTRADICTS = 1.0  # Logarithm of the ratio of evidences below minus which two facts contradict each other
 
 
@@ -434,7 +434,7 @@ def _facts(one: xr.Dataset) -> list[str]:
         fact = weighed.sel(fact=name)
         shift, width = fact["shift"].values, fact["width"].values
         moved = np.maximum(np.abs(shift), 1 - width)
-        best = [j for j in np.argsort(-moved)[:NAMED] if moved[j] > ASKED]
+        best = [j for j in np.argsort(-moved)[:NAMED] if moved[j] > REQUESTED]
         asks = ", ".join(f"{one['unknown'].values[j]} {shift[j]:+.1f} ± {width[j]:.1f}" for j in best)
         chances = [f"{float(fact[key]):.2g}" for key in ("probability", "given_others", "in_fit")]
         rows.append((str(name), *chances, asks))

@@ -148,8 +148,8 @@ class Levitating:
             square = torque / (floater.inertia * np.sin(angle) * (spin - np.cos(angle)))
             if abs(angle) < np.pi / 2 and square > 0:
                 moment = np.array([np.sin(angle), 0.0, np.cos(angle)])
-                aside = -floater.moment * moment @ slope[:, 0] / (floater.mass * square)
-                place = np.array([aside, 0.0, -height]) / floater.radius
+                offset = -floater.moment * moment @ slope[:, 0] / (floater.mass * square)
+                place = np.array([offset, 0.0, -height]) / floater.radius
                 return np.concatenate([place, moment, [np.sqrt(square) / (2 * np.pi) / UNIT]])
         return None
 
@@ -217,7 +217,7 @@ DESIGN: Columns = {
 
 
 @dataclass(frozen=True, eq=False)
-class CarriedLosses:
+class PosedLosses:
     """The losses of magnets that keep their own currents wherever they are: one table, transformed to each."""
 
     table: RotorLosses  # of a cube about the origin, its axes along the frame's
@@ -272,7 +272,7 @@ def design_row(point: Point, cached: bool = True) -> xr.Dataset:
 def losses_of(scene: Scene, steel: bool) -> tuple[Dissipation, Dissipation | None]:
     """Losses of a scene's magnets and, if asked for, of the block that balances a displaced cube."""
     magnet, block = _canonical_losses(scene.rotor[0].recoil_permeability, steel)
-    return CarriedLosses(magnet, scene.rotor), block
+    return PosedLosses(magnet, scene.rotor), block
 
 
 @cache

@@ -72,10 +72,10 @@ def targets(name: str, design: xr.Dataset) -> Array:
     nodes = dict(zip(QUANTITIES, np.moveaxis(design["node"].values, -1, 0), strict=True))
     part, spins = design["part"].values[:, :, None], design["body_spin"].values
     frequency, bounce, bare, turning = (nodes[name] for name in ("frequency", "bounce", "bare", "precession frequency"))
-    aside = (1 - nodes["side frequency"] / frequency) ** 2
+    lateral = (1 - nodes["side frequency"] / frequency) ** 2
     stable, steady = bare <= STABLE, bounce > 1e-6 * frequency
     met = ~stable & steady & (np.abs(bounce - turning) < 1e-6 * frequency)
-    loose = ~stable & steady & ~met & (aside < APART[1])
+    loose = ~stable & steady & ~met & (lateral < APART[1])
     unstable = -((bare / (2 * np.pi * frequency)) ** 2)
 
     def signed(values: Array, ended: Array, times: float = 1.0) -> Array:
@@ -93,9 +93,9 @@ def targets(name: str, design: xr.Dataset) -> Array:
         "squared bounce": signed((bounce / frequency) ** 2, ~steady),
         "precession": np.where(stable, turning / frequency, np.nan),
         "meeting": signed(between, met, 4.0),
-        "lateral": signed(aside, loose),
+        "lateral": signed(lateral, loose),
     }
-    for motion, over in (("precession", nodes["eddy"]), ("side", eddy / np.sqrt(aside))):
+    for motion, over in (("precession", nodes["eddy"]), ("side", eddy / np.sqrt(lateral))):
         for name in EFFECTS:
             size = 1e-3 if name == "air" else over
             found[f"{motion} {name}"] = np.where(own, nodes[f"{motion} {name}"] / size, np.nan)
@@ -207,7 +207,7 @@ Course = Mapping[str, Array]  # What becomes of n trajectories, by name, see `si
 def simulated(
     surrogate: Surrogate, inputs: Array, frequency: Array, spin: Array, strengths: Array, longest: Array
 ) -> Course:
-    """Flights of n rotors, in the units of the surrogate's scenes.
+    """Trajectories of n rotors, in the units of the surrogate's scenes.
 
     Parameters
     ----------
@@ -292,9 +292,9 @@ LARGE = 3e-3  # Motion with which a floater is lost, m
 SCATTER = 0.7  # Of the logarithm of the residual motion from one trajectory to the next
 TIMES = 0.1  # Of the logarithm of computed times
 SOFT = 0.003  # Of the logarithm of frequencies, which the article gives in whole Hz
-TOLD = 0.1  # Of the logarithm of a made-up time
+REPORTED = 0.1  # Of the logarithm of a made-up time
 DAY, SHORTEST = 86400.0, 3.0  # Longest trajectory of the experiment, and the shortest that counts, s
-NOT_CAUGHT = 0.05
+NOT_CAPTURED = 0.05
 """Probability that all launches fail below a rotor that can levitate a floater: about half are captured (`capture`)."""
 Values = Mapping[str, Array]
 Flight = tuple[str, float, float, float]  # Kind of rotor, its δx or δz (mm), frequency (Hz) and longest time (s)
@@ -387,8 +387,8 @@ def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[F
     for kind, surrogate in models.surrogates.items():
         own = [flight for flight in flights if flight[0] == kind]
         if own:
-            asked = zip(*(models.conditions(values, flight) for flight in own), strict=True)
-            together = simulated(surrogate, *map(np.concatenate, asked))
+            requested = zip(*(models.conditions(values, flight) for flight in own), strict=True)
+            together = simulated(surrogate, *map(np.concatenate, requested))
             parts = {name: np.split(each, len(own)) for name, each in together.items()}
             found |= {flight: {name: each[k] for name, each in parts.items()} for k, flight in enumerate(own)}
     return found
@@ -417,7 +417,7 @@ def ended(flight: Flight, way: str, lasted: float | None = None) -> Likelihood:
         found = ends(models, flight, known[flight], values)[way]
         if lasted is None:
             return found
-        return np.asarray(found * np.exp(-0.5 * ((_logarithm(known[flight]["fall"]) - np.log(lasted)) / TOLD) ** 2))
+        return np.asarray(found * np.exp(-0.5 * ((_logarithm(known[flight]["fall"]) - np.log(lasted)) / REPORTED) ** 2))
 
     return likelihood
 
@@ -454,7 +454,7 @@ def _never(distance: float) -> Fact:
 
     def likelihood(models: Models, values: Values, known: Known) -> Array:
         nothing = ends(models, flight, known[flight], values)["nothing"]
-        return nothing + (1 - nothing) * NOT_CAUGHT
+        return nothing + (1 - nothing) * NOT_CAPTURED
 
     return Fact(f"δz = {distance:g} mm never levitated (up to 200 Hz)", (flight,), likelihood)
 

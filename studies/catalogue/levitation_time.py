@@ -102,10 +102,10 @@ COLUMNS: Columns = {
     "distance_start": (STEP, "m", "distance from the rotor at the start"),
     "distance_end": (STEP, "m", "distance at the end or the cap"),
     "spin_end": (STEP, "1", "body spin at the end or the cap"),
-    "fall_rate": (STEP, "m/s", "mean rate of fall over the first nine tenths of the flight"),
-    "fall_ratio": (STEP, "1", "rate of fall from 0.6 to 0.9 of the flight over that from 0 to 0.3"),
+    "fall_rate": (STEP, "m/s", "mean rate of fall over the first nine tenths of the trajectory"),
+    "fall_ratio": (STEP, "1", "rate of fall from 0.6 to 0.9 of the trajectory over that from 0 to 0.3"),
     "balance_spin": (STEP, "1", "body spin at which drag and eddy currents balance"),
-    "growth": (STEP, "1/s", "largest growth rate of a mode during the flight"),
+    "growth": (STEP, "1/s", "largest growth rate of a mode during the trajectory"),
     "flight_time": ((*STEP, "sample"), "s", "time"),
     "flight_distance": ((*STEP, "sample"), "m", "distance from the rotor"),
 }

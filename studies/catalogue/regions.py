@@ -57,10 +57,10 @@ INTERVAL: Columns = {
     "plate_error": (("tried",), "1", "estimated relative error of the plate's table"),
 }
 LASTING: Columns = {
-    "low": (("metal",), "Hz", "lowest frequency at which flights last"),
-    "high": (("metal",), "Hz", "highest frequency up to which flights last"),
-    "growth_per_s": (("metal",), "1/s", "largest growth rate of a mode in the flight there"),
-    "ended_by": (("metal",), "", "what ends flights beyond"),
+    "low": (("metal",), "Hz", "lowest frequency at which trajectories last"),
+    "high": (("metal",), "Hz", "highest frequency up to which trajectories last"),
+    "growth_per_s": (("metal",), "1/s", "largest growth rate of a mode in the trajectory there"),
+    "ended_by": (("metal",), "", "what ends trajectories beyond"),
 }
 
 
@@ -231,13 +231,13 @@ STEPS, LONGEST = 16, 3600.0  # Frequencies of trajectories; how long they are fo
 COLUMNS: Columns = {
     "low": ((), "Hz", "lowest stable frequency without losses"),
     "high": ((), "Hz", "highest stable frequency without losses"),
-    "lasts_from": ((), "Hz", "lowest frequency at which flights last"),
-    "lasts_to": ((), "Hz", "highest frequency at which flights last"),
+    "lasts_from": ((), "Hz", "lowest frequency at which trajectories last"),
+    "lasts_to": ((), "Hz", "highest frequency at which trajectories last"),
     "rotor_frequency": (("step",), "Hz", "frequency of the rotor"),
     "levitated": (("step",), "s", "time until the loss"),
-    "growth": (("step",), "1/s", "largest growth rate of a mode in the flight"),
-    "end": (("step",), "", "what ended the flight"),
-    "ended_by": ((), "", "what ends flights beyond"),
+    "growth": (("step",), "1/s", "largest growth rate of a mode in the trajectory"),
+    "end": (("step",), "", "what ended the trajectory"),
+    "ended_by": ((), "", "what ends trajectories beyond"),
     "variant": ((), "", "what conducts"),
 }
 ENDS = tuple(COLUMNS)[:4]
@@ -338,7 +338,7 @@ def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
 
 UPPER_LIMIT = Study(
     name="upper-limit",
-    summary="until which frequency flights last, below rotors that do and do not conduct",
+    summary="until which frequency trajectories last, below rotors that do and do not conduct",
     points=limit_points,
     compute=upper_limit,
     figures={"upper-limit": limit_figure},

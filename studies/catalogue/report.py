@@ -55,7 +55,7 @@ def used_references(result: xr.Dataset) -> set[str]:
 
 
 SUMMARIES = {
-    "run": "A scene: its field, the force on the floater, where it levitates, and a flight.",
+    "run": "A scene: its field, the force on the floater, where it levitates, and a trajectory.",
     "simulate": "The motion of the floater from where the scene lets it go.",
     QUESTION: "A quantity of a scene over some of its parameters.",
 }
@@ -112,8 +112,8 @@ def _part(path: Path) -> dict[str, Any]:
         picture = _embedded(file_content(file, MOST, "picture", "a file"), file.suffix[1:])
         pictures.append((SCENE if file.stem.endswith("scene") else file.stem, picture))
     summary = _summary(path) if kind == "run" else {}
-    told = ("headline", "equilibria")  # by themselves
-    answers = {key: json.dumps(value, ensure_ascii=False) for key, value in summary.items() if key not in told}
+    separate = ("headline", "equilibria")  # by themselves
+    answers = {key: json.dumps(value, ensure_ascii=False) for key, value in summary.items() if key not in separate}
     return {
         "name": path.stem,
         "summary": study.summary if study else SUMMARIES.get(kind, ""),

@@ -98,7 +98,7 @@ def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Answer:
 
 
 def question_job(question: Question, values: dict[str, list[Any]], engine: Workers, out: Path) -> Answer:
-    """Answer one's own question over a grid; writes question.nc and its figure.
+    """Compute a question of one's own over a grid; writes question.nc and its figure.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     result = read_result(path)
     if "scene" not in result.attrs or "position_rotor_frame" not in result:
         raise InputError(
-            f"Input {path} must hold a flight (result.nc of `run`, trajectory.nc of `simulate`); instead it is of "
+            f"Input {path} must hold a trajectory (result.nc of `run`, trajectory.nc of `simulate`); instead it is of "
             f"'{result.attrs['study']}'. Its figures: spinlev figure {path}"
         )
     scene, motion = flight_of(result, str(path))

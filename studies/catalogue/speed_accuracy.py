@@ -258,12 +258,12 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
     truth : tolerance of the reference; None for the one of the study
     """
     catalogue = {name: method for name, method in methods(quick).items() if names is None or name in names}
-    asked = truth or (QUICK_TRUTH if quick else TRUTH_TOLERANCE)
+    requested = truth or (QUICK_TRUTH if quick else TRUTH_TOLERANCE)
     truths = {}
     for problem in PERMEABILITIES:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AccuracyWarning)  # its own error is stored, whatever it is
-            table = rotor_table(cube(problem), "auto", asked)
+            table = rotor_table(cube(problem), "auto", requested)
         truths[problem] = _at_points(table)
     errors, costs = [], []
     for name, method in catalogue.items():

@@ -55,7 +55,7 @@ def _loaded(scene: Path) -> "Scene":
 def run(
     scene: Path | None = None,
     *,
-    asked: Models = Models(),
+    requested: Models = Models(),
     spin: float = 0.0,
     duration_s: float = 10.0,
     quick: Flag = False,
@@ -78,18 +78,18 @@ def run(
     """
     positive("--duration-s", duration_s)
     check_spin("--spin", spin)
-    asked = asked.checked()
+    requested = requested.checked()
     if quick:
-        interaction: InteractionModel = "rigid" if asked.interaction == "auto" else asked.interaction
-        rtol, plate_rtol = max(asked.rtol, 1e-3), max(asked.plate_rtol, 0.05)
-        asked = replace(asked, interaction=interaction, rtol=rtol, plate_rtol=plate_rtol)
+        interaction: InteractionModel = "rigid" if requested.interaction == "auto" else requested.interaction
+        rtol, plate_rtol = max(requested.rtol, 1e-3), max(requested.plate_rtol, 0.05)
+        requested = replace(requested, interaction=interaction, rtol=rtol, plate_rtol=plate_rtol)
     loaded = _loaded(scene or default_scene())
     from ...fem.cache import owned
     from ..run import main_job
 
     with owned(output.folder):
-        values, lines = main_job(loaded, asked, spin, duration_s, output.folder)
-    said = f"Quick: field to {asked.rtol:.1%}, plate's response to {asked.plate_rtol:.0%}; without --quick: to the end."
+        values, lines = main_job(loaded, requested, spin, duration_s, output.folder)
+    said = f"Quick: field to {requested.rtol:.1%}, plate's response to {requested.plate_rtol:.0%}."
     return values, [*lines, said] if quick else lines
 
 
@@ -130,7 +130,7 @@ def field(
     rtol
         Relative accuracy asked of the field wherever the floater can be.
     """
-    asked = Models(model, rtol=rtol).checked()
+    requested = Models(model, rtol=rtol).checked()
     if (given := (points is not None) + (plane is not None) + working_point) != 1:
         raise InputError(
             f"Input --points must be given, or --plane, or --working-point; instead received {given or 'none'} of them."
@@ -139,7 +139,7 @@ def field(
         from ..demagnetising import working_point_job
         from ..levitation import Levitation
 
-        return working_point_job(Levitation(_loaded(scene), asked), output.folder)
+        return working_point_job(Levitation(_loaded(scene), requested), output.folder)
     if plane is not None:
         extent = None if extent_mm is None else map_extent(extent_mm)
         check_steps("--steps", steps)
@@ -150,16 +150,18 @@ def field(
     loaded, places = _loaded(scene), read_points(points)
     from ..run import field_job
 
-    return field_job(loaded, places, asked, output.folder)
+    return field_job(loaded, places, requested, output.folder)
 
 
-def equilibria(scene: SceneFile, *, asked: Models = Models(), spin: Spin = 0.0, output: Output = Output()) -> Answer:
+def equilibria(
+    scene: SceneFile, *, requested: Models = Models(), spin: Spin = 0.0, output: Output = Output()
+) -> Answer:
     """All equilibria of the floater, frequency-locked to the rotor, with their modes and stability."""
     check_spin("--spin", spin)
     loaded = _loaded(scene)
     from ..run import equilibria_job
 
-    return equilibria_job(loaded, asked.checked(), spin, output.folder)
+    return equilibria_job(loaded, requested.checked(), spin, output.folder)
 
 
 def compare(
@@ -190,15 +192,20 @@ def compare(
     """
     check_spin("--spin", spin)
     frequencies = None if frequency_hz is None else frequency_grid(frequency_hz)
-    asked = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
+    requested = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
     loaded = _loaded(scene)
     from ..compare import compare_job
 
-    return compare_job(loaded, asked, spin, frequencies, output.folder)
+    return compare_job(loaded, requested, spin, frequencies, output.folder)
 
 
 def simulate(
-    scene: SceneFile, *, duration_s: float, asked: Models = Models(), resume: Flag = False, output: Output = Output()
+    scene: SceneFile,
+    *,
+    duration_s: float,
+    requested: Models = Models(),
+    resume: Flag = False,
+    output: Output = Output(),
 ) -> Answer:
     """Trajectory of the floater and how it ended; writes trajectory.nc and its figure.
 
@@ -215,7 +222,7 @@ def simulate(
     from ..run import simulate_job
 
     with owned(output.folder):
-        return simulate_job(loaded, asked.checked(), duration_s, output.folder, resume)
+        return simulate_job(loaded, requested.checked(), duration_s, output.folder, resume)
 
 
 def plate(
@@ -263,7 +270,7 @@ def study(
     at: Place = "0,0,-20",
     spin: Spin = 0.0,
     duration_s: float = 3.0,
-    asked: Models = Models(),
+    requested: Models = Models(),
     engine: Workers = Workers(),
     output: Output = Output(),
 ) -> Answer:
@@ -306,7 +313,7 @@ def study(
         from ..catalogue.runner import question_job
         from ..question import Question
 
-        question = Question(loaded, name, ask, asked.checked(), spin, duration_s, tuple(1e-3 * place))
+        question = Question(loaded, name, ask, requested.checked(), spin, duration_s, tuple(1e-3 * place))
         return question_job(question, values, engine.checked(), output.folder)
     from ..catalogue.entries import CATALOGUE
 
@@ -393,7 +400,7 @@ def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
     return {"file": str(path)}, [f"Written: {path}. Next: spinlev run {path}"]
 
 
-def export(scene: SceneFile, file: Path, *, asked: Models = Models(), output: Output = Output()) -> Answer:
+def export(scene: SceneFile, file: Path, *, requested: Models = Models(), output: Output = Output()) -> Answer:
     """B, H and M inside and around the bodies, and J in the plate, for ParaView.
 
     Parameters
@@ -404,7 +411,7 @@ def export(scene: SceneFile, file: Path, *, asked: Models = Models(), output: Ou
     loaded = _loaded(scene)
     from ..exchange import export_job
 
-    return export_job(loaded, asked.checked(), file)
+    return export_job(loaded, requested.checked(), file)
 
 
 # A page that leads to another.

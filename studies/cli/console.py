@@ -205,7 +205,7 @@ class _Printed(logging.Handler):
 
 
 @contextmanager
-def heard(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
+def printing(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
     """Messages and progress on standard error inside the block, if they are wanted; details too where `verbose`."""
     if not wanted or LOG.handlers:
         yield

@@ -19,7 +19,7 @@ from rich.console import Console
 from ...geometry.common import SpinlevError, printable
 from ..figures.style import figures_across
 from . import commands
-from .console import FORTRAN, answers_only, heard, is_missing_library, missing_extra, note, to_json, way_out
+from .console import FORTRAN, answers_only, is_missing_library, missing_extra, note, printing, to_json, way_out
 from .options import Output
 from .start import STOPPED, TOO_MANY_FILES
 
@@ -49,14 +49,14 @@ def run(arguments: list[str], stop: threading.Event) -> int:
 
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
     """The exit status; `stop` tells that the user has stopped the program, whatever a library made of that."""
-    with heard(verbose="--verbose" in arguments):
+    with printing(verbose="--verbose" in arguments):
         try:
             _answer(arguments, out)
         except CycloptsError as error:
-            note(f"{_told(error)}\nTry: spinlev --help")
+            note(f"{_message(error)}\nTry: spinlev --help")
             return 2
         except SpinlevError as error:
-            note(_told(error))
+            note(_message(error))
             return error.exit_status
         except OSError as error:
             where = error.filename or "standard output"
@@ -77,7 +77,7 @@ def _status(arguments: list[str], out: Any, stop: threading.Event | None = None)
     return 0
 
 
-def _told(error: Exception) -> str:
+def _message(error: Exception) -> str:
     """An error as a message, what was received in it cut where it is longer than anybody reads."""
     lines = f"spinlev: {error}".split("\n")
     return "\n".join(line if len(line) <= LONGEST else f"{line[:LONGEST]} ..." for line in lines)

@@ -22,7 +22,7 @@ from cyclopts import Parameter
 from ...geometry.common import Array, InputError, no_argument, shown
 from ...geometry.files import file_content
 from ..figures.style import FigureWidth
-from .console import heard
+from .console import printing
 
 Answer = tuple[Mapping[str, Any], list[str]]  # of a command: numbers for a program, lines for a person
 COLUMNS = ("x_mm", "y_mm", "z_mm")
@@ -271,7 +271,7 @@ class Workers:
 # What the functions of `spinlev` have in common
 
 
-class Asked(TypedDict, total=False):
+class Requested(TypedDict, total=False):
     """Fields of `Models` that functions take by name only."""
 
     rtol: float
@@ -309,18 +309,18 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
     Messages are printed where `progress` is true; of an unknown keyword it says which one it resembles.
     """
     signature = inspect.signature(function)
-    known = [*signature.parameters, *Asked.__annotations__]
+    known = [*signature.parameters, *Requested.__annotations__]
 
     @wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> T:
         for name in kwargs.keys() - known:
             raise TypeError(no_argument(function.__name__, name, known))
-        with heard(bool(signature.bind(*args, **kwargs).arguments.get("progress"))):
+        with printing(bool(signature.bind(*args, **kwargs).arguments.get("progress"))):
             return function(*args, **kwargs)
 
     own = [parameter for parameter in signature.parameters.values() if parameter.kind != parameter.VAR_KEYWORD]
-    if len(own) < len(signature.parameters):  # `**asked`, one by one
-        hints = {name: getattr(hint, "__forward_arg__", hint) for name, hint in Asked.__annotations__.items()}
+    if len(own) < len(signature.parameters):  # `**requested`, one by one
+        hints = {name: getattr(hint, "__forward_arg__", hint) for name, hint in Requested.__annotations__.items()}
         only = inspect.Parameter.KEYWORD_ONLY
         own += [inspect.Parameter(name, only, default=getattr(Models, name), annotation=hints[name]) for name in hints]
     called.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
@@ -338,7 +338,7 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
 MOST_VALUES = 100_000  # points of a sweep, at most
 
 
-def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
+def parse_vary(requested: Sequence[str]) -> dict[str, list[Any]]:
     """Values by key, in the order given.
 
     Raises
@@ -346,7 +346,7 @@ def parse_vary(asked: Sequence[str]) -> dict[str, list[Any]]:
     InputError : not of this form, no number, no value, a key given twice, or too many points
     """
     found: dict[str, list[Any]] = {}
-    for text in asked:
+    for text in requested:
         key, equals, values = text.partition("=")
         if not equals or not key:
             raise _wrong(text)

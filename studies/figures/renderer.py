@@ -17,7 +17,7 @@ from ...geometry.common import ComputationError
 from ..processes import Death, results
 from .view import Sample
 
-Told = Callable[[float], None]  # called with the finished part of all
+Progress = Callable[[float], None]  # called with the finished part of all
 
 
 class RenderError(ComputationError):
@@ -31,7 +31,7 @@ class Picture(Protocol):
         """The finished part, now and then, and last the file's content; iterated in the other process."""
 
 
-def render(pictures: Mapping[Path, Picture], progress: Told = lambda fraction: None) -> None:
+def render(pictures: Mapping[Path, Picture], progress: Progress = lambda fraction: None) -> None:
     """Draw pictures, all in one process, and write each as soon as it is finished.
 
     Parameters
@@ -84,7 +84,7 @@ def unavailable() -> str | None:
     return None
 
 
-def drawn(pictures: Sequence[Picture], progress: Told = lambda fraction: None) -> Generator[bytes, None, None]:
+def drawn(pictures: Sequence[Picture], progress: Progress = lambda fraction: None) -> Generator[bytes, None, None]:
     """The files' contents, one after the other. Raises RenderError, the end of a sentence: why there are no more."""
     try:
         with closing(results(1, _drawing, deque([pictures]), showing=True)) as answers:
@@ -111,8 +111,8 @@ def _drawing(pictures: Sequence[Picture]) -> Iterator[float | bytes | str]:
     """What the process that draws answers: finished parts, contents, and the reason where there is no more."""
     try:
         for number, picture in enumerate(pictures):
-            for told in picture.draw():
-                yield (number + told) / len(pictures) if isinstance(told, float) else told
+            for part in picture.draw():
+                yield (number + part) / len(pictures) if isinstance(part, float) else part
     except Exception as error:  # whatever it is, the other process says it in a line
         from ..cli.console import DRAWING, is_missing_library, missing_extra, way_out
 

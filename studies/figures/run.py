@@ -118,7 +118,7 @@ def force_figure(result: xr.Dataset) -> Figure:
     """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
     figure, ((axes, near),) = panels(1, 2, 3.6)
     weight = -1e3 * float(result.attrs["weight_N"])
-    felt = result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1  # older results do not say
+    acting = result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1  # older results do not say
     depth = -1e3 * result["equilibrium_position"].sel(axis="z")
     curves = result[["curve_model", "curve_number", "curve_position", "curve_force"]]  # without the trajectory
     peaks = [3.5 * weight]
@@ -134,7 +134,7 @@ def force_figure(result: xr.Dataset) -> Figure:
                 panel.plot(*_smooth(np.arange(float(len(force))), distance, force), **look)
                 peaks += force[1:-1][(force[1:-1] > force[:-2]) & (force[1:-1] > force[2:])].tolist()
         for plate, stable, marker, fill, label in MARKS:
-            chosen = (felt == plate) & (result["equilibrium_stable"] == stable)
+            chosen = (acting == plate) & (result["equilibrium_stable"] == stable)
             if chosen.any():
                 panel.plot([], [], marker, color="0.3", mfc=fill or "0.3", label=label)
             for model in np.unique(result["equilibrium_model"].values[chosen.values]).tolist():
@@ -315,9 +315,9 @@ def _derived(result: xr.Dataset) -> xr.Dataset:
         depth = (-1e3 * result["position"].sel(axis="z")).assign_attrs(units="mm", long_name="levitation distance")
         result = result.assign(depth=depth)
     if "lateral_offset" in result:
-        aside = (1e3 * result["lateral_offset"]).assign_attrs(units="mm", long_name="lateral offset")
+        offset = (1e3 * result["lateral_offset"]).assign_attrs(units="mm", long_name="lateral offset")
         angle = result["polar_angle"].assign_attrs(long_name="polar angle")
-        result = result.assign(lateral_offset=aside, polar_angle=angle)
+        result = result.assign(lateral_offset=offset, polar_angle=angle)
     if "B" in result:
         x, y, z = (1e3 * result["B"].sel(axis=axis, drop=True) for axis in "xyz")
         parts = {"across": (x**2 + y**2) ** 0.5, "along": abs(z)}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
-from spinlev.dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_answers
+from spinlev.dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_mutual
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
@@ -48,8 +48,8 @@ def test_shift_by_mutual_magnetisation(table, alone):
     effect = Mutual(answers, PERMEABLE.moment)
     there = find_equilibria(SCENE, Interaction(table, (effect,)))[0]
     moved = np.linalg.norm(there.position - alone.position)
-    assert shift_by_answers(SCENE, table, alone, answers) == pytest.approx(moved, rel=0.02)
-    assert shift_by_answers(SCENE, table, alone, None) == pytest.approx(moved, rel=1.0)
+    assert shift_by_mutual(SCENE, table, alone, answers) == pytest.approx(moved, rel=0.02)
+    assert shift_by_mutual(SCENE, table, alone, None) == pytest.approx(moved, rel=1.0)
     for depth in (15e-3, 20e-3, 30e-3):
         place, direction = np.array([[1e-3, 0.0, -depth]]), np.array([[0.2, 0.0, 0.98]])
         direction /= np.linalg.norm(direction)

@@ -34,7 +34,7 @@ def begun(part, checkpoint):
     """What is flown when the user stops at a part of the flight."""
     with pytest.raises(FlightStopped) as stop:
         simulate(SCENE, DIPOLE, 4.0, compact=True, progress=stopped_at(part), checkpoint=checkpoint)
-    return stop.value.flown
+    return stop.value.simulated
 
 
 @pytest.mark.parametrize("seconds", [0.0, 1e9])

@@ -123,7 +123,7 @@ def test_progress_rises_to_one_and_an_interrupt_keeps_what_is_finished():
 
     with pytest.raises(FlightStopped, match=r"stopped at 0\.0") as stop:
         simulate(thrown((0.0, 0.0, -30e-3), (0.0, 0.0, 0.0)), DIPOLE, 0.05, compact=True, progress=interrupt)
-    flight = stop.value.flown
+    flight = stop.value.simulated
     assert flight.ended_by == "stopped"
     assert 0 < flight.levitated_s < 0.05
     assert len(flight.time) > 10

@@ -9,7 +9,7 @@ from article import PERMEABLE, PERMEABLE_MAGNETS
 
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, in_ball
-from spinlev.dynamics.flights.batch import fly_together
+from spinlev.dynamics.flights.batch import simulate_together
 from spinlev.dynamics.flights.flight import Flight, displaced, integrate
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import mutual_choice
@@ -150,7 +150,7 @@ def test_a_floater_that_swings_wide_moves_as_by_the_tables_energy(mutual, start)
     begun = displaced(start.state, np.array([3e-4, 0.0, 0.0]), SCENE.angular_velocity)
     near = integrate(flight, begun, 0.3)
     whole = integrate(Flight(SCENE, mutual, 0.3, compact=True, in_balls=False), begun, 0.3)
-    (lane,) = fly_together([SCENE], mutual, [begun], 0.3)
+    (lane,) = simulate_together([SCENE], mutual, [begun], 0.3)
     assert np.hypot(*near.lab.position[:, :2].T).max() > 2e-3
     assert 0 not in flight.parts
     assert near.field_changes.count > 50
@@ -169,7 +169,7 @@ def test_flights_in_lanes_of_which_some_stay_empty_are_those_alone(mutual, start
     """Three side by side: where nobody flies the equations are asked for all the same, and must be finite."""
     scenes = [replace(SCENE, frequency=frequency) for frequency in (109.0, 110.0, 111.0)]
     begun = replace(start.state, position=start.state.position + np.array([0.0, 0.0, 1e-4]))
-    flown = fly_together(scenes, mutual, [begun] * 3, 0.1)
+    flown = simulate_together(scenes, mutual, [begun] * 3, 0.1)
     for scene, found in zip(scenes, flown, strict=True):
         alone = integrate(Flight(scene, mutual, 0.1, compact=True), begun, 0.1)
         assert np.abs(found.lab.position - alone.lab.position).max() < 1e-10 * 0.02

@@ -6,8 +6,8 @@ import pytest
 from spinlev.dynamics.flights.batch import ensemble, launched
 from spinlev.dynamics.flights.trajectory import DURATION
 from spinlev.studies.catalogue.capture import (
+    CAPTURED,
     FARTHER,
-    HELD,
     LEAN,
     NEARER,
     NO_EQUILIBRIUM,
@@ -92,7 +92,7 @@ def test_seeds_differ_from_rotor_to_rotor_and_from_batch_to_batch():
 def test_a_small_point_is_computed_drawn_and_told():
     row = CAPTURE.compute(POINT)
     assert set(np.unique(row["outcome"])) <= set(range(4))
-    held = (row["outcome"] == HELD).values
+    held = (row["outcome"] == CAPTURED).values
     np.testing.assert_array_equal(row["levitated"].values[held], 1.0)
     assert (row["levitated"].values[~held] < 1.0).all()
     assert 2 <= held.sum() <= 11  # the share of 200 flights is 57 %: beyond this is one in thousands
