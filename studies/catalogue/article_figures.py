@@ -1,13 +1,11 @@
 """The article's figures of field, force along the axis and side mode, beside those of the finite magnets."""
 
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import ScalarFormatter
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
@@ -15,7 +13,7 @@ from scipy.optimize import brentq
 from ...dynamics.continuation.frequencies import kicked, levitating_branch
 from ...dynamics.flights.flight import simulate
 from ...geometry.common import Array
-from ..figures.style import DASHES, NAMES, PALETTE, legend_below, panels, plot_branch, styled
+from ..figures.style import DASHES, NAMES, PALETTE, legend_below, panels, plain_log, plot_branch, styled
 from ..levitation import Levitation
 from ..plan import sources
 from ..result import Columns, variable
@@ -54,7 +52,7 @@ def field_components(point: Point) -> xr.Dataset:
         places = DISTANCES[:, None] * np.array([0.0, 0.0, -1.0])
         b, _ = model.evaluate(places)
         across, along, error = np.hypot(b[:, 0], b[:, 1]), b[:, 2], model.absolute_error(places)[0]
-    there = variable(("distance",), DISTANCES, "m", "distance below the rotor's origin")
+    there = variable(("distance",), DISTANCES, "m", "distance from the rotor's origin along the axis")
     return recorded(point, FIELD_COLUMNS, (across, along, error), {"distance": there})
 
 
@@ -73,20 +71,27 @@ def deviations(part: xr.Dataset) -> dict[str, Any]:
     return {**found, "fem": true["field_error"] / size}
 
 
+COMPONENTS = {"off_axis": r"off-axis field $B_\perp$ (mT)", "on_axis": r"on-axis field $B_z$ (mT)"}
+
+
 @showing.drawn
-def component_figure(result: xr.Dataset, quantity: str, ylabel: str) -> Figure:
-    """One component of the field below the rotor against the parameter of each configuration."""
+def components_figure(result: xr.Dataset) -> Figure:
+    """Both components of the field below the rotor against the parameter of each configuration."""
     styles = {"fem": DASHES["fem"], "dipole": DASHES["dipole"], "article": "+"}
-    figure, rows = showing.configuration_panels(result, 2.7, ylabel=ylabel)
-    for axes, configuration, part in rows:
-        for model, style in styles.items():
-            found = _of(part, model)
-            for k, color in zip(range(found.sizes["distance"]), PALETTE, strict=False):
-                axes.plot(found["value"], 1e3 * found[quantity][:, k], style, color=color, ms=4)
-        axes.set(xlabel=article.label_of(configuration), yscale="log")
-    rows[0][0].yaxis.set_major_formatter(ScalarFormatter())
+    configurations = dict(showing.by_configuration(result))
+    figure, axes = panels(2, len(configurations), 2.5)
+    for row, (quantity, label) in zip(axes, COMPONENTS.items(), strict=True):
+        values = 1e3 * result[quantity]
+        row[0].set_ylabel(label)
+        for panel, (configuration, part) in zip(row, configurations.items(), strict=True):
+            for model, style in styles.items():
+                found = _of(part, model)
+                for k, color in zip(range(found.sizes["distance"]), PALETTE, strict=False):
+                    panel.plot(found["value"], 1e3 * found[quantity][:, k], style, color=color, ms=4)
+            plain_log(panel.yaxis)
+            panel.set(xlabel=article.label_of(configuration), ylim=(0.8 * values.min(), 1.25 * values.max()))
     names = {**NAMES, "article": "formulas of the article"}
-    _explain(rows[0][0], result, {names[model]: style for model, style in styles.items()})
+    _explain(axes[0, 0], result, {names[model]: style for model, style in styles.items()})
     return figure
 
 
@@ -94,20 +99,21 @@ def component_figure(result: xr.Dataset, quantity: str, ylabel: str) -> Figure:
 def differences_figure(result: xr.Dataset) -> Figure:
     """How far the simpler models are from the finite elements."""
     figure, rows = showing.configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
+    worst = 0.0
     for axes, configuration, part in rows:
         value, off = _of(part, "fem")["value"], deviations(part)
         for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
             for model in ("dipole", "cuboid"):
                 axes.plot(value, 100 * off[model][:, k], DASHES[model], color=color)
-        axes.plot(value, 100 * off["fem"].max("distance"), ":", color="0.5", lw=1.6)
-        axes.set(xlabel=article.label_of(configuration), yscale="log")
+        worst = max(worst, 100 * float(off["fem"].max()))
+        axes.set(xlabel=article.label_of(configuration), ylim=(0, None))
     names = {NAMES[model]: DASHES[model] for model in ("dipole", "cuboid")}
-    _explain(rows[0][0], result, names | {"largest error of the finite elements": ":"})
+    _explain(rows[0][0], result, names | {f"error of the finite elements: at most {worst:.1g} %": " "})
     return figure
 
 
 def _explain(axes: Axes, result: xr.Dataset, models: dict[str, str]) -> None:
-    places = {f"{1e3 * distance:g} mm below": f"C{k}-" for k, distance in enumerate(result["distance"].values)}
+    places = {f"distance {1e3 * distance:g} mm": f"C{k}-" for k, distance in enumerate(result["distance"].values)}
     showing.explain(axes, places | models)
 
 
@@ -125,17 +131,12 @@ def components_lines(result: xr.Dataset) -> list[str]:
     return [*showing.text_table(head, rows), last]
 
 
-OFF, ON = r"off-axis field $B_\perp$ (mT)", r"on-axis field $B_z$ (mT)"
 FIELD_COMPONENTS = Study(
     name="field-components",
     summary="off-axis and on-axis field against the parameter of each rotor of the article, by four models",
     points=field_points,
     compute=field_components,
-    figures={
-        "field-components-off-axis": partial(component_figure, quantity="off_axis", ylabel=OFF),
-        "field-components-on-axis": partial(component_figure, quantity="on_axis", ylabel=ON),
-        "field-components-differences": differences_figure,
-    },
+    figures={"field-components": components_figure, "field-components-differences": differences_figure},
     report=components_lines,
 )
 
@@ -220,7 +221,11 @@ STYLES = {
     "semi-analytic": (":", "article, semi-analytic"),
     "small angles": ("-.", "article, small angles"),
 }
-POINTS = {"near_tipping": ("<", "near tipping point"), "equilibrium": ("o", "stable"), "far_tipping": (">", "far one")}
+POINTS = {
+    "near_tipping": ("<", "near tipping point"),
+    "equilibrium": ("o", "stable"),
+    "far_tipping": (">", "far tipping point"),
+}
 
 
 @showing.drawn
@@ -240,6 +245,7 @@ def parts_figure(result: xr.Dataset) -> Figure:
         showing.explain(left, {text: style})
     showing.explain(left, {"attracting part": "C0-", "repelling part": "C1-", "net force, with gravity": "k-"})
     _mark(left, true, PALETTE[2])
+    showing.explain(left, {words: symbol for symbol, words in POINTS.values()}, ms=5)
     left.axhline(0.0, color="0.3", lw=0.6)
     left.set(ylabel="force, upwards (mN)", ylim=(-470, 350), title=f"(a) δx = 1 mm, {float(one['frequency']):g} Hz")
     right.set(ylabel="deviation from finite elements\n(% of the weight)", ylim=(-25, 25))
@@ -258,6 +264,7 @@ def net_figure(result: xr.Dataset) -> Figure:
         _plot(angle, found, 1e-3 * np.degrees(found["polar_angle"].values), "-", color=color)
         showing.explain(net, {f"{float(found['frequency']):g} Hz": f"C{k}-"})
     showing.explain(net, {text: style for style, text in list(STYLES.values())[:2]})
+    showing.explain(net, {words: symbol for symbol, words in POINTS.values()}, ms=5)
     net.axhline(0.0, color="0.3", lw=0.6)
     net.set(ylabel="net force, with gravity (mN)", ylim=(-60, 1.1e3 * float(_net(result).max())))
     angle.axhline(REPORTED_ANGLE, color="0.4", lw=0.8, ls="-.", label="near tipping point in the article")
@@ -276,8 +283,8 @@ def _plot(axes: Axes, found: xr.Dataset, values: ArrayLike, style: str, **more: 
 
 
 def _mark(axes: Axes, found: xr.Dataset, color: str) -> None:
-    for name, (symbol, text) in POINTS.items():
-        axes.plot(1e3 * float(found[name]), 0.0, symbol, color=color, ms=5, label=text)
+    for name, (symbol, _) in POINTS.items():
+        axes.plot(1e3 * float(found[name]), 0.0, symbol, color=color, ms=5)
 
 
 def force_lines(result: xr.Dataset) -> list[str]:
@@ -394,7 +401,8 @@ def radius_figure(result: xr.Dataset) -> Figure:
         frequency, stable = found["frequency"], article.stable_in_flight(found["growth"])
         plot_branch(axes, frequency, 1e3 * found["radius"], stable, color=color)
         axes.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
-        axes.set(xlim=(35, 255), ylim=(0, None))
+        axes.set_xlim(35, 255)
+        plain_log(axes.yaxis)
     key = {"stable": "-", "unstable": "--", "$\\mathcal{G}/\\mu_f\\omega^2$ of the article": ":"}
     showing.explain(rotors[0][0], key)
     return figure

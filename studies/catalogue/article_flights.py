@@ -128,11 +128,9 @@ def models_figure(result: xr.Dataset) -> Figure:
     """The levitation distance of every rotor by finite elements and by the dipole."""
     figure, rotors = rotor_panels(result, 4.0, *AXES)
     for axes, rotor, color in rotors:
-        width = 1.8 if _levitated(rotor) else 0.8
-        for side in SIDES:
-            frequency, distance, stable = _side(rotor, "fem", side)
-            plot_branch(axes, frequency, distance, stable, color=color, lw=width)
-            axes.plot(frequency, _side(rotor, "dipole", side)[1], ":", color=color, lw=0.8)
+        frequency, distance, stable = _branch(rotor, "fem")
+        plot_branch(axes, frequency, distance, stable, color=color, lw=1.8 if _levitated(rotor) else 0.8)
+        axes.plot(*_branch(rotor, "dipole")[:2], ":", color=color, lw=0.8)
         found = case_with(rotor, model="fem")
         axes.plot(found["fold_frequency"], 1e3 * found["fold_distance"], "o", color=color, ms=3)
         axes.set_ylim(8, 52)
@@ -169,6 +167,15 @@ def _side(rotor: xr.Dataset, model: str, side: str) -> tuple[Array, Array, NDArr
     """Frequency (Hz), distance (mm) and whether it is stable on one side, by one model."""
     found = case_with(rotor, model=model).sel(side=side)
     return found["frequency"].values, 1e3 * found["distance"].values, article.stable_in_flight(found["growth"])
+
+
+def _branch(rotor: xr.Dataset, model: str) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """As of `_side`, from the highest frequency on the far side through the fold to the highest on the near one."""
+    fold, (near, far) = case_with(rotor, model=model), (_side(rotor, model, side) for side in SIDES)
+    middle = [fold["fold_frequency"]], [1e3 * fold["fold_distance"]], [near[2][np.isfinite(near[1])][:1].any()]
+    found = [np.concatenate([f[::-1], m, n]) for f, m, n in zip(far, middle, near, strict=True)]
+    frequency, distance, stable = (values[np.isfinite(found[1])] for values in found)
+    return frequency, distance, stable.astype(bool)
 
 
 def distance_lines(result: xr.Dataset) -> list[str]:
@@ -315,7 +322,7 @@ def flight_figure(result: xr.Dataset) -> Figure:
                 mark = "v" if one["averaged_end"] == "fold" else "x"
                 panel.plot(time[last], np.clip(mean[last], 12, 34), mark, color=color, ms=5)
         panel.set_ylim(11, 40)
-    explain(rows[0][0], {"averaged trajectory": "--", "lost in a fall": "v", "lost in oscillations": "x"}, ms=4)
+    explain(rows[0][0], {"averaged trajectory": "--", "lost at the fold": "v", "lost in oscillations": "x"}, ms=4)
     return figure
 
 
@@ -330,7 +337,7 @@ def flight_lines(result: xr.Dataset) -> list[str]:
             cells = (one["kind"].item(), float(one["levitated"]), ends, one["averaged_end"].item(), *numbers)
             name = f"{article.rotor_label('horizontal', float(rotor['value']))}, {frequency:g} Hz"
             rows.append((name, *cells, REPORTED.get(float(frequency), "")))
-    head = ("rotor", "simulated", "for (s)", "mean distance (mm)", "averaged", "for (s)", "growth (1/s)", "energy")
+    head = ("rotor", "simulated", "for (s)", "mean distance (mm)", "averaged", "for (s)", "growth (s⁻¹)", "energy")
     return [
         *text_table((*head, "article"), rows),
         "Energy: violation of its balance. Article: what it reports for δx = 1 mm.",

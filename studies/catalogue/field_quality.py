@@ -119,13 +119,13 @@ def validity_lines(result: xr.Dataset) -> list[str]:
 @drawn
 def validity_figure(result: xr.Dataset) -> Figure:
     """Error of each model against the distance, on the axis and at the largest lateral offset, rotor by rotor."""
-    distance, words = 1e3 * result["distance"].values, ("distance (mm)", "relative error of B")
-    rotors = {rotor: result.sel(rotor=rotor) for rotor in result["rotor"].values.tolist()}
+    distance, words = 1e3 * result["distance"].values, ("levitation distance (mm)", "relative error of B")
+    rotors = {rotor.split(", ")[1]: result.sel(rotor=rotor) for rotor in result["rotor"].values.tolist()}
     figure, rows = small_multiples(rotors, 3.0, 3, *words, sharey=True)
     for panel, rotor in rows:
-        for model, color in zip(result["model"].values, PALETTE, strict=False):
+        for model, color in zip(result["model"].values.tolist(), PALETTE, strict=False):
             error = rotor["field_error"].sel(model=model)
-            panel.semilogy(distance, error.isel(offset=0), color=color, label=str(model))
+            panel.semilogy(distance, error.isel(offset=0), color=color, label=model)
             panel.semilogy(distance, error.isel(offset=-1), ":", color=color)
         own = rotor["truth_error"].max("offset")
         panel.semilogy(distance, own, color="0.6", lw=2.5, label="error of the finite elements")

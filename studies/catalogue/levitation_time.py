@@ -18,7 +18,7 @@ from ...geometry.scene.contents import Drag, Scene
 from ..figures.style import PALETTE, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
-from .article import FLOATER, PERMEABILITY, REMANENCE, levitation_of, losses, rotor_scene
+from .article import FLOATER, PERMEABILITY, REMANENCE, levitation_of, losses, rotor_label, rotor_scene
 from .showing import drawn, small_multiples, span, text_table
 
 
@@ -185,7 +185,7 @@ def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
 
 
 MARKS = dict(zip(OUTCOMES, ("v", "o", "X", "^", "|"), strict=True))
-MEANINGS = ("touches the rotor", "falls (fold)", "lost in oscillations", "levitates for 250 s", "no equilibrium")
+MEANINGS = ("touches the rotor", "lost at the fold", "lost in oscillations", "levitates for 250 s", "no equilibrium")
 """Of the outcomes, in a legend."""
 BANDS = {
     "displacement": "displacement ±0.2 mm, ±0.5 mm or ±0.5°",
@@ -196,7 +196,7 @@ BANDS = {
 LINES = {
     "complete": ("-", "mutual magnetisation, currents in the rotor too"),
     "rough release": ("--", "oscillation from 0.1 mm, not 3 µm"),
-    "Stokes drag": (":", "air after Stokes"),
+    "Stokes drag": (":", "Stokes drag"),
 }
 REPORTED = {
     "horizontal 1 mm": {115: "linear fall", 140: "stable", 150: "oscillating loss"},
@@ -226,7 +226,8 @@ def times_figure(result: xr.Dataset) -> Figure:
         nominal, outcome = (rotor[name].sel(variant="nominal") for name in ("levitation_time", "outcome"))
         panel.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
         for number, (mark, words) in enumerate(zip(MARKS.values(), MEANINGS, strict=True)):
-            panel.plot(frequency, nominal.where(outcome == number), mark, color=PALETTE[0], ms=3.5, label=words)
+            if (outcome == number).any():
+                panel.plot(frequency, nominal.where(outcome == number), mark, color=PALETTE[0], ms=3.5, label=words)
         for there, end in REPORTED.get(rotor["case"].item(), {}).items():
             panel.axvline(there, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
         panel.set(ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
@@ -236,7 +237,7 @@ def times_figure(result: xr.Dataset) -> Figure:
 @styled
 def flights_figure(result: xr.Dataset) -> Figure:
     """Distance against time in some nominal trajectories of each rotor, their frequencies by colour."""
-    figure, rows = small_multiples(_rotors(result), 2.2, 3, "time (s)", "distance (mm)")
+    figure, rows = small_multiples(_rotors(result), 2.2, 3, "time (s)", "levitation distance (mm)")
     for panel, rotor in rows:
         nominal, frequency = rotor.sel(variant="nominal"), rotor["frequency"].values
         counted = np.flatnonzero(nominal["levitation_time"].values >= float(result.attrs["shortest_s"]))
@@ -255,7 +256,7 @@ def flights_figure(result: xr.Dataset) -> Figure:
 def _rotors(result: xr.Dataset) -> dict[str, xr.Dataset]:
     """The part of each rotor, in the order of displacement or tilt, by the title of its panel."""
     cases = sorted(result["case"].values.tolist(), key=lambda name: CASES[name][:2])
-    return {case.replace(" deg", "°"): result.sel(case=case) for case in cases}
+    return {rotor_label(*CASES[case][:2]): result.sel(case=case) for case in cases}
 
 
 def time_lines(result: xr.Dataset) -> list[str]:
@@ -273,7 +274,7 @@ def time_lines(result: xr.Dataset) -> list[str]:
                 values = (one["frequency"], one["levitation_time"], *scaled, one["fall_ratio"], one["balance_spin"])
                 cells = [span(value) if number != NO_EQUILIBRIUM or not k else "" for k, value in enumerate(values)]
                 rows.append((f"{case}, {variant}: {name}", *cells))
-    head = ("flights", "at (Hz)", "time (s)", "from (mm)", "to (mm)", "fall (mm/s)", "late/early", "balance at spin")
+    head = ("outcome", "at (Hz)", "time (s)", "from (mm)", "to (mm)", "fall (mm/s)", "late/early", "balance at spin")
     return text_table(head, rows)
 
 

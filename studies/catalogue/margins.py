@@ -32,7 +32,7 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Floater, Scene
 from ..cli.console import note
 from ..cli.options import FieldModel
-from ..figures.style import PALETTE
+from ..figures.style import PALETTE, plain_log
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
 from . import article, showing
@@ -206,7 +206,7 @@ def contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figur
     for axes, rotor, color in rotors:
         value, error = contributions(rotor.isel(case=0), quantity)[:, chosen]
         axes.errorbar(value, range(len(chosen)), xerr=error, fmt="o", ms=4, color=color)
-        showing.plain_log(axes)
+        plain_log(axes.xaxis)
     first = rotors[0][0]
     first.set_yticks(range(len(chosen)), [list(PARAMETERS.values())[k].words for k in chosen])
     first.invert_yaxis()
@@ -239,7 +239,7 @@ def sensitivity_lines(result: xr.Dataset) -> list[str]:
         moved = 1e3 * (one["leaning_distance"] - one["leaning_distance"][0]).values[1:]
         leans.append((head, *(f"{d:+.4f}" for d in moved), *(f"{g:.1e}" for g in one["leaning_growth"].values[1:])))
     units = [f"{quantity} ({unit})" for quantity, (_, unit) in SCALES.items()]
-    tilted = [f"{words}, {tilt:g}°" for words in ("distance (mm)", "growth (1/s)") for tilt in TILTS[1:]]
+    tilted = [f"{words}, {tilt:g}°" for words in ("distance (mm)", "growth (s⁻¹)") for tilt in TILTS[1:]]
     per = "derivative, by mm or °", "lowest (Hz)", "highest (Hz)", *(f"{q} (mm)" for q in QUANTITIES[2:])
     return [
         *showing.text_table(per, slopes),

@@ -22,7 +22,7 @@ from ...geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box, rotation_matrix
 from ..cli.options import PlateModel
-from ..figures.style import PALETTE, panels
+from ..figures.style import PALETTE, panels, plain_log
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with, each_case, study_of_one
@@ -189,7 +189,7 @@ def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
 def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
     """Damping rate of each mode against what is varied; crosses: it grows; bars: error of the plate's table."""
     titles = {SWEEPS[sweep][0]: sweep for sweep in sweeps}
-    figure, rows = showing.small_multiples(titles, 3.0, 3, ylabel="damping rate (1/s)", sharey=True)
+    figure, rows = showing.small_multiples(titles, 3.0, 3, ylabel="damping rate (s⁻¹)", sharey=True)
     for panel, sweep in rows:
         for ending, (words, style, fill) in ENDINGS.items():
             part = part_of(result, sweep + ending)
@@ -202,9 +202,9 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
             showing.explain(panel, {words: style}, mfc=fill, ms=4)
         panel.set_xlabel(SWEEPS[sweep][1])
         if sweep in PLACES:
-            showing.plain_log(panel, DISTANCES)
+            plain_log(panel.xaxis, DISTANCES)
         elif sweep != "frequency":
-            panel.set_xscale("log")
+            plain_log(panel.xaxis)
     return figure
 
 
@@ -229,8 +229,8 @@ def rotors_figure(result: xr.Dataset) -> Figure:
         _damped(axes, places, part["growth"].max("mode"), part["error"], marker, color, None)
         showing.explain(axes, {f"plate {place}": marker}, color=color, ms=4)
         rotors = zip(part["configuration"].values.tolist(), part["value"].values.tolist(), strict=True)
-        axes.set_xticks(places, [article.rotor_label(*rotor) for rotor in rotors], rotation=90)
-    axes.set(xlabel="rotor; face of the plate at 18 mm", ylabel="damping rate of the\nleast stable mode (1/s)")
+        axes.set_xticks(places, [article.rotor_label(*rotor).replace(" = ", "\n") for rotor in rotors])
+    axes.set(xlabel="rotor; face of the plate at 18 mm", ylabel="damping rate of the\nleast stable mode (s⁻¹)")
     return figure
 
 
@@ -248,7 +248,7 @@ def means_figure(result: xr.Dataset) -> Figure:
                     more: Any = {"ms": 4, "color": color, "mfc": fill, "label": f"{place}, {words}"}
                     panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
         panel.set(ylabel=label, yscale="linear" if name == "lift" else "log")
-        showing.plain_log(panel, DISTANCES)
+        plain_log(panel.xaxis, DISTANCES)
     return figure
 
 
@@ -275,7 +275,7 @@ def damping_lines(result: xr.Dataset) -> list[str]:
                 cells = [mode, rate, *(f"{float(v):.3g}" for v in means(one).values())]
             before = f"{float(one['growth_without'].max()):+.1g}"
             rows.append((where, f"{float(one['rotor_frequency']):.1f}", before, *cells))
-    head = ("where", "rotor (Hz)", "growth without (1/s)", "least stable mode", "growth (1/s)")
+    head = ("where", "rotor (Hz)", "growth without (s⁻¹)", "least stable mode", "growth (s⁻¹)")
     return [*showing.text_table((*head, *(words for _, words in MEANS.values())), rows), sentence(result)]
 
 
@@ -291,12 +291,12 @@ def sentence(result: xr.Dataset) -> str:
             showing.range_text(worst, abs(worst) * part["error"]),
         )
         lost = f", {gone} without an equilibrium" if gone else ""
-        words.append(f"{place} to {span} /s ({kept} of {part.sizes['case']} stable{lost})")
+        words.append(f"{place} to {span} s⁻¹ ({kept} of {part.sizes['case']} stable{lost})")
     before = part_of(result, ROTORS[0])["growth_without"].max("mode").values
     return (
         f"The plate (infinite slab of 30 mm aluminium, face {DISTANCE * 1e3:g} mm from the floater's centre) changes "
         f"the growth rate of the least stable mode of the article's rotors, amid their stable frequencies, from "
-        f"{before.min():+.1g} to {before.max():+.1g} /s: {'; '.join(words)}."
+        f"{before.min():+.1g} to {before.max():+.1g} s⁻¹: {'; '.join(words)}."
     )
 
 

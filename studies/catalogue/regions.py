@@ -204,7 +204,7 @@ def map_lines(result: xr.Dataset) -> list[str]:
             ]
             cells = (" and ".join(stable) or "never", ", ".join(plate), " and ".join(lasting))
             rows.append((f"{label}, {one['model'].item()}", *cells))
-    head = ("rotor, model", "stable", "growth with the plate (1/s)", f"trajectories last {article.FLIGHT:g} s")
+    head = ("rotor, model", "stable", "growth with the plate (s⁻¹)", f"trajectories last {article.FLIGHT:g} s")
     return showing.text_table(head, rows)
 
 

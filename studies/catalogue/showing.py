@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
@@ -101,7 +100,7 @@ def rotor_panels(
     Colours go from dark to bright along viridis with displacement or tilt; a bar below the panel tells them.
     Parameters are those of `small_multiples`.
     """
-    figure, rows = configuration_panels(result, height, xlabel, ylabel)
+    figure, rows = configuration_panels(result, height, xlabel, ylabel, sharex=True)
     found: list[tuple[Axes, xr.Dataset, Any]] = []
     for axes, configuration, part in rows:
         rotors = dict(by_rotor(part))
@@ -138,16 +137,6 @@ def explain(axes: Axes, formats: Mapping[str, str], **style: Any) -> None:
     for words, shape in formats.items():
         grey = {} if "C" in shape or "k" in shape else {"color": "0.3"}
         axes.plot([], [], shape, **{**grey, "label": words, **style})
-
-
-def plain_log(axes: Axes, ticks: Sequence[float] = ()) -> None:
-    """A logarithmic x axis of few decades, its ticks (1, 3, 10 … if not given) as plain numbers."""
-    axes.set_xscale("log")
-    axes.xaxis.set(
-        major_locator=FixedLocator(ticks) if ticks else LogLocator(subs=(1.0, 3.0)),
-        major_formatter="{x:g}",
-        minor_locator=NullLocator(),
-    )
 
 
 def mode_label(mode: str) -> str:

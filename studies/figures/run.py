@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ...geometry.solids import Solid
-from .style import COLORS, DASHES, NAMES, PALETTE, legend_below, panels, plot_branch, styled, titled
+from .style import COLORS, DASHES, NAMES, PALETTE, legend_below, panels, plain_log, plot_branch, styled, titled
 from .view import near_plate, triangles
 
 if TYPE_CHECKING:
@@ -86,14 +86,12 @@ def scene_figure(scene: Scene) -> Figure:
 @styled
 def field_figure(result: xr.Dataset) -> Figure:
     """The field's two components on the axis below the rotor, and how far the models are from the best of them."""
-    from matplotlib.ticker import LogLocator
-
     figure, ((left, right),) = panels(1, 2, 3.2)
     distance, reference = -1e3 * result["axis_height"].values, str(result.attrs["best_model"])
     fields = {str(model): result["axis_field"].sel(model=model).values for model in result["model"].values}
     best = fields.pop(reference)
-    left.semilogy(distance, 1e3 * np.hypot(best[:, 0], best[:, 1]), color=COLORS[reference], label="across the axis")
-    left.semilogy(distance, 1e3 * np.abs(best[:, 2]), "--", color=COLORS[reference], label="along the axis")
+    left.plot(distance, 1e3 * np.hypot(best[:, 0], best[:, 1]), color=COLORS[reference], label="across the axis")
+    left.plot(distance, 1e3 * np.abs(best[:, 2]), "--", color=COLORS[reference], label="along the axis")
     size = np.linalg.norm(best, axis=1)
     looks = {model: (COLORS[model], DASHES[model], NAMES[model]) for model in fields}
     far = np.flatnonzero(np.isfinite(best).all(axis=1))[-1]
@@ -107,7 +105,7 @@ def field_figure(result: xr.Dataset) -> Figure:
     error = result["axis_error"].sel(model=reference).values
     right.fill_between(distance, np.nanmin(error) / 3, error, color="0.85", label=f"error estimate, {NAMES[reference]}")
     left.set(xlabel=DISTANCE, ylabel=f"|B component| (mT), {NAMES[reference]}")
-    left.yaxis.set(major_locator=LogLocator(subs=(1.0, 2.0, 5.0)), major_formatter="{x:g}", minor_formatter="")
+    plain_log(left.yaxis)
     right.set(xlabel=DISTANCE, ylabel=f"|ΔB| / |B| against {NAMES[reference]}")
     legend_below(figure)
     return figure
@@ -259,7 +257,7 @@ def modes_figure(result: xr.Dataset) -> Figure:
     for name, marker in zip(listed["mode"].values.tolist(), MODE_MARKERS, strict=True):
         axes.plot([], [], marker, color="0.3", mfc="none", label=name)
     axes.plot([], [], "o", color="0.3", label="filled: grows")
-    axes.set(yscale="log", xlabel="frequency, rotor's frame (Hz)", ylabel="rate of decay or growth (1/s)")
+    axes.set(yscale="log", xlabel="frequency, rotor's frame (Hz)", ylabel="rate of decay or growth (s⁻¹)")
     axes.margins(0.08)
     legend_below(figure)
     return figure

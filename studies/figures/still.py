@@ -28,13 +28,14 @@ BAR: dict[str, Any] = {"color": "black", "vertical": True, "position_y": 0.3, "h
 BAR |= {"title_font_size": 24, "label_font_size": 22}
 NAME: dict[str, Any] = {"font_size": 22, "text_color": "black", "shape_color": "white", "shape_opacity": 0.7}
 NAME |= {"margin": 4, "show_points": False, "always_visible": True}
+SHORTEST = 0.1  # Of the floater's radius: a shorter path is a dot
 MARGIN = 0.92  # Part of the window's height that what is shown fills
 
 
 def scene_picture(view: View) -> bytes:
     """A PNG of rotor, floater, plate, field and path, with their names, seen in the rotor's frame."""
     plotter, scene, center = new_plotter(), view.scene, 1e3 * view.position
-    times = _add_bodies(plotter, view)
+    path = _add_bodies(plotter, view)
     if view.plane is not None:
         _add_field(plotter, view)
     radius = 1e3 * scene.floater.radius
@@ -46,8 +47,10 @@ def scene_picture(view: View) -> bytes:
         corners = 1e3 * near.corners
         whole = np.allclose(near.size, scene.plate.box.size)
         names["plate" if whole else "part of the plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
-    if times:
-        names[f"path × {times:g}, {view.frame}"] = beside - np.array([0.0, 0.0, 0.8 * radius])
+    if path:
+        names[f"path, {view.frame}"] = beside - np.array([0.0, 0.0, 0.8 * radius])
+    if scene.frequency:
+        names["axis of rotation"] = [1.0, 0.0, rotor[:, 2].max() + 8.0]
     plotter.add_point_labels(np.array(list(names.values())), list(names), **NAME)
     _look(plotter, scene)
     plotter.add_axes()
@@ -162,25 +165,18 @@ def _png(plotter: pv.Plotter) -> bytes:
     return file.getvalue()
 
 
-def _add_bodies(plotter: pv.Plotter, view: View) -> float:
-    """Draw rotor, floater, plate and path; returns how many times the path is enlarged, 0 for none."""
-    scene = view.scene
+def _add_bodies(plotter: pv.Plotter, view: View) -> bool:
+    """Draw rotor, floater, plate and path; returns whether the path is long enough to be seen."""
+    scene, path = view.scene, 1e3 * view.path
     _add_rotor(plotter, scene)
     add_plate(plotter, scene, view.currents)
     add_floater(plotter, scene, view.position, view.moment)
     if scene.frequency:
         _add_turning(plotter, scene, -1.5e3 * float(view.position[2]))
-    if len(view.path) < 2:
-        return 0.0
-    path = 1e3 * view.path
-    middle = (path.max(axis=0) + path.min(axis=0)) / 2
-    reach = float(np.abs(path - middle).max())
-    # Enlarged by a round number until it can be seen inside the floater.
-    steps = [times for k in range(7) for times in (10.0**k, 2 * 10.0**k, 5 * 10.0**k)]
-    times = max([1.0, *(t for t in steps if t * reach <= 800 * scene.floater.radius)])
-    shown = middle + times * (path - middle)[:: max(1, len(path) // 20000)]
-    plotter.add_mesh(pv.MultipleLines(shown), color="#0072B2", line_width=2)
-    return times
+    seen = len(path) > 1 and float(np.ptp(path, axis=0).max()) > SHORTEST * 1e3 * scene.floater.radius
+    if seen:
+        plotter.add_mesh(pv.MultipleLines(path[:: max(1, len(path) // 20000)]), color="#0072B2", line_width=2)
+    return seen
 
 
 def _add_rotor(plotter: pv.Plotter, scene: Scene) -> list[pv.Actor]:
@@ -197,7 +193,7 @@ def _add_turning(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
     """The axis, and above the rotor an arrow in the sense in which it turns: in front of the field's plane."""
     corners = _rotor_corners(scene)
     height, radius = float(corners[:, 2].max()) + 3.0, float(np.linalg.norm(corners[:, :2], axis=1).max())
-    angles = np.radians(np.linspace(-170, -60, 60))
+    angles = np.radians(np.linspace(-185, -25, 60))
     arc = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(60, height)])
     plotter.add_mesh(pv.MultipleLines(arc).tube(radius=0.45), color="black")
     tip = pv.Cone(center=arc[-1], direction=arc[-1] - arc[-3], height=4.0, radius=1.6, resolution=30)
@@ -213,11 +209,11 @@ def _add_field(plotter: pv.Plotter, view: View) -> None:
     width, depth = plane.width, plane.depth
     grid = pv.ImageData(dimensions=(FINE, 1, FINE), spacing=(2 * width / (FINE - 1), 1.0, 2.4 * depth / (FINE - 1)))
     grid.origin = (-width, 0.0, -1.6 * depth)
-    grid[FIELD] = size
+    grid[FIELD] = np.nan_to_num(size, nan=np.nanmax(size))  # inside the magnets it is not seen, up to them it is
     low, high = np.floor(np.log10(np.nanpercentile(size, 0.1))), np.ceil(np.log10(np.nanpercentile(size, 99)))
     bar = {**BAR, "title": f"{FIELD}\n ", "fmt": "%.0f" if low >= 0 else "%g", "position_x": 0.9}
     bar["n_labels"] = int(high - low) + 1
-    look: dict[str, Any] = {"log_scale": True, "cmap": "viridis", "opacity": 0.6, "nan_opacity": 0.0}
+    look: dict[str, Any] = {"log_scale": True, "cmap": "viridis", "opacity": 0.6}
     plotter.add_mesh(grid, scalars=FIELD, clim=[10**low, 10**high], scalar_bar_args=bar, lighting=False, **look)
     shown = plotter.scalar_bars[bar["title"]]
     table = pv.LookupTable()  # as the half transparent plane is seen on white
@@ -253,7 +249,7 @@ def _look(plotter: pv.Plotter, scene: Scene) -> None:
     |x - c| <= t (d - z); two corners decide c and d, and the same holds upwards.
     """
     side = -1.0 if scene.plate and scene.plate.box.center[0] > 0 else 1.0
-    away = np.array([side * 0.14, -1.0, 0.25])
+    away = np.array([side * 0.2, -1.0, 0.4])
     away /= np.linalg.norm(away)
     right = np.cross([0.0, 0.0, 1.0], away)
     right /= np.linalg.norm(right)

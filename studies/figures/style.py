@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
@@ -154,6 +154,15 @@ def plot_branch(axes: Axes, x: ArrayLike, y: ArrayLike, solid: NDArray[np.bool_]
     axes.plot(x, np.where(solid, y, np.nan), "-", **style)
 
 
+def plain_log(axis: Any, ticks: Sequence[float] = ()) -> None:
+    """A logarithmic x or y axis of few decades, its ticks (1, 2, 5, 10 … if not given) as plain numbers."""
+    from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
+
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    locator = FixedLocator(ticks) if ticks else LogLocator(subs=(1.0, 2.0, 5.0))
+    axis.set(major_locator=locator, major_formatter="{x:g}", minor_locator=NullLocator())
+
+
 def legend_below(figure: Figure, *labelled: Any) -> None:
     """One legend below all panels in as many columns as fit, up to six; the figure becomes higher by its height.
 
@@ -170,7 +179,7 @@ def legend_below(figure: Figure, *labelled: Any) -> None:
     for columns in range(min(len(entries), 6), 0, -1):
         legend = figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns)
         size = legend.get_window_extent(canvas.get_renderer())
-        if columns == 1 or size.width < figure.bbox.width:
+        if columns == 1 or size.width < 0.97 * figure.bbox.width:
             figure.set_figheight(figure.get_figheight() + max(0.0, size.height / figure.dpi - LEGEND))
             return
         legend.remove()
