@@ -99,7 +99,7 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
         return ListedEffect(ROTOR_CURRENTS, False, None, None, OF_SPHERES)
     pieces = pieces_of([replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor], ())
     losses = levitation.losses or (ball_losses(pieces) if pieces else None)
-    doubt = 0.0 if included else metal_error(pieces, scene.frequency)
+    doubt = 0.0 if included else metal_error(pieces, scene.fastest)
     near = False
     if first is not None and not included:
         # Within the sphere about a magnet, as in the hole of a ring, no ball is like that magnet.

@@ -374,7 +374,7 @@ def ensemble(
     together = min(TOGETHER, -(-len(begun.position) // number))
     requested = levitation.scene, levitation.interaction, begun, duration
     found = simulated(*requested, map if number == 1 else mapped(number), together)
-    last = found.last.to_lab(levitation.scene.angular_velocity * found.levitated_s)
+    last = found.last.to_lab(levitation.scene.angle(found.levitated_s))
     data = {
         "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),
         "ended_by": (("flight",), found.ended_by),

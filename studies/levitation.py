@@ -164,7 +164,7 @@ class Levitation:
         scene, pieces = self.scene, pieces_of(self.scene.rotor, self.scene.conductors)
         if pieces:
             scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
-            check_metal(pieces, scene.frequency, scene.floater.radius)
+            check_metal(pieces, scene.fastest, scene.floater.radius)
         return bool(pieces)
 
     @cached_property
@@ -309,7 +309,7 @@ class Levitation:
         Raises what `plate_around` and the plate's models raise.
         """
         assert self.scene.plate is not None
-        radius, frequency = self.scene.floater.radius, self.scene.frequency
+        radius, frequency = self.scene.floater.radius, self.scene.fastest
         field = sources(self.table), place, radius, frequency
         requested = plate_around(self.scene.plate, plan.model, *field, plan.rtol, plan.region)
 
@@ -329,7 +329,7 @@ class Levitation:
         if not self.absolute or not self._ahead:
             return None
         note("Trajectory over an infinite slab ...")
-        slab = self.elsewhere(replace(self.models, plate_model="slab"))
+        slab = self.elsewhere(replace(self.models, plate_model="slab"), drive=())
         try:
             simulated = slab.flight(min(self._ahead, AHEAD))
         except FlightStopped:

@@ -82,7 +82,12 @@ def _simulate_together(levitations: Sequence[Levitation], duration: float) -> No
         with suppress(SpinlevError):
             still = one.scene.plate is None or one.models.plate_model == "none"
             if still and one.scene.floater.body is None and is_long(one.interaction):
-                key = one.equations_key, one.interaction_model, bool(np.any(one.scene.gravity[:2]))
+                key = (
+                    one.equations_key,
+                    one.interaction_model,
+                    bool(np.any(one.scene.gravity[:2])),
+                    bool(one.scene.drive),
+                )
                 groups.setdefault(key, []).append(one)
     for alike in groups.values():
         ready = []

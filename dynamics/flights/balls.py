@@ -83,13 +83,15 @@ class Balls:
         """Number of the first runtime parameter that is not a ball's."""
         return FIRST + sum(effect.count for effect in _fitted(self.whole, LARGE))
 
-    def enter(self, formulas: Sequence[BallField], state: Array, values: Array) -> float:
+    def enter(self, formulas: Sequence[BallField], state: Array, values: Array, time: float = 0.0) -> float:
         """Set the runtime parameters `values` to the first ball of `formulas` that will do for a scaled state; error.
 
         It must hold the circle on which the rotor sees a floater that turns less than the rotor, or not at all: once a
-        turn, backwards.  Where no ball does, those of the last of `formulas` hold a part of the way each.
+        turn, backwards, at the rate of a scaled `time`.  Where no ball does, those of the last of `formulas` hold a
+        part of the way each.
         """
-        length, rate, (x, y, _) = values[Parameter.LENGTH], values[Parameter.RATE], state[:3]
+        length, (x, y, _) = values[Parameter.LENGTH], state[:3]
+        rate = values[Parameter.RATE] + values[Parameter.ACCELERATION] * time
         lost, spacing = float(values[Parameter.LOST_DISTANCE]) * length, SPACING * self.scene.floater.radius
         drift = state[3:6] - rate * np.array([-y, x, 0.0])
         arm = rate * np.array([-drift[1], drift[0], 0.0])

@@ -23,9 +23,19 @@ from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import startless_text
 from ..motion.equations import Equations
-from ..motion.events import BEYOND, CONTACT, Events, clearance, flight_events, plate_depth, plate_legs, range_events
-from ..motion.plate import PlateForce, PlateMemory
-from ..motion.state import Parameter, State, Vector
+from ..motion.events import (
+    BEYOND,
+    CONTACT,
+    Events,
+    Leg,
+    clearance,
+    flight_events,
+    motion_legs,
+    plate_depth,
+    range_events,
+)
+from ..motion.plate import ENDLESS, PlateForce, PlateMemory
+from ..motion.state import DRIVEN, STEADY, Parameter, State, Vector
 from .balls import LARGE, SMALL
 from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight, IntegrationError, Recorder
 from .trajectory import DURATION, Trajectory
@@ -37,15 +47,27 @@ FLAT = 1e-9  # Sine of the angle to the horizontal that a plate may have
 
 
 class _Passenger(Course):
-    """A trajectory on a slot for balls of one kind."""
+    """A trajectory on a slot for balls of one kind, where no plate is; each leg of its drive is integrated for itself."""
 
     over = False
-    left = False  # Whether it was ever beyond the range of the plate's table
+    end = 0.0  # Scaled time at which "duration" interrupts it
+
+    def __init__(self, course: Course, left: bool = False) -> None:
+        super().__init__(**vars(course))
+        self.left = left  # Whether it was ever beyond the range of the plate's table
+        self._legs = self.legs
+        self.onward()
 
     @property
-    def end(self) -> float:
-        """Scaled time at which "duration" interrupts it."""
-        return self.duration / self.flight.scales.time
+    def legs(self) -> Iterator[Leg]:
+        return iter(motion_legs(replace(self.flight.scene, plate=None), self.duration))
+
+    def onward(self) -> bool:
+        """Begin the next leg; False where there is none."""
+        leg = next(self._legs, None)
+        if leg is not None:
+            self.end = self.set_leg(leg)
+        return leg is not None
 
     def record(self, times: Array, states: Array) -> None:
         assert self.recorder is not None
@@ -54,10 +76,12 @@ class _Passenger(Course):
     def follow(self, meaning: str) -> bool:
         """After what interrupted it, with time and state as they are then: whether it goes on on its slot."""
         if meaning == DURATION:
-            self.ended_by, self.over = DURATION, True
+            last, now = self.end == self.duration / self.flight.scales.time, np.array([self.time[0]])
+            if last:
+                self.ended_by, self.over = DURATION, True
             if self.recorder:
-                self.record(np.array([self.time[0]]), self.state[None])
-            return False
+                self.record(now, self.state[None])
+            return not last and self.onward()
         degree = self.flight.degree(self.values)
         self.change_ball()
         return self.flight.degree(self.values) == degree
@@ -71,27 +95,23 @@ class _Passenger(Course):
 
 
 class _Launch(_Passenger):
-    """A launch over a plate's currents; each leg of the plate's way is integrated for itself."""
+    """A launch over a plate's currents; each leg of the plate's way is integrated for itself, too."""
 
     def __init__(self, course: Course, left: bool) -> None:
-        super().__init__(**vars(course))
-        self.ended_by, self.left, self._end = CONTACT, left, 0.0
-        self._legs = iter(plate_legs(self.flight.scene.plate, self.duration))
-        self.follow(DURATION)
+        super().__init__(course, left)
+        self.ended_by = CONTACT
 
     @property
-    def end(self) -> float:
-        return self._end
+    def legs(self) -> Iterator[Leg]:
+        return iter(motion_legs(self.flight.scene, self.duration))
 
     def follow(self, meaning: str) -> bool:
         """Beyond the table it goes on; at the end of a leg the next one begins."""
         if meaning == BEYOND:
             self.left = True
-        elif meaning != DURATION or (leg := next(self._legs, None)) is None:
+        elif meaning != DURATION or not self.onward():
             self.ended_by = meaning
             return False
-        else:
-            self._end = self.set_leg(*leg)
         return True
 
 
@@ -301,7 +321,7 @@ def _begun(flight: Flight, start: State, duration: float, recorded: bool) -> _Pa
     start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
     free = clearance(flight.scene, np.zeros(1), start.position[None])[0] >= 0
     course = flight.begin(start, duration, interval=flight.interval(duration) if recorded and free else None)
-    found = _Passenger(**vars(course))
+    found = _Passenger(course)
     if not free:
         found.ended_by, found.over = CONTACT, True
     return found
@@ -350,10 +370,10 @@ def launched(
     _check(scene, starts, duration)
     flight, count = Flight(scene, table, duration, memory=memory, in_balls=False), len(starts.position)
     equations, (scales, values) = flight.equations(0)[0], (flight.scales, flight.values)
-    position = equations.variables[:3]
+    position, turn = equations.variables[:3], DRIVEN if scene.drive else STEADY
     events = [
-        *flight_events(replace(scene, plate=None), position),
-        *range_events(memory, position),
+        *flight_events(replace(scene, plate=None), position, turn),
+        *range_events(memory, position, turn),
         *((obstacle, CONTACT) for obstacle in _obstacles(scene, memory, position)),
     ]
     unit = starts.moment / np.linalg.norm(starts.moment, axis=1)[:, None]
@@ -362,12 +382,16 @@ def launched(
         force, now, states = PlateForce(memory, values), np.zeros(count), scales.pack(starts)
         silent = np.where(np.isin(np.arange(12), (6, 7, 8)), 0.0, states)
         own = force(now, states).signals - force(now, silent).signals
+        if scene.drive:  # there the rotor's part is integrated, but for its mean
+            depth = float(plate_depth(memory.plate, np.zeros(1))[0])
+            left, mean = (memory.left_by_rotor(rate).signals(0.0, depth) for rate in (scene.angular_velocity, ENDLESS))
+            own = own + (left - mean) * values[Parameter.PLATE_SHARE]
     outside = ~memory.in_range(starts.position, np.repeat(plate_depth(memory.plate, np.zeros(1)), count))
     passengers = []
     for k in range(count):
         course = flight.begin(starts[k], duration, None if currents is None else currents[k])
         if currents is None:
-            course.state[12:-1] = own[k]
+            course.state[12 : 12 + own.shape[1]] = own[k]
         passengers.append(_Launch(course, bool(outside[k])))
     free = clearance(scene, np.zeros(count), starts.position) > 0
     if free.any():

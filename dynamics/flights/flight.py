@@ -32,15 +32,16 @@ from ..motion.events import (
     CONTACT,
     LOST,
     Events,
+    Leg,
     clearance,
     flight_events,
     lost_distance,
+    motion_legs,
     plate_depth,
-    plate_legs,
     range_events,
 )
-from ..motion.plate import PlateForce, PlateMemory, plate_numbers
-from ..motion.state import Parameter, Scales, State
+from ..motion.plate import ENDLESS, PlateForce, PlateMemory, plate_numbers
+from ..motion.state import DRIVEN, STEADY, Parameter, Scales, State
 from .balls import DEGREE, LARGE, SMALL, Balls, in_ball, is_long
 from .trajectory import DURATION, STOPPED, Checkpoint, FieldChanges, FlightStopped, Trajectory
 
@@ -108,12 +109,12 @@ class Flight:
         self.balls = Balls(scene, self.whole) if (is_long(table) if in_balls is None else in_balls) else None
         self.first = self.balls.end if self.balls else len(Parameter)
         values = parameters(scene, self.scales)
-        own = np.zeros(0) if memory is None else plate_numbers(memory, values)
+        own = np.zeros(0) if memory is None else plate_numbers(memory, values, bool(scene.drive))
         self.values = np.concatenate([values, np.zeros(self.first - len(values)), own])
         """Runtime parameters, in no ball: those of the equations, of a ball, and of the plate."""
         self.parts: dict[int, Part] = {}
         """By the degree of the ball, 0: in none."""
-        self.compile_seconds, self._tolerance, self._turns = 0.0, tolerance, scene.frequency * duration
+        self.compile_seconds, self._tolerance, self._turns = 0.0, tolerance, scene.fastest * duration
         long = memory is None and self._turns > STRAIGHT_TURNS  # straight code of a plate takes minutes to compile
         self._straight = long if compact is None else not compact
 
@@ -148,14 +149,15 @@ class Flight:
         """Equations of motion and terminal events; a ball is free of bodies and ends before the floater is lost."""
         ball = BallField(DEGREE + 1, degree)
         whole = in_ball(self.whole, ball) if degree else self.whole
-        equations = equations_of_motion(whole, self.tilted, self.memory, self.first)
-        position = equations.variables[:3]
+        driven = bool(self.scene.drive)
+        equations = equations_of_motion(whole, self.tilted, self.memory, self.first, driven)
+        position, turn = equations.variables[:3], DRIVEN if driven else STEADY
         if degree:
             away = ball.offset([hy.par[Parameter.LENGTH] * x for x in position])
             events = [(1.0 - hy.sum([a * a for a in away]), LEFT)]
         else:
-            events = flight_events(self.scene, position)
-        return equations, events if self.memory is None else [*events, *range_events(self.memory, position)]
+            events = flight_events(self.scene, position, turn)
+        return equations, events if self.memory is None else [*events, *range_events(self.memory, position, turn)]
 
     def jacobi(self, values: Array, times: Array, states: Array) -> Array:
         """Terms (k, n) of the Jacobi integral at scaled times (n,) and states (n, s), with the plate where it is then.
@@ -173,9 +175,13 @@ class Flight:
         return np.asarray(function(inputs, pars=pars[: function.nparams], time=times))
 
     def balanced(self, values: Array, times: Array, states: Array) -> Array:
-        """The floater's (n, 12) at scaled times (n,), and J - work, from states (n, s) under parameters `values`."""
+        """The floater's (n, 12) at scaled times (n,), and J - work, from states (n, s) under parameters `values`.
+
+        With a drive what the motor has given, angular momentum and work, is between.
+        """
         energy = self.jacobi(values, times, states).sum(axis=0) - states[:, -1]
-        return np.concatenate([states[:, :12], energy[:, None]], axis=1)
+        given = states[:, -3:-1] if self.scene.drive else states[:, :0]
+        return np.concatenate([states[:, :12], given, energy[:, None]], axis=1)
 
     def begin(
         self, start: State, duration: float, currents: Array | None = None, interval: float | None = None
@@ -188,9 +194,11 @@ class Flight:
         values[Parameter.LOST_DISTANCE] = lost_distance(start.position) / self.scales.length
         if self.memory is not None:
             depth = float(plate_depth(self.memory.plate, np.zeros(1))[0])
-            left = self.memory.left_by_rotor(self.scene.angular_velocity).signals(0.0, depth)
+            rate = ENDLESS if self.scene.drive else self.scene.angular_velocity
+            left = self.memory.left_by_rotor(rate).signals(0.0, depth)
             own = ((0.0 if currents is None else currents) - left) * values[Parameter.PLATE_SHARE]
-        course = Course(self, duration, values, np.concatenate([self.scales.pack(start), own, [0.0]]))
+        given = np.zeros(3 if self.scene.drive else 1)  # by the motor, and the work
+        course = Course(self, duration, values, np.concatenate([self.scales.pack(start), own, given]))
         course.enter_ball()
         if interval is not None:
             row, now = course.state[None], np.zeros(1)
@@ -202,7 +210,7 @@ class Flight:
 
     def interval(self, duration: float) -> float:
         """First scaled time between samples of a trajectory of so many seconds."""
-        turn = 1 / abs(self.scene.frequency) if self.scene.frequency else np.inf
+        turn = 1 / self.scene.fastest if self.scene.fastest else np.inf
         return float(min(turn / SAMPLES_PER_TURN, duration / 1000) / self.scales.time)
 
 
@@ -271,7 +279,7 @@ class Course:
     def enter_ball(self) -> None:
         """Begin in a ball, a small one if it will do."""
         if self.flight.balls:
-            error = self.flight.balls.enter((SMALL, LARGE), self.state, self.values)
+            error = self.flight.balls.enter((SMALL, LARGE), self.state, self.values, self.time[0])
             self.changes = FieldChanges(error=error)
 
     def change_ball(self) -> None:
@@ -283,7 +291,7 @@ class Course:
         if degree and away @ away * inverse**2 < INSIDE:
             return
         after, now, row = self.values.copy(), np.array([self.time[0]]), self.state[None]
-        error = self.flight.balls.enter((LARGE,), self.state, after)
+        error = self.flight.balls.enter((LARGE,), self.state, after, self.time[0])
         if np.array_equal(after, self.values):
             return
         jump = float(self.flight.jacobi(after, now, row).sum() - self.flight.jacobi(self.values, now, row).sum())
@@ -297,10 +305,10 @@ class Course:
         """Propagate in pieces until something ends the trajectory."""
         flight, scales, kept = self.flight, self.flight.scales, perf_counter()
         assert self.recorder is not None
-        for leg in plate_legs(flight.scene.plate, self.duration):
-            if self.time[0] >= leg[0] / scales.time:
+        for leg in motion_legs(flight.scene, self.duration):
+            if self.time[0] >= leg.end / scales.time:
                 continue
-            end = self.set_leg(*leg)
+            end = self.set_leg(leg)
             while self.time[0] < end:
                 self.change_ball()
                 times, states = self._piece(end, self.recorder)
@@ -315,12 +323,14 @@ class Course:
                     checkpoint.write(self.content())
                     kept = perf_counter()
 
-    def set_leg(self, end: float, depth: float, speed: float) -> float:
-        """Let the plate move as on a leg: to `end`, `depth` and `speed` as of `plate_legs`; scaled time of its end."""
-        scales = self.flight.scales
-        self.values[Parameter.PLATE_DEPTH] = depth / scales.length
-        self.values[Parameter.PLATE_SPEED] = speed * scales.time / scales.length
-        return end / scales.time
+    def set_leg(self, leg: Leg) -> float:
+        """Let plate and rotor move as on a leg; scaled time of its end."""
+        scales, values = self.flight.scales, self.values
+        values[Parameter.PLATE_DEPTH] = leg.depth / scales.length
+        values[Parameter.PLATE_SPEED] = leg.speed * scales.time / scales.length
+        values[Parameter.ANGLE], values[Parameter.RATE] = leg.angle, leg.rate * scales.time
+        values[Parameter.ACCELERATION] = leg.acceleration * scales.time**2
+        return leg.end / scales.time
 
     def _piece(self, end: float, recorder: Recorder) -> tuple[Array, Array]:
         """Go on to the end of a piece or to an event: scaled times, and states with J - work."""
@@ -372,18 +382,23 @@ class Course:
     def trajectory(self, speed: float) -> Trajectory:
         """The samples, at so many simulated seconds per second."""
         assert self.recorder is not None
-        scales, velocity, changes = self.flight.scales, self.flight.scene.angular_velocity, self.changes
+        scales, scene, changes, given = self.flight.scales, self.flight.scene, self.changes, None
         time, states = np.minimum(self.recorder.times * scales.time, self.duration), self.recorder.states
         if self.ended_by == DURATION:  # not a last digit less
             time[-1] = self.duration
-        lab, memory, beyond = scales.unpack(states).to_lab(velocity * time), self.flight.memory, 0.0
+        angle, memory, beyond = scene.angle(time), self.flight.memory, 0.0
+        lab = scales.unpack(states).to_lab(angle)
         if memory is not None:
             beyond = float(1 - np.mean(memory.in_range(lab.position, plate_depth(memory.plate, time))))
+        if scene.drive:
+            unit = scene.floater.mass * scales.length**2 / scales.time  # of an angular momentum
+            given = states[:, 12:14] * [unit, unit / scales.time]
         drift = np.abs(states[:, -1] - states[0, -1]).max() / self.scale
         return Trajectory(
             time=time,
             lab=lab,
-            angular_velocity=velocity,
+            angle=angle,
+            rate=scene.rate(time),
             ended_by=LOST if self.ended_by == BEYOND else self.ended_by,
             energy_error=float(max(drift, np.abs(np.linalg.norm(states[:, 6:9], axis=1) - 1).max())),
             realtime_factor=speed,
@@ -392,6 +407,7 @@ class Course:
             beyond_plate_table=beyond,
             left_plate_table=self.ended_by == BEYOND,
             field_changes=replace(changes, energy=changes.energy / self.scale, total=changes.total / self.scale),
+            given=given,
         )
 
 

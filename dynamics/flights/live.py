@@ -70,7 +70,7 @@ class LiveFlight:
     @property
     def now(self) -> State:
         """Motion along the laboratory's axes, SI units."""
-        return self._course.flight.scales.unpack(self.state).to_lab(self.scene.angular_velocity * self.time)
+        return self._course.flight.scales.unpack(self.state).to_lab(self.scene.angle(self.time))
 
     def onward(self, seconds: float) -> Piece:
         """Integrate on so long (s), or to contact or loss, after which nothing is left to integrate.
@@ -83,12 +83,13 @@ class LiveFlight:
         times, states = np.array([course.time[0]]), course.state[None]
         if course.ended_by == DURATION:
             interval = seconds / int(np.clip(A_SECOND * seconds, FEWEST, MOST)) / unit
-            course.recorder = Recorder(np.append(course.state[:12], 0.0), interval, 4 * MOST, course.time[0])
+            first = course.flight.balanced(course.values, times, states)[0]
+            course.recorder = Recorder(first, interval, 4 * MOST, course.time[0])
             course.duration = self.time + seconds
             course.fly()
             times, states = course.recorder.times[1:], course.recorder.states[1:]
             course.time = float(times[-1]), 0.0
-        turned = self.scene.angular_velocity * times * unit
+        turned = self.scene.angle(times * unit)
         lab = course.flight.scales.unpack(states).to_lab(turned)
         return Piece(times * unit, lab, float(turned[-1]), course.ended_by)
 
@@ -103,9 +104,9 @@ class LiveFlight:
         there; nothing is changed.
         """
         check_free("position", self.scene, np.asarray(position, float), self.time)
-        place = turned_about_z(position, self.scene.angular_velocity * self.time)
+        place = turned_about_z(position, self.scene.angle(self.time))
         self._check_range(place)
-        turning = np.cross([0.0, 0.0, self.scene.angular_velocity], place)
+        turning = np.cross([0.0, 0.0, float(self.scene.rate(self.time))], place)
         self._course.ended_by = DURATION
         self._become(replace(self.now, position=place, velocity=turning))
 
@@ -120,6 +121,6 @@ class LiveFlight:
             )
 
     def _become(self, lab: State) -> None:
-        state = lab.to_rotor(self.scene.angular_velocity * self.time)
+        state = lab.to_rotor(self.scene.angle(self.time))
         self._course.state[:12] = self._course.flight.scales.pack(state)
         self._course.enter_ball()

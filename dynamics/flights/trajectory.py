@@ -13,6 +13,7 @@ import numpy as np
 from ...fem.files import seal, unsealed, write_whole
 from ...geometry.common import Array, InputError, html_table, millimetres
 from ..equilibria.balance import Indices
+from ..motion.events import CONTACT, LOST
 from ..motion.state import State
 
 DURATION, STOPPED = "duration", "stopped"
@@ -35,7 +36,8 @@ class Trajectory:
 
     time: Array  #: (n,) s, at equal intervals but for the last
     lab: State  #: motion (n, 3) along the laboratory's axes, SI units
-    angular_velocity: float  #: of the rotor, rad/s
+    angle: Array  #: (n,) of the rotor, rad
+    rate: Array  #: (n,) its angular velocity, rad/s
     ended_by: str  #: "duration", "contact" or "lost"; "stopped" by the user
     energy_error: float  #: largest relative violation of the energy balance or of |m̂| = 1
     realtime_factor: float  #: simulated seconds per second of integration, compilation left out
@@ -47,6 +49,8 @@ class Trajectory:
     left_plate_table: bool = False
     #: from one representation of the rotor's field to another; the energy balance is that of the motion between them
     field_changes: FieldChanges = field(default_factory=FieldChanges)
+    #: (n, 2) angular momentum about the axis, N m s, and work, J, that the motor has given; None without a drive
+    given: Array | None = None
 
     def __repr__(self) -> str:
         place = ", ".join(f"{1e3 * value:.4f}" for value in self.lab.position[-1])
@@ -70,9 +74,21 @@ class Trajectory:
         return float(self.time[-1])
 
     @property
+    def lost_at_hz(self) -> float | None:
+        """Frequency of the rotor at which the floater touched something or was lost, Hz; None where neither."""
+        return float(self.rate[-1]) / (2 * np.pi) if self.ended_by in (CONTACT, LOST) else None
+
+    @property
+    def motor(self) -> Array:
+        """(n, 2) torque, N m, and power, W, of the motor, each the mean since the sample before."""
+        assert self.given is not None
+        mean = np.diff(self.given, axis=0) / np.diff(self.time)[:, None]
+        return np.concatenate([mean[:1], mean]) if len(mean) else np.zeros_like(self.given)
+
+    @property
     def rotor(self) -> State:
         """Motion (n, 3) along the rotor's axes, SI units."""
-        return self.lab.to_rotor(self.angular_velocity * self.time)
+        return self.lab.to_rotor(self.angle)
 
 
 class FlightStopped(KeyboardInterrupt):

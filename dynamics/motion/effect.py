@@ -17,7 +17,7 @@ from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.harmonics.interior import Ball, BallField
 from ...fem.rotor.table import FieldFormula, FieldTable
 from ...geometry.common import Array
-from .state import Parameter, Vector
+from .state import STEADY, Parameter, Turn, Vector
 
 ZERO = hy.expression(0.0)
 NOTHING = (ZERO, ZERO, ZERO)
@@ -35,6 +35,7 @@ class Motion:
     lag: Vector
     field: Vector  # the rotor's B (3) T and ∂B_i/∂x_j (3, 3) T/m at the floater's centre
     gradient: list[list[hy.expression]]
+    turn: Turn = STEADY
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,7 @@ class Added:
     turning: Vector = NOTHING  # (3,) a field that turns the floater's moment: scaled torque by a unit moment across it
     energy: hy.expression = ZERO  # term of the Jacobi integral
     power: hy.expression = ZERO  # rate of change of the Jacobi integral by this effect
+    motor: hy.expression | None = None  # torque about the axis that it takes from the motor; None: that on the floater
 
 
 @runtime_checkable

@@ -104,7 +104,7 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     pieces = pieces_of(scene.rotor, scene.conductors)
     if pieces:
         scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
-        check_metal(pieces, scene.frequency, scene.floater.radius)
+        check_metal(pieces, scene.fastest, scene.floater.radius)
     if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
     return whole.joined(*effects)

@@ -13,6 +13,9 @@ along the axis everything is autonomous, and the Jacobi integral
 
 is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
 do in the rotating frame is integrated along as the last state, `work`, so that J - work never changes.
+With a drive W changes in time, and dJ/dt = -Ẇ ẑ·(r × v + iΩ); velocity and spin are those seen from the laboratory, so
+that nothing else changes.  What the rotor does to the floater, and a plate to the rotor, the motor gives: its angular
+momentum and its work, W times the torque, are integrated along as two more states.
 Effects (`effect`) add what else acts on the floater: accelerations of position and spin, their energy to J, their
 power to `work`.  A plate adds its currents as further states (`memory_terms`) and their energy to J.  Every number that
 a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
@@ -29,7 +32,7 @@ from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
 from .effect import Motion, interaction_of
 from .plate import PlateMemory, memory_terms
-from .state import Parameter, Scales, Vector, cross, dot, subtract, turned
+from .state import DRIVEN, STEADY, Parameter, Scales, Vector, cross, dot, subtract, turned
 
 FORCE_ALONE = "spinlev.floater_force gives force and torque on it; for a motion take a cylinder or a sphere."
 NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment", "spin") for axis in "xyz")
@@ -39,7 +42,7 @@ NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment"
 class Equations:
     """The equations of motion as heyoka expressions."""
 
-    variables: Vector  # the twelve of the floater, then the plate's
+    variables: Vector  # the twelve of the floater, then the plate's, and with a drive what the motor has given
     rates: Vector  # their derivatives with respect to scaled time
     # the terms of the Jacobi integral: motion, turning, magnet, weight, swirl, effects, and the plate's energy
     jacobi: Vector
@@ -75,7 +78,11 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
 
 
 def equations_of_motion(
-    table: FieldFormula, tilted_gravity: bool = False, memory: PlateMemory | None = None, first: int = len(Parameter)
+    table: FieldFormula,
+    tilted_gravity: bool = False,
+    memory: PlateMemory | None = None,
+    first: int = len(Parameter),
+    driven: bool = False,
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
@@ -84,8 +91,9 @@ def equations_of_motion(
     table : the rotor's field, with effects if it is an `Interaction`
     tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
     memory, first : the plate's currents, if they are modelled, and the first of their runtime parameters
+    driven : whether the rotor's rate changes in time
     """
-    variables = hy.make_vars(*NAMES)
+    variables, rotor = list(hy.make_vars(*NAMES)), DRIVEN if driven else STEADY
     position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
     length, torque, inertia, linear = (
         hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
@@ -94,26 +102,27 @@ def equations_of_motion(
     strength = torque * inertia * length
     force, turn = [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
     pulled, turning = [strength * m for m in moment], [torque * b for b in field]
-    axial, lateral = _gravity(tilted_gravity)
+    axial, lateral = _gravity(tilted_gravity, rotor.angle)
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
-    drift = subtract(velocity, turned(position))
-    lag = [spin[0], spin[1], spin[2] - hy.par[Parameter.RATE]]
+    drift = subtract(velocity, turned(position, rotor.rate))
+    lag = [spin[0], spin[1], spin[2] - rotor.rate]
     brake = _angular_drag(moment, spin)
+    momentum = cross(position, velocity)[2] + inertia * spin[2]
     jacobi = [
         0.5 * dot(velocity, velocity),
         0.5 * inertia * dot(spin, spin),
         -inertia * torque * dot(moment, field),
         -axial[2] * position[2],
-        -hy.par[Parameter.RATE] * (cross(position, velocity)[2] + inertia * spin[2]),
+        -rotor.rate * momentum,
     ]
     power = dot(push, drift) + inertia * dot(brake, lag)
-    motion = Motion(position, velocity, moment, spin, drift, lag, field, gradient)
+    motion = Motion(position, velocity, moment, spin, drift, lag, field, gradient, rotor)
     parts = [effect.added(motion) for effect in interaction_of(table).effects]
     states: list[hy.expression] = []
     state_rates: Vector = []
     if memory is not None:
         states = [hy.expression(f"plate_{i}") for i in range(len(memory.table.rates))]
-        by_plate, state_rates = memory_terms(memory, first, position, moment, states)
+        by_plate, state_rates = memory_terms(memory, first, position, moment, states, driven)
         parts.append(by_plate)
     for added in parts:
         force = [a + b for a, b in zip(force, added.force, strict=True)]
@@ -124,22 +133,30 @@ def equations_of_motion(
         power = power + added.power
     force = [dot(pulled, [gradient[i][j] for i in range(3)]) + f for j, f in enumerate(force)]
     turn = [a + b for a, b in zip(cross(moment, turning), turn, strict=True)]
+    if driven:
+        power = power - rotor.acceleration * momentum
+        given = cross(position, force)[2] + inertia * turn[2]
+        for added in parts:
+            if added.motor is not None:
+                given = given + added.motor - cross(position, added.force)[2] - inertia * added.torque[2]
+        states = [*states, *hy.make_vars("motor_momentum", "motor_work")]
+        state_rates = [*state_rates, given, rotor.rate * given]
     rates = [
         *drift,
-        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity)),
+        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity, rotor.rate)),
         *cross(lag, moment),
-        *subtract([turn[i] + brake[i] for i in range(3)], turned(spin)),
+        *subtract([turn[i] + brake[i] for i in range(3)], turned(spin, rotor.rate)),
     ]
     return Equations([*variables, *states], [*rates, *state_rates], jacobi, power)
 
 
-def _gravity(tilted: bool) -> tuple[Vector, Vector]:
+def _gravity(tilted: bool, angle: hy.expression) -> tuple[Vector, Vector]:
     """Gravity along the axis and across it, both along the rotor's axes."""
     zero = hy.expression(0.0)
     axial = [zero, zero, hy.par[Parameter.GRAVITY_Z]]
     if not tilted:
         return axial, [zero, zero, zero]
-    x, y, angle = hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y], hy.par[Parameter.RATE] * hy.time
+    x, y = hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y]
     return axial, [hy.cos(angle) * x + hy.sin(angle) * y, hy.cos(angle) * y - hy.sin(angle) * x, zero]
 
 

@@ -4,7 +4,7 @@ The distance of the floater's centre from a box is exact, faces, edges and corne
 of the box that was nearest when it began; a contact that this may miss is found by `clearance` at the samples.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import heyoka as hy
 import numpy as np
@@ -15,7 +15,7 @@ from ...geometry.scene.contents import Plate, Scene
 from ...geometry.shapes import Box
 from ...geometry.solids import Solid
 from .plate import PlateMemory, raised, seen_by_plate
-from .state import Parameter, Vector, turned_about_z
+from .state import STEADY, Parameter, Turn, Vector, turned_about_z
 
 # The last: where the range of a plate's table ends, beyond which nobody knows its currents' field.
 CONTACT, LOST, BEYOND = "contact", "lost", "beyond"
@@ -25,22 +25,22 @@ CONTACT, LOST, BEYOND = "contact", "lost", "beyond"
 Events = list[tuple[hy.expression, str]]
 
 
-def flight_events(scene: Scene, position: Vector) -> Events:
+def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events:
     """Contact with the bodies of a scene and loss, at a scaled position."""
     length = hy.par[Parameter.LENGTH]
     metres = [length * p for p in position]
     gaps = [_excess(body, metres) for body in scene.turning_bodies]
     if scene.plate is not None:
-        gaps.append(_excess(scene.plate.body, raised(position)))
+        gaps.append(_excess(scene.plate.body, raised(position, turn)))
     within = (scene.floater.inner_radius / scene.floater.radius) ** 2  # its own contact is found at the samples
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
     return [*((gap / (length * length) - within, CONTACT) for gap in gaps), (reach, LOST)]
 
 
-def range_events(memory: PlateMemory, position: Vector) -> Events:
+def range_events(memory: PlateMemory, position: Vector, turn: Turn = STEADY) -> Events:
     """Where a scaled position leaves the range of a plate's table."""
     region = memory.table.region
-    away = [x - float(c) for x, c in zip(seen_by_plate(memory.plate, position), region.center, strict=True)]
+    away = [x - float(c) for x, c in zip(seen_by_plate(memory.plate, position, turn), region.center, strict=True)]
     half = (region.upper - region.lower) / 2
     return [(1.0 - (a * a) / float(h) ** 2, BEYOND) for a, h in zip(away, half, strict=True)]
 
@@ -71,7 +71,7 @@ def clearance(scene: Scene, time: Array, position: Array, moment: Array | None =
     """
     gaps = [body.distance(position) for body in scene.turning_bodies]
     if scene.plate is not None:
-        seen = turned_about_z(position, scene.angular_velocity * time)
+        seen = turned_about_z(position, scene.angle(time))
         seen[:, 2] += plate_depth(scene.plate, time)
         gaps.append(scene.plate.body.distance(seen))
     found = np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
@@ -86,7 +86,7 @@ def _own_gap(scene: Scene, time: float, position: Array, moment: Array) -> float
     floater, bodies = scene.floater, list(scene.turning_bodies)
     gaps = [-body_overlap(body, floater.placed(position, moment)) for body in bodies]
     if scene.plate is not None:
-        turn = scene.angular_velocity * time
+        turn = scene.angle(time)
         seen = turned_about_z(position, turn) + plate_depth(scene.plate, np.array([time])) * [0.0, 0.0, 1.0]
         gaps.append(-body_overlap(scene.plate.body, floater.placed(seen, turned_about_z(moment, turn))))
     return min(gaps)
@@ -106,15 +106,38 @@ def plate_depth(plate: Plate, time: Array) -> Array:
     return np.zeros(len(time)) if plate.lowering is None else plate.lowering.depth(time)
 
 
-def plate_legs(plate: Plate | None, duration: float) -> list[tuple[float, float, float]]:
-    """Stretches of steady motion of the plate: end (s), depth at t = 0 if it had always moved so (m), speed (m/s)."""
-    lowering = plate.lowering if plate else None
-    if lowering is None or not lowering.speed:
-        return [(duration, 0.0, 0.0)]
-    finish = lowering.start + lowering.distance / lowering.speed
-    legs = [
-        (lowering.start, 0.0, 0.0),
-        (finish, -lowering.start * lowering.speed, lowering.speed),
-        (duration, lowering.distance, 0.0),
-    ]
-    return [(min(end, duration), depth, speed) for end, depth, speed in legs]
+@dataclass(frozen=True)
+class Leg:
+    """A stretch in which plate and drive go on steadily, SI units; but for `end` as at t = 0, if they always did."""
+
+    end: float
+    depth: float  # of the plate
+    speed: float
+    angle: float  # of the rotor
+    rate: float
+    acceleration: float = 0.0
+
+
+def motion_legs(scene: Scene, duration: float) -> list[Leg]:
+    """The stretches of so many seconds, in turn."""
+    lowering = scene.plate.lowering if scene.plate else None
+    plate = [(duration, 0.0, 0.0)]
+    if lowering is not None and lowering.speed:
+        finish = lowering.start + lowering.distance / lowering.speed
+        plate = [
+            (lowering.start, 0.0, 0.0),
+            (finish, -lowering.start * lowering.speed, lowering.speed),
+            (duration, lowering.distance, 0.0),
+        ]
+    plate = [(min(end, duration), depth, speed) for end, depth, speed in plate]
+    times, rates, angles = scene.knots
+    slopes = np.append(np.diff(rates) / np.diff(times), 0.0)
+    begins = rates - slopes * times
+    angles = angles - (begins + rates) / 2 * times
+    ends = [min(end, duration) for end in (*times[1:].tolist(), duration)]
+    legs = []
+    for end in sorted({*ends, *(end for end, _, _ in plate)}):
+        _, depth, speed = next(leg for leg in plate if end <= leg[0])
+        k = next(k for k, last in enumerate(ends) if end <= last)
+        legs.append(Leg(end, depth, speed, float(angles[k]), float(begins[k]), float(slopes[k])))
+    return legs

@@ -56,7 +56,7 @@ from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AIR_VISCOSITY, Floater, Scene
-from .effect import Added, DerivedField, Effect, Motion, dissipative
+from .effect import ZERO, Added, DerivedField, Effect, Motion, dissipative
 from .state import Parameter, Vector, cross, dot
 
 REAL_AIR = "air beyond Stokes"
@@ -105,14 +105,15 @@ class RealAir:
         unit = length * length / time * (AIR_DENSITY / AIR_VISCOSITY)  # Reynolds number of unit spin or speed
         fast = hy.relu(spin[2]) + hy.relu(-spin[2])
         steady = _beyond(STOKES_UP_TO + hy.relu(unit * fast - STOKES_UP_TO)) - 1.0
-        swing = _layered(hy.sqrt(0.5 * unit * hy.par[Parameter.RATE])) - 1.0
+        swing = _layered(hy.sqrt(0.5 * unit * motion.turn.pace)) - 1.0
         torque = [-swing * spin[0], -swing * spin[1], -steady * spin[2]]
         tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
         excess = (along - tilt) * dot(torque, moment)
         speed = 4.0 * unit * unit * dot(motion.velocity, motion.velocity)
         push = hy.par[Parameter.LINEAR_DRAG] * (1.0 - _separated(speed + SLOW**2))
         force = [push * v for v in motion.velocity]
-        return dissipative(force, [tilt * torque[i] + excess * moment[i] for i in range(3)], motion)
+        brake = [tilt * torque[i] + excess * moment[i] for i in range(3)]
+        return replace(dissipative(force, brake, motion), motor=ZERO)
 
 
 def _beyond(number: Value) -> Value:
@@ -223,7 +224,7 @@ def check_floater_metal(scene: Scene) -> None:
 
     Raises InputError: with the skin depth, and the conductivity or frequency up to which it would do.
     """
-    floater, frequency = scene.floater, scene.frequency
+    floater, frequency = scene.floater, scene.fastest
     number = skin_number(floater.radius, floater.conductivity or 0.0, frequency)
     if too_slow(scene):
         rule = "leave its skin depth large against it where it has a remanence"
@@ -248,7 +249,7 @@ def slow_error(scene: Scene) -> float:
     As for the rotor's metal (`fem.rotor_metal`) the fastest are at twice the rotor's frequency.
     """
     floater = scene.floater
-    return min(1.0, (2 * skin_number(floater.radius, floater.conductivity or 0.0, scene.frequency)) ** 2 / 105)
+    return min(1.0, (2 * skin_number(floater.radius, floater.conductivity or 0.0, scene.fastest)) ** 2 / 105)
 
 
 def too_slow(scene: Scene) -> bool:

@@ -18,6 +18,13 @@ from outside, and ½ Σ y_f², y_f = y - y_r, as what the floater has stored; to
     Σ [λ y_f² + u y_f ∂q/∂d] + m·Σ b_i dy_ri/dt.
 
 Whatever depends on the rotor's rate is a runtime parameter.
+
+With a drive the rate W changes, and q would follow with a delay.  There q is the share's mean r_0 over a turn alone, so
+that all the rest is integrated, exact for every W(t) and in shorter steps:
+
+    d(p_i - q_i)/dt = -λ_i (p_i - q_i - m·b_i) + λ_i (r_i - r_i0) - u ∂r_i0/∂d.
+
+The plate's torque on the rotor is Σ y_i ∂r_i/∂φ.
 """
 
 from dataclasses import dataclass, replace
@@ -31,7 +38,9 @@ from ...fem.plate.table import PlateTable, RotorShare
 from ...geometry.common import Array
 from ...geometry.scene.contents import Plate
 from .effect import Added
-from .state import Parameter, Vector, cross, dot, dotted, subtract, turned, turned_about_z
+from .state import DRIVEN, STEADY, Parameter, Turn, Vector, cross, dot, dotted, subtract, turned, turned_about_z
+
+ENDLESS = 1e30  # Rate of a rotor, rad/s, that no current follows
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +59,10 @@ class PlateMemory:
         return max(self.table.errors.total, self.share.error) + self.neglected
 
     def left_by_rotor(self, angular_velocity: float) -> RotorShare:
-        """States q that a rotor turning so fast (rad/s) leaves in the plate, in the form of its share r."""
+        """States q that a rotor turning so fast (rad/s) leaves in the plate, in the form of its share r.
+
+        Those of a rotor of the rate `ENDLESS` are means over a turn alone.
+        """
         series = self.share.series.copy()
         turns = np.arange(1, len(series) // 2 + 1)[:, None]
         followed = 1 / (1 + 1j * angular_velocity * turns / self.table.rates)
@@ -68,18 +80,20 @@ class PlateMemory:
         return f"PlateMemory {self.model!r}: {text}\n{self.table!r}"
 
 
-def plate_numbers(memory: PlateMemory, values: Array) -> Array:
+def plate_numbers(memory: PlateMemory, values: Array, driven: bool = False) -> Array:
     """Runtime parameters of a plate, from those of `parameters`.
 
     They are -λT of each state, then for each harmonic of the rotor's share what its currents q - r are in each
-    multipole, and, of a plate that goes down, the harmonics of q of each state.
+    multipole, and, of a plate that goes down, the harmonics of q of each state, or, with a drive, those of r.
     """
-    table, velocity = memory.table, float(values[Parameter.RATE]) / float(values[Parameter.TIME])
+    table = memory.table
+    velocity = ENDLESS if driven else float(values[Parameter.RATE]) / float(values[Parameter.TIME])
     left = memory.left_by_rotor(velocity).series
     strengths = np.einsum("nim,ik->nmk", left[1:] - memory.share.series[1:], _signal_weights(table)).ravel()
-    sinking = left.swapaxes(1, 2).ravel() if memory.plate.lowering else np.zeros(0)
+    of_states = memory.share.series if driven else left if memory.plate.lowering else np.zeros((0, 0, 0))
     unit = float(values[Parameter.PLATE_SHARE])
-    return np.concatenate([-table.rates * float(values[Parameter.TIME]), unit * np.concatenate([strengths, sinking])])
+    by_rotor = unit * np.concatenate([strengths, of_states.swapaxes(1, 2).ravel()])
+    return np.concatenate([-table.rates * float(values[Parameter.TIME]), by_rotor])
 
 
 def _signal_weights(table: PlateTable) -> Array:
@@ -88,7 +102,7 @@ def _signal_weights(table: PlateTable) -> Array:
 
 
 def memory_terms(
-    memory: PlateMemory, first: int, position: Vector, moment: Vector, states: Vector
+    memory: PlateMemory, first: int, position: Vector, moment: Vector, states: Vector, driven: bool = False
 ) -> tuple[Added, Vector]:
     """The plate's part of the equations of motion, and the scaled rates of its states.
 
@@ -100,10 +114,13 @@ def memory_terms(
     memory, first : the plate, whose numbers are the runtime parameters from number `first` on
     position, moment : of the floater, scaled
     states : p - q of the plate
+    driven : whether the rotor's rate changes in time
     """
     plate, table, lowered = memory.plate, memory.table, memory.plate.lowering is not None
+    rotor = DRIVEN if driven else STEADY
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
-    place, pointing = seen_by_plate(plate, position), _product(plate.box.rotation.T, _turn(moment, 1.0))
+    place = seen_by_plate(plate, position, rotor)
+    pointing = _product(plate.box.rotation.T, _turned(moment, rotor.angle, 1.0))
     source = [strength * m for m in pointing]
     # x, y and z enter only after the sums over multipoles: every operation counts in Taylor's method
     flux, slopes = (table.multipoles.derivatives(place, order) for order in (1, 2))
@@ -111,7 +128,8 @@ def memory_terms(
     signals = [dot(along, entry) for entry in flux]  # of the floater in each multipole
     weights = _signal_weights(table)
     own = [p - weighted(row, signals) for p, row in zip(states, weights, strict=True)]
-    by_rotor, sinking, stored, spent = _rotor_terms(memory, first + len(own), signals, own)
+    decay = [hy.par[first + i] * y for i, y in enumerate(own)]
+    by_rotor, forced, stored, spent, braked = _rotor_terms(memory, first, signals, own, driven)
     # of all states together, so that the fields of 20 to 40 multipoles are summed instead of those of 40 to 90 states
     strengths = [weighted(column, own) + r for column, r in zip(weights.T, by_rotor, strict=True)]
     steeper = table.multipoles.factors(2) / table.multipoles.factors(1) / table.multipoles.scale
@@ -122,70 +140,83 @@ def memory_terms(
     )
     field = [weighted(row, field_sums) for row in cartesian(1)]
     push = [dot(source, [weighted(row, slope_sums) for row in rows]) for rows in cartesian(2)]
-    force = [length * f for f in _seen_by_rotor(plate, push)]
-    turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field))]
-    decay = [hy.par[first + i] * y for i, y in enumerate(own)]
+    force = [length * f for f in _seen_by_rotor(plate, push, rotor)]
+    turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field, rotor))]
     speed = hy.par[Parameter.PLATE_SPEED] if lowered else hy.expression(0.0)
-    drive = dot(force, [*turned(position)[:2], speed]) + hy.par[Parameter.RATE] * turn[2]
+    drive = dot(force, [*turned(position, rotor.rate)[:2], speed]) + rotor.rate * turn[2]
     added = Added(
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
         energy=0.5 * hy.sum([y * y for y in own]) + stored,
         power=dotted(own, decay) - spent - drive,
+        motor=braked,
     )
-    return added, [a + b for a, b in zip(decay, sinking, strict=True)] if lowered else decay
+    return added, [a + b for a, b in zip(decay, forced, strict=True)] if forced else decay
 
 
 def _rotor_terms(
-    memory: PlateMemory, first: int, signals: Vector, own: Vector
-) -> tuple[Vector, Vector, hy.expression, hy.expression]:
+    memory: PlateMemory, first: int, signals: Vector, own: Vector, driven: bool
+) -> tuple[Vector, Vector, hy.expression, hy.expression, hy.expression]:
     """The part of the rotor's currents, from the floater's signals in each multipole and y_f of each state.
 
-    They are Σ W_ik (q_i - r_i) of every multipole; -u ∂q/∂d of each state, if the plate goes down; the floater's energy
-    in their field; and its change by the field's own, with Σ u y_f ∂q/∂d.
+    They are Σ W_ik (q_i - r_i) of every multipole; what drives each state beside the floater, if the plate goes down or
+    with a drive; the floater's energy in their field; its change by the field's own, less y_f times what drives; and,
+    with a drive, the torque by which the plate brakes the rotor.
     """
     angle, depth = names = hy.make_vars("rotor_angle", "plate_depth")
+    rotor = DRIVEN if driven else STEADY
     speed = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_SPEED]
     below = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_DEPTH] + speed * hy.time
-    now = {"rotor_angle": hy.par[Parameter.RATE] * hy.time, "plate_depth": below}
+    now = {"rotor_angle": rotor.angle, "plate_depth": below}
     constant, *turning = memory.share.basis(*names)
     functions, count = [f for row in turning for f in row], len(signals)
     here = hy.subs(functions, now) if functions else []
     # r and q are Σ number · basis: the basis is written once, its derivatives by angle and depth are heyoka's
-    changing = [hy.par[Parameter.RATE] * hy.subs(hy.diff(f, angle), now) for f in functions]
-    rows = [[hy.par[first + n * count + k] for k in range(count)] for n in range(len(functions))]
-    sums, lowering, spent = [dotted(row, signals) for row in rows], list[hy.expression](), hy.expression(0.0)
+    by_angle = [hy.subs(hy.diff(f, angle), now) for f in functions]
+    changing = [rotor.rate * f for f in by_angle]
+    start, zero = first + len(own), hy.expression(0.0)
+    rows = [[hy.par[start + n * count + k] for k in range(count)] for n in range(len(functions))]
+    sums, forced, braked = [dotted(row, signals) for row in rows], list[hy.expression](), zero
+
+    def number(harmonic: int, state: int) -> hy.expression:
+        """Of q of a state, or with a drive of r."""
+        return hy.par[start + len(functions) * count + harmonic * len(own) + state]
+
     if memory.plate.lowering is not None:
         sinking = [speed * hy.subs(hy.diff(f, depth), now) for f in [*constant, *functions]]
         changing = [a + b for a, b in zip(changing, sinking[len(constant) :], strict=True)]
-        start = first + len(functions) * count
-        numbers = [[hy.par[start + n * len(own) + i] for n in range(len(sinking))] for i in range(len(own))]
-        lowering = [-dotted(row, sinking) for row in numbers]
-        spent = -dotted(own, lowering)
-    strengths = [dotted(column, here) for column in zip(*rows, strict=True)] or [hy.expression(0.0)] * count
-    return strengths, lowering, -dotted(here, sums), spent + dotted(changing, sums)
+        parts = sinking[: len(constant)] if driven else sinking
+        forced = [-hy.sum([number(n, i) * f for n, f in enumerate(parts)]) for i in range(len(own))]
+    if driven:
+        weights = [[number(n, i) for n in range(len(constant), len(constant) + len(here))] for i in range(len(own))]
+        shares = [dotted(row, here) for row in weights]
+        driving = [-hy.par[first + i] * share for i, share in enumerate(shares)]
+        forced = [a + b for a, b in zip(forced or [zero] * len(own), driving, strict=True)]
+        braked = hy.sum([(r - y) * dotted(row, by_angle) for r, y, row in zip(shares, own, weights, strict=True)])
+    spent = -dotted(own, forced) if forced else zero
+    strengths = [dotted(column, here) for column in zip(*rows, strict=True)] or [zero] * count
+    return strengths, forced, -dotted(here, sums), spent + dotted(changing, sums), braked
 
 
-def raised(position: Vector) -> Vector:
+def raised(position: Vector, rotor: Turn) -> Vector:
     """A scaled position in the rotor's frame along the laboratory's axes, raised by what the plate has gone down, m."""
     depth = hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time
-    x, y, z = _turn([hy.par[Parameter.LENGTH] * p for p in position], 1.0)
+    x, y, z = _turned([hy.par[Parameter.LENGTH] * p for p in position], rotor.angle, 1.0)
     return [x, y, z + hy.par[Parameter.LENGTH] * depth]
 
 
-def seen_by_plate(plate: Plate, position: Vector) -> Vector:
+def seen_by_plate(plate: Plate, position: Vector, rotor: Turn) -> Vector:
     """A scaled position in the rotor's frame along the plate's axes, m, from its centre."""
     return _product(
-        plate.box.rotation.T, subtract(raised(position), [hy.expression(float(c)) for c in plate.box.center])
+        plate.box.rotation.T, subtract(raised(position, rotor), [hy.expression(float(c)) for c in plate.box.center])
     )
 
 
-def _seen_by_rotor(plate: Plate, vector: Vector) -> Vector:
-    return _turn(_product(plate.box.rotation, vector), -1.0)
+def _seen_by_rotor(plate: Plate, vector: Vector, rotor: Turn) -> Vector:
+    return _turned(_product(plate.box.rotation, vector), rotor.angle, -1.0)
 
 
-def _turn(vector: Vector, sense: float) -> list[hy.expression]:
-    angle = hy.par[Parameter.RATE] * hy.time
+def _turned(vector: Vector, angle: hy.expression, sense: float) -> list[hy.expression]:
     cosine, sine = hy.cos(angle), sense * hy.sin(angle)
     x, y, z = vector
     return [cosine * x - sine * y, sine * x + cosine * y, z]

@@ -21,6 +21,7 @@ class Parameter(IntEnum):
     """Places of the runtime parameters; free of units but LENGTH (m), TORQUE (1/T), TIME (s) and the last ones.
 
     PLATE_MOMENT is the floater's moment by the root of the unit of energy (A m²/√J), PLATE_SHARE one by that root.
+    RATE, ANGLE and PLATE_DEPTH are those at t = 0, had ACCELERATION and PLATE_SPEED always been as they are.
     INDUCED is the moment that 1 T induces in the floater, by the same root, A m²/(T √J).
     TILT_EDDY and SPIN_EDDY are the floater's own eddy currents, 1/T²: accelerations by unit field and relative turn;
     SLOWNESS is μ0σR² of it in units of time.
@@ -48,6 +49,30 @@ class Parameter(IntEnum):
     SPIN_EDDY = auto()
     SLOWNESS = auto()
     MEASURE = auto()
+    ACCELERATION = auto()
+    ANGLE = auto()
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """The rotor's turn as scaled expressions."""
+
+    rate: hy.expression
+    angle: hy.expression
+    acceleration: hy.expression
+    pace: hy.expression  # the rate's size, smooth where it passes through zero
+
+
+RATE, ACCELERATION = hy.par[Parameter.RATE], hy.par[Parameter.ACCELERATION]
+NOW = RATE + ACCELERATION * hy.time
+REST = 1e-4  # Rate that is added in square to that of a drive: of a square root each derivative must be finite
+STEADY = Turn(RATE, RATE * hy.time, hy.expression(0.0), RATE)
+DRIVEN = Turn(
+    NOW,
+    hy.par[Parameter.ANGLE] + (RATE + 0.5 * ACCELERATION * hy.time) * hy.time,
+    ACCELERATION,
+    hy.sqrt(NOW * NOW + REST**2),
+)
 
 
 def dotted(a: Vector, b: Vector) -> hy.expression:
@@ -65,9 +90,9 @@ def cross(a: Vector, b: Vector) -> list[hy.expression]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def turned(vector: Vector) -> list[hy.expression]:
+def turned(vector: Vector, rate: hy.expression) -> list[hy.expression]:
     """W × vector: what the frame's rotation adds to the rate of a vector fixed in the laboratory."""
-    return [-hy.par[Parameter.RATE] * vector[1], hy.par[Parameter.RATE] * vector[0], hy.expression(0.0)]
+    return [-rate * vector[1], rate * vector[0], hy.expression(0.0)]
 
 
 def subtract(a: Vector, b: Vector) -> list[hy.expression]:
@@ -121,7 +146,7 @@ class Scales:
     """Units of the integrated state, chosen so that all its components are of order one."""
 
     length: float  # radius of the floater, m
-    # 1/ω of the rotor, s; of a rotor at rest the time of a fall through `length`, or one second without gravity
+    # 1/ω of the rotor at its fastest, s; at rest the time of a fall through `length`, or one second without gravity
     time: float
     # moment of inertia about the magnetic moment over that across it; the integrated spin is L/I, which has so much of
     # the true one along the moment
@@ -131,8 +156,8 @@ class Scales:
     def of(cls, scene: Scene) -> Scales:
         radius, weight = scene.floater.radius, float(np.linalg.norm(scene.gravity))
         ratio = scene.floater.spin_ratio
-        if scene.frequency:
-            return cls(radius, 1 / abs(scene.angular_velocity), ratio)
+        if scene.fastest:
+            return cls(radius, 1 / (2 * np.pi * scene.fastest), ratio)
         return cls(radius, float(np.sqrt(radius / weight)) if weight > WEIGHTLESS else 1.0, ratio)
 
     def pack(self, state: State) -> Array:

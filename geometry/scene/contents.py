@@ -185,6 +185,14 @@ class Drag:
         return cls.stokes(floater.radius if floater.body is None else float(np.cbrt(floater.volume * 0.75 / np.pi)))
 
 
+@dataclass(frozen=True)
+class DriveStep:
+    """A step of the rotor's drive: steadily to a `frequency` (Hz), or staying where None, in so many `seconds`."""
+
+    frequency: float | None
+    seconds: float
+
+
 @dataclass(frozen=True, eq=False)
 class AbsoluteStart:
     """Initial state in the laboratory frame: position m, velocity m/s, moment direction, angular velocity rad/s."""
@@ -219,7 +227,7 @@ class Scene:
 
     Parameters
     ----------
-    frequency : turns of the rotor per second about +z, Hz
+    frequency : turns of the rotor per second about +z, Hz; of one with a drive at t = 0
     rotor : magnets in the rotor's frame, which is the laboratory's at t = 0
     floater : the sphere
     gravity : (3,) m/s², laboratory frame
@@ -232,6 +240,7 @@ class Scene:
     conductors : metal beside the magnets that turns with the rotor
     files : path of each file that it names, with the SHA-256 of its content when the scene was read
     parts : the solids of the STEP files that its keys name, in canonical pose, also of those computed as another shape
+    drive : what the rotor's frequency does in time, step by step; after the last it stays
     keys : the tables of a scene file that it was made of, and the scene that they made: what of that was not replaced
         since is as they say. None of a scene that was put together from its parts
     """
@@ -249,12 +258,42 @@ class Scene:
     conductors: tuple[Conductor, ...] = ()
     files: tuple[tuple[str, str], ...] = field(default=(), compare=False)
     parts: tuple[Part, ...] = field(default=(), compare=False)
+    drive: tuple[DriveStep, ...] = ()
     keys: tuple[Mapping[str, Any], Scene] | None = field(default=None, compare=False, repr=False)
 
     @property
     def angular_velocity(self) -> float:
-        """ω = 2π frequency, rad/s."""
+        """ω = 2π frequency, rad/s; with a drive at t = 0."""
         return 2 * np.pi * self.frequency
+
+    @property
+    def fastest(self) -> float:
+        """The highest frequency of the rotor, Hz."""
+        return max(abs(self.frequency), *(step.frequency or 0.0 for step in self.drive), 0.0)
+
+    @cached_property
+    def knots(self) -> Array:
+        """(3, n) instants (s) between which the angular velocity changes steadily; it (rad/s) and the angle (rad)."""
+        times, rates, angles = [0.0], [self.angular_velocity], [0.0]
+        for step in self.drive:
+            rate = rates[-1] if step.frequency is None else 2 * np.pi * step.frequency
+            angles.append(angles[-1] + (rates[-1] + rate) / 2 * step.seconds)
+            rates.append(rate)
+            times.append(times[-1] + step.seconds)
+        return np.array([times, rates, angles])
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Angular velocity of the rotor at each `time` (s), rad/s."""
+        return np.asarray(np.interp(time, *self.knots[:2]))
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Angle (rad) of the rotor at each `time` (s): the integral of its angular velocity."""
+        time = np.asarray(time, float)
+        if not self.drive:
+            return np.asarray(self.angular_velocity * time)
+        times, rates, angles = self.knots
+        last = np.searchsorted(times[1:], time, "right")
+        return np.asarray(angles[last] + (rates[last] + self.rate(time)) / 2 * (time - times[last]))
 
     @property
     def turning_bodies(self) -> tuple[Solid, ...]:
@@ -263,7 +302,7 @@ class Scene:
 
     def __repr__(self) -> str:
         air = f"drag {self.drag.linear:.3g} N s/m, {self.drag.angular:.3g} N m s{' and more' if self.drag.air else ''}"
-        lines = [f"Scene at {self.frequency:g} Hz, gravity ({listed(self.gravity)}) m/s², {air}"]
+        lines = [f"Scene at {self._frequencies}, gravity ({listed(self.gravity)}) m/s², {air}"]
         lines += [f"  {body!r}" for body in (*self.rotor, *self.conductors)]
         lines += [f"  Field from {self.field_map}"] if self.field_map else []
         lines += [f"  {body!r}" for body in (self.floater, self.plate) if body]
@@ -275,4 +314,13 @@ class Scene:
         rows["floater"] = repr(self.floater).removeprefix("Floater ")
         rows |= {"plate": repr(self.plate).removeprefix("Plate ")} if self.plate else {}
         rows["gravity"] = f"({listed(self.gravity)}) m/s²"
-        return html_table(f"Scene at {self.frequency:g} Hz", rows)
+        return html_table(f"Scene at {self._frequencies}", rows)
+
+    @property
+    def _frequencies(self) -> str:
+        """Those of a drive's steps, in words."""
+        said = [f"{self.frequency:g} Hz"]
+        for step in self.drive:
+            way = "held for" if step.frequency is None else f"to {step.frequency:g} Hz in"
+            said.append(f"{way} {step.seconds:g} s")
+        return ", ".join(said)

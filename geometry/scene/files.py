@@ -142,6 +142,16 @@ def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", k
     return found
 
 
+def driven(scene: Scene, steps: Sequence[Mapping[str, Any]], source: str = "drive", **keys: Any) -> Scene:
+    """The `scene` with other `steps` of its `[[drive]]`, and other keys of the whole file.
+
+    Raises SceneError as `changed` does.
+    """
+    found = assemble(scene_keys(scene) | {"drive": _plain(steps)} | keys, source, Path())
+    _check_same(scene, found.files, source)
+    return found
+
+
 def check_files(scene: Scene, source: str = "scene") -> None:
     """Raise SceneError if a file that a scene names has another content than when the scene was read."""
     _check_same(scene, [(path, content_digest(Path(path))) for path, _ in scene.files], source)
@@ -185,6 +195,7 @@ def scene(
     gravity_m_s2: Sequence[float] = (0.0, 0.0, -9.81),
     drag: Mapping[str, Any] | None = None,
     start: Mapping[str, Any] | None = None,
+    drive: Sequence[Mapping[str, Any]] | None = None,
     **more: Any,
 ) -> Scene:
     """A scene from the tables of a scene file; the object itself is in SI units.
@@ -204,6 +215,8 @@ def scene(
     start : dict, optional
         "offset_mm" from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz"; left
         out, 0.1 mm above the stable equilibrium.
+    drive : list of dict, optional
+        Steps of the rotor's frequency from `frequency_hz` on: "to_hz" or "stop" (True) with "in_s", or "hold_s".
     **more : float or list
         Further keys that stand in no table of a scene file.
 
@@ -226,7 +239,8 @@ def scene(
     130.0
     """
     keys = {"frequency_hz": frequency_hz, "gravity_m_s2": gravity_m_s2, "rotor": rotor, "floater": floater, **more}
-    keys |= {name: table for name, table in (("plate", plate), ("drag", drag), ("start", start)) if table is not None}
+    tables = {"plate": plate, "drag": drag, "start": start, "drive": drive}
+    keys |= {name: table for name, table in tables.items() if table is not None}
     return _warned(assemble(_plain(keys), "scene"))
 
 
@@ -354,6 +368,11 @@ def _drag(scene: Scene) -> dict[str, Any] | None:
     return {"model": "air"} if scene.drag == replace(stokes, air=True) else _said(schema.DragTable, scene.drag)
 
 
+def _drive(scene: Scene) -> list[dict[str, float]] | None:
+    steps = [(step.frequency, step.seconds) for step in scene.drive]
+    return [{"hold_s": s} if f is None else {"to_hz": f, "in_s": s} for f, s in steps] or None
+
+
 def _start(scene: Scene) -> dict[str, Any] | None:
     keys = _said(schema.StartTable, scene.start)
     return None if keys == {"offset_mm": [0.0, 0.0, 0.1]} else keys
@@ -395,6 +414,7 @@ FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
     "plate": (("plate",), _plate),
     "drag": (("drag", "floater"), _drag),
     "start": (("start",), _start),
+    "drive": (("drive",), _drive),
 }
 
 

@@ -13,7 +13,7 @@ from ..magnets import Magnet
 from ..rotor import Conductor, Rotor, horizontal, tilt, vertical
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix
 from ..solids import Part, Solid, known_shape
-from .contents import AbsoluteStart, Drag, Floater, Lowering, MapReading, OffsetStart, Plate, Scene
+from .contents import AbsoluteStart, Drag, DriveStep, Floater, Lowering, MapReading, OffsetStart, Plate, Scene
 
 MILLI = 1e-3
 ORIGIN = (0.0, 0.0, 0.0)
@@ -48,6 +48,8 @@ Metal = Annotated[Number, Field(ge=1e-3, le=1e9)]
 Coercivity = Annotated[Positive, Field(ge=1e-6, le=1e5)]
 Brake = Annotated[NotNegative, Field(le=1e6), _zero_or(1e-30)]
 Speed = Annotated[Number, Field(ge=-1e9, le=1e9)]
+Frequency = Annotated[NotNegative, Field(le=1e6), _zero_or(1e-3)]
+Duration = Annotated[Positive, Field(ge=1e-6, le=1e9)]
 RECOIL_PERMEABILITY = 1.05  # Default: sintered NdFeB
 # Along the easy axis, and across it; a single number for both.
 MagnetPermeability = Annotated[
@@ -275,10 +277,22 @@ class StartTable(Table):
         )
 
 
+class DriveTable(Table):
+    """A step of the rotor's drive: a ramp to a frequency or to rest, or a hold."""
+
+    to_hz: Frequency | None = None
+    stop: Literal[True] | None = None
+    in_s: Duration | None = None
+    hold_s: Duration | None = None
+
+    def step(self) -> DriveStep:
+        return DriveStep(0.0 if self.stop else self.to_hz, self.in_s or self.hold_s or 0.0)
+
+
 class SceneTable(Table):
     """The whole file."""
 
-    frequency_hz: Annotated[NotNegative, Field(le=1e6), _zero_or(1e-3)]
+    frequency_hz: Frequency
     gravity_m_s2: Three[Coordinate] = [0.0, 0.0, -9.81]
     rotor: Annotated[
         Annotated[DisplacedRotor, Tag("horizontal")]
@@ -291,6 +305,7 @@ class SceneTable(Table):
     plate: PlateTable | None = None
     drag: DragTable | None = None
     start: StartTable | None = None
+    drive: list[DriveTable] | None = None
 
     def scene(self, parts: Mapping[int, Part], field_map: Path | None) -> Scene:
         """The scene in SI units, its `parts` by the numbers of their magnets."""
@@ -306,6 +321,7 @@ class SceneTable(Table):
             field_map=field_map,
             map_reading=MapReading(rotor.map_length_unit, rotor.map_field_unit, rotor.map_columns),
             conductors=tuple(conductor.conductor() for conductor in rotor.conductors),
+            drive=tuple(step.step() for step in self.drive or ()),
         )
 
 
@@ -322,6 +338,7 @@ TABLES: dict[str, type[Table]] = {
     "lowering": LoweringTable,
     "drag": DragTable,
     "start": StartTable,
+    "drive": DriveTable,
 }
 
 
@@ -360,6 +377,14 @@ def key_faults(table: SceneTable) -> list[str]:
             'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
             'sphere; instead received "air".'
         )
+    for k, step in enumerate(table.drive or ()):
+        kinds = [key for key in ("to_hz", "stop", "hold_s") if getattr(step, key) is not None]
+        if len(kinds) != 1:
+            received = " and ".join(kinds) or "none of them"
+            faults.append(f"Input drive[{k}] must have one of to_hz, stop and hold_s; instead received {received}.")
+        elif (step.in_s is None) != (kinds == ["hold_s"]):
+            rule, instead = ("be left out", "received both") if step.in_s else ("be given", "it is missing")
+            faults.append(f"Input drive[{k}].in_s must {rule} beside {kinds[0]}; instead {instead}.")
     if rotor.field_map is None:
         alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(rotor, k) is not None]
         faults += [f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone]

@@ -201,4 +201,4 @@ def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
         down = np.array([0.0, 0.0, float(plate.lowering.depth(result["time"].values[-1]))])
         scene = replace(scene, plate=replace(plate, body=moved(plate.body, plate.body.center - down), lowering=None))
     laboratory = State(*(result[name].values for name in ("position", "velocity", "moment", "spin")))
-    return scene, laboratory.to_rotor(scene.angular_velocity * result["time"].values)
+    return scene, laboratory.to_rotor(scene.angle(result["time"].values))

@@ -43,7 +43,7 @@ def seen_from(scene: Scene, time: Array, motion: State) -> View:
     """
     frame, last = "rotor's frame", len(time) - 1
     if np.any(scene.gravity[:2]):
-        frame, angle = "laboratory", scene.angular_velocity * time
+        frame, angle = "laboratory", scene.angle(time)
         motion = motion.to_lab(angle)
         last -= int(np.argmax(np.cos(angle[:-LATEST:-1])))
     seconds = PATH / scene.frequency if scene.frequency else np.inf
@@ -76,7 +76,7 @@ def flight_frames(scene: Scene, time: Array, motion: State) -> Frames:
         for vectors in (motion.position, motion.moment)
     )
     standing = State(position, np.zeros_like(position), moment, np.zeros_like(moment))
-    laboratory = standing.to_lab(scene.angular_velocity * instants)
+    laboratory = standing.to_lab(scene.angle(instants))
     return Frames(scene, instants, laboratory.position, laboratory.moment)
 
 

@@ -191,10 +191,10 @@ def _frame(piece: Piece | None = None) -> Frame:
     flight = _flights[0]
     if piece is None:  # nothing was simulated
         lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
-        turned = flight.scene.angular_velocity * flight.time
+        turned = flight.scene.angle(flight.time)
         piece = Piece(np.array([flight.time]), lab, turned, flight.ended_by)
     places, moments = piece.lab.position, piece.lab.moment
-    seen = piece.lab.to_rotor(flight.scene.angular_velocity * piece.time).position
+    seen = piece.lab.to_rotor(flight.scene.angle(piece.time)).position
     words = ENDS.get(piece.ended_by, "")
     return {
         "samples": np.stack([piece.time, 1e3 * places[:, 2], polar_angle(moments)]),

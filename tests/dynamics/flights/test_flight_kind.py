@@ -29,7 +29,8 @@ VERTICAL = Scene(80.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.s
 
 def flown(distance, ended_by, time=TIME):
     position = np.stack([0 * distance, 0 * distance, -distance], axis=1)  # on the axis: the same in both frames
-    return Trajectory(time, State(position, position, position, position), 600.0, ended_by, 0.0, 1.0, 1, 0.0)
+    state, rate = State(position, position, position, position), np.full(len(time), 600.0)
+    return Trajectory(time, state, 600.0 * time, rate, ended_by, 0.0, 1.0, 1, 0.0)
 
 
 WAVE = np.sin(60 * TIME)
