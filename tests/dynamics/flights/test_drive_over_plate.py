@@ -80,7 +80,7 @@ def test_a_drive_that_holds_is_none(memory):
 
 
 def test_what_the_plate_takes_from_a_rotor_alone(memory):
-    """The torque of a turning dipole over an infinite slab, exactly: the table, made to 1 % for the floater, has 1.1 % less."""
+    """The torque of a turning dipole over an infinite slab: the table, to 1 % for the floater, has 1.1 % less."""
     magnets, still = horizontal(0.0, 10e-3, 1.305, 1.0), replace(PLATE, lowering=None)
     table, floater = rotor_table(magnets, "dipole"), replace(FLOATER, remanence=1e-6)
     scene = Scene(110.0, magnets, floater, NO_DRAG, np.zeros(3), still, drive=(DriveStep(None, 0.1),))
