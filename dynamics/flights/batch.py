@@ -47,7 +47,7 @@ FLAT = 1e-9  # Sine of the angle to the horizontal that a plate may have
 
 
 class _Passenger(Course):
-    """A trajectory on a slot for balls of one kind, free of the plate; each leg of its drive is a stretch of its own."""
+    """A trajectory on a slot for balls of one kind, free of the plate; each leg of its drive is one for itself."""
 
     over = False
     end = 0.0  # Scaled time at which "duration" interrupts it

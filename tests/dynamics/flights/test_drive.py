@@ -7,7 +7,7 @@ import pytest
 from article import FLOATER, MAGNETS, NO_DRAG
 from scipy.integrate import quad, solve_ivp
 
-from spinlev.dynamics.flights.batch import fly_together
+from spinlev.dynamics.flights.batch import simulate_together
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
 from spinlev.dynamics.motion.state import turned_about_z
 from spinlev.fem.rotor.choice import rotor_table
@@ -121,7 +121,7 @@ def test_down_to_rest_and_up_from_it():
 def test_side_by_side_as_one_by_one():
     """Drives in SIMD lanes and in balls, the second of which is another one."""
     scenes = [replace(DOWN, drive=STEPS), replace(DOWN, drive=(DriveStep(90.0, 0.1),))]
-    flown = fly_together(scenes, TABLE, [START, START], 0.2)
+    flown = simulate_together(scenes, TABLE, [START, START], 0.2)
     for scene, one in zip(scenes, flown, strict=True):
         alone = integrate(Flight(scene, TABLE, 0.2, in_balls=True), START, 0.2)
         assert one.ended_by == alone.ended_by
