@@ -119,7 +119,8 @@ class MovedEffect:
         names = ("velocity", "moment", "spin", "drift", "lag", "field")
         seen = {name: move.into(getattr(motion, name), measure) for name in names}
         gradient = move.tensor(motion.gradient, measure)
-        found = self.effect.added(Motion(position=[x / length for x in place], gradient=gradient, **seen))
+        position = [x / length for x in place]
+        found = self.effect.added(Motion(position=position, gradient=gradient, turn=motion.turn, **seen))
         vectors = ("force", "torque", "pulled", "turning")
         return replace(found, **{name: move.back(getattr(found, name), measure) for name in vectors})
 

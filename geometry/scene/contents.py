@@ -284,7 +284,7 @@ class Scene:
 
     def rate(self, time: ArrayLike) -> Array:
         """Angular velocity of the rotor at each `time` (s), rad/s."""
-        return np.asarray(np.interp(time, *self.knots[:2]))
+        return np.asarray(np.interp(np.asarray(time, float), *self.knots[:2]))
 
     def angle(self, time: ArrayLike) -> Array:
         """Angle (rad) of the rotor at each `time` (s): the integral of its angular velocity."""

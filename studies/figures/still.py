@@ -75,7 +75,7 @@ def flight_animation(frames: Frames) -> Iterator[float | bytes]:
     with gif:
         for number, instant in enumerate(frames.time):
             pose = np.eye(4)
-            pose[:3, :3] = rotation_matrix((0.0, 0.0, np.degrees(frames.scene.angle(instant))))
+            pose[:3, :3] = rotation_matrix((0.0, 0.0, float(np.degrees(frames.scene.angle(instant)))))
             for actor in magnets:
                 actor.user_matrix = pose
             for actor in floater:

@@ -191,7 +191,7 @@ def _frame(piece: Piece | None = None) -> Frame:
     flight = _flights[0]
     if piece is None:  # nothing was simulated
         lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
-        turned = flight.scene.angle(flight.time)
+        turned = float(flight.scene.angle(flight.time))
         piece = Piece(np.array([flight.time]), lab, turned, flight.ended_by)
     places, moments = piece.lab.position, piece.lab.moment
     seen = piece.lab.to_rotor(flight.scene.angle(piece.time)).position
