@@ -18,7 +18,7 @@ from ..fem.rotor.near_field import NEAR_RTOL, complete
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..geometry.common import ComputationError, InputError
 from ..geometry.scene.contents import Scene
-from ..geometry.scene.files import scene_text
+from ..geometry.scene.files import driven, scene_text
 from .catalogue.entries import CATALOGUE
 from .catalogue.runner import figures_of, question_study
 from .cli.console import missing_extra
@@ -166,6 +166,7 @@ def simulate(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     progress: bool = False,
+    drive: Sequence[Mapping[str, Any]] | None = None,
     **requested: Unpack[Requested],
 ) -> xr.Dataset:
     """Trajectory of the floater from where the scene says.
@@ -174,18 +175,22 @@ def simulate(
     ----------
     duration : float
         Simulated time, s.
+    drive : list of dict, optional
+        Steps of the rotor's frequency in place of the scene's: "to_hz" or "stop" (True) with "in_s", or "hold_s".
 
     Returns
     -------
     xarray.Dataset
-        Over `time`, SI units; how it ended and the violation of the energy balance are attributes.
+        Over `time`, SI units; how it ended and the violation of the energy balance are attributes. With a drive also
+        the frequency, torque, power and work of the motor, and the equilibria at steady frequencies.
 
     Raises
     ------
     EquilibriumError
         The scene starts from an equilibrium and has none.
     """
-    levitation = Levitation(scene, Models(model, plate_model, **requested))
+    given = given_scene(scene)
+    levitation = Levitation(given if drive is None else driven(given, drive), Models(model, plate_model, **requested))
     simulated = Result(levitation, flight=levitation.flight(duration)).dataset()
     return simulated.assign_attrs(scene=scene_text(levitation.scene))
 

@@ -9,6 +9,8 @@ from typing import Any, cast
 
 import numpy as np
 
+from ..dynamics.continuation.branch import BranchPoint
+from ..dynamics.continuation.frequencies import branch_through, on_branch
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
 from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
@@ -21,6 +23,7 @@ from ..dynamics.motion.events import plate_depth
 from ..dynamics.motion.plate import PlateMemory
 from ..dynamics.motion.rates import Rates
 from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
+from ..dynamics.motion.state import Scales
 from ..fem.mutual.making import cached_mutual_table, mutual_key
 from ..fem.mutual.table import MutualTable
 from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
@@ -32,6 +35,7 @@ from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
 from ..geometry.common import Array, SpinlevError, Watch, unwatched
 from ..geometry.scene.contents import AbsoluteStart, Plate
+from ..geometry.solids import moved
 from .cli.console import detail, note, progress, stages
 from .cli.options import FieldModel, Models, finite, positive
 from .plan import (
@@ -39,6 +43,7 @@ from .plan import (
     RotorField,
     SceneLike,
     SharedTables,
+    check_drive,
     check_room,
     check_way,
     equations_key,
@@ -76,6 +81,8 @@ class Levitation:
 
     def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
         self.scene = given_scene(scene)
+        self.still = replace(self.scene, drive=()) if self.scene.drive else self.scene
+        """The scene with a rotor that keeps its first frequency, of which the equilibria are."""
         self.models = models.checked()
         self.spin = finite("spin", spin)
         self.searched = True  # whether the equilibria were searched for; else they were carried here from scenes nearby
@@ -243,20 +250,20 @@ class Levitation:
         def remembered(search: Callable[[], FixedPoints]) -> FixedPoints:
             if self.scene.field_map:  # no number in a key stands for how a map is fitted
                 return search()
-            found, known = cached_points(self.scene, equations, self.spin, search, note)
+            found, known = cached_points(self.still, equations, self.spin, search, note)
             if known:
                 detail("  from the cache.")
             return found
 
-        return survey(self.scene, table, self.spin, rates=rates, remembered=remembered, watch=watch)
+        return survey(self.still, table, self.spin, rates=rates, remembered=remembered, watch=watch)
 
     @cached_property
     def survey(self) -> Survey:
         """All equilibria free of the bodies, the stable ones first, with the plate where its currents are modelled."""
         found = self.without_plate
         if self.plate is None:
-            return free_of_bodies(self.scene, found)
-        return with_plate(self.scene, self.interaction, found, self.plate, self.rates)
+            return free_of_bodies(self.still, found)
+        return with_plate(self.still, self.interaction, found, self.plate, self.rates)
 
     @property
     def equilibria(self) -> tuple[Equilibrium, ...]:
@@ -276,6 +283,34 @@ class Levitation:
             with_spin = f"with body spin {self.spin:g}" if self.scene.frequency else "for any spin"
             raise EquilibriumError(f"At {self.scene.frequency:g} Hz the floater has no equilibrium {with_spin}.")
         return chosen
+
+    @cached_property
+    def branch(self) -> tuple[BranchPoint, ...]:
+        """Equilibria without plate against the frequency, from where a trajectory begins to a fold or contact.
+
+        None where it does not begin at an equilibrium, or gravity is not along the axis.
+        """
+        chosen = None if self.absolute or self.scene.gravity[:2].any() else _first(self.without_plate.equilibria)
+        if chosen is None:
+            return ()
+        start, scene = Scales.of(self.still).pack(chosen.start), self.still
+        try:
+            return tuple(branch_through(scene, self.rates, start, scene.frequency, self.spin))
+        except EquilibriumError as error:
+            note(f"Equilibria at other frequencies are not known: {error}")
+            return ()
+
+    def _check_drive(self) -> None:
+        """Refuse a plate in the way of a floater after a step of the drive, where it would levitate at all."""
+        if self.scene.plate is None or not self.scene.drive or not self.branch:
+            return
+        times, rates, _ = self.scene.knots
+        for time, frequency in zip(times[1:], rates[1:] / (2 * np.pi), strict=True):
+            there = on_branch(self.still, self.rates, self.branch, np.array([frequency]))[0]
+            if there is not None:
+                down = self.scene.plate.body.center - plate_depth(self.scene.plate, np.array([time])) * np.eye(3)[2]
+                plate = replace(self.scene.plate, body=moved(self.scene.plate.body, down))
+                check_room(replace(self.scene, plate=plate), there.position, f" at {frequency:g} Hz")
 
     # The plate's currents
 
@@ -388,7 +423,7 @@ class Levitation:
             return ()
         if self.wider is None:
             return self.equilibria
-        return with_plate(self.scene, self.interaction, self.without_plate, self.wider, self.rates).equilibria
+        return with_plate(self.still, self.interaction, self.without_plate, self.wider, self.rates).equilibria
 
     def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
@@ -400,12 +435,15 @@ class Levitation:
         Raises
         ------
         EquilibriumError : it shall begin at an equilibrium, and there is none that will do
-        InputError : `duration` is not positive, or the trajectory would begin in contact
+        InputError : `duration` is not positive or shorter than the drive, the trajectory would begin in contact, or the
+            plate is in the floater's way after a step of the drive
         FlightStopped : the user stopped it; the error holds what was simulated
         """
         positive("duration", duration)
         if duration in self.simulated:
             return self.simulated[duration]
+        check_drive(self.scene, duration)
+        self._check_drive()
         self._ahead = duration
         kept = checkpoint.read() if checkpoint else None
         if kept is not None and self.plate is not None:

@@ -174,6 +174,16 @@ def equations_key(scene: Scene, models: Models) -> str:
     )
 
 
+def check_drive(scene: Scene, duration: float) -> None:
+    """A drive that is not over after `duration` (s) is a wrong scene: InputError."""
+    total = float(scene.knots[0, -1])
+    if total > duration * (1 + 1e-9):
+        raise InputError(
+            f"Input drive must end within the {duration:g} s that are simulated; instead its steps take {total:g} s. "
+            "Simulate longer, or shorten them."
+        )
+
+
 def check_way(scene: Scene, place: Array) -> None:
     """A conductor of the rotor where the floater, at `place` (3,) m, would levitate is a wrong scene: InputError."""
     for k, conductor in enumerate(scene.conductors):
@@ -186,12 +196,12 @@ def check_way(scene: Scene, place: Array) -> None:
             )
 
 
-def check_room(scene: Scene, place: Array) -> None:
-    """A plate that leaves a floater at `place` (3,) m no room is a wrong scene: InputError."""
+def check_room(scene: Scene, place: Array, when: str = "") -> None:
+    """A plate that leaves a floater at `place` (3,) m no room is a wrong scene: InputError, which says `when`."""
     depth = sphere_overlap(place, scene.floater.inner_radius, scene.plate.body) if scene.plate else 0.0
     if scene.plate and depth > TOUCHING:
         center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
         raise InputError(
             f"Input plate.center_mm must leave room for the floater; instead received {center}: the plate overlaps it "
-            f"by {depth * 1e3:.4g} mm where it levitates, at {levitates} mm; move the plate away."
+            f"by {depth * 1e3:.4g} mm where it levitates{when}, at {levitates} mm; move the plate away."
         )

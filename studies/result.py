@@ -26,7 +26,15 @@ from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from .effects import PLATE_NEGLECTED, ListedEffect, effects_summary, listed_effects
 from .levitation import Levitation
-from .words import comparison_words, equilibria_words, flight_words, kind_of_flight, plate_words
+from .words import (
+    comparison_words,
+    drive_words,
+    equilibria_words,
+    flight_words,
+    kind_of_flight,
+    plate_words,
+    stable_near_start,
+)
 
 AXIS = ("x", "y", "z")
 MODES = ("bounce", *SIDE, *TILT)
@@ -61,6 +69,16 @@ OF_A_STATE = (
 )
 PLACES = 500  # of a trajectory, at which the field's error is looked at
 Columns = Mapping[str, tuple[tuple[str, ...], str, str]]  # dimensions, unit and a name for an axis label, by name
+DRIVE: Columns = {
+    "rotor_frequency": (("time",), "Hz", "frequency of the rotor"),
+    "motor_torque": (("time",), "N m", "torque of the motor, mean since the sample before"),
+    "motor_power": (("time",), "W", "power of the motor, mean since the sample before"),
+    "motor_momentum": (("time",), "N m s", "angular momentum that the motor has given"),
+    "motor_work": (("time",), "J", "work that the motor has done"),
+    "quasi_static_frequency": (("branch_point",), "Hz", "frequency of an equilibrium without the plate"),
+    "quasi_static_distance": (("branch_point",), "m", "its levitation distance"),
+    "quasi_static_growth": (("branch_point",), "1/s", "growth rate of its least stable mode"),
+}  # Of a trajectory with a drive
 LIBRARIES = ("spinlev", "ngsolve", "heyoka", "numpy", "scipy", "xarray")
 
 
@@ -83,6 +101,12 @@ class Result:
             if scene.plate and (down := scene.plate.lowering):
                 end = down.start + down.distance / down.speed
                 found = found.assign_attrs(lowered_from_s=down.start, lowered_until_s=end)
+            if self.flight.given is not None:
+                points = levitation.branch
+                branch = [[p.parameter, -p.position[2], p.growth_per_s] for p in points]
+                motor = self.flight.motor.T, self.flight.given.T, np.reshape(branch, (-1, 3)).T
+                frequency = self.flight.rate / (2 * np.pi)
+                found = found.assign(columns(DRIVE, [frequency, *(row for rows in motor for row in rows)]))
         else:
             survey = self.survey or levitation.survey
             found = found_dataset(survey.equilibria).assign_attrs(left_out=left_out_text(survey.left_out))
@@ -119,6 +143,19 @@ class Result:
                 "field_changes": vars(flight.field_changes),
                 "realtime_factor": flight.realtime_factor,
             }
+            if flight.given is not None:
+                momentum, work = flight.given[-1].tolist()
+                stable = stable_near_start(levitation)
+                values |= {
+                    "lost_at_hz": flight.lost_at_hz,
+                    "ended_at_hz": float(flight.rate[-1]) / (2 * math.pi),
+                    "motor_torque_N_m": momentum / flight.levitated_s if flight.levitated_s else None,
+                    "motor_power_W": work / flight.levitated_s if flight.levitated_s else None,
+                    "motor_momentum_N_m_s": momentum,
+                    "motor_work_J": work,
+                    "quasi_static_range_hz": stable and [stable.low.parameter, stable.high.parameter],
+                    "quasi_static_ends": stable and [stable.low.kind, stable.high.kind],
+                }
         return {**values, **effects_summary(levitation, self._effects)}
 
     @cached_property
@@ -134,7 +171,7 @@ class Result:
             lines += equilibria_words(levitation, self.survey)
         lines += comparison_words(self.comparison, levitation.scene.plate is not None)
         if self.flight is not None:
-            lines.append(flight_words(levitation, self.flight))
+            lines += [flight_words(levitation, self.flight), *drive_words(levitation, self.flight)]
         if self.flight is not None or not self.failed:
             lines += plate_words(levitation)
         lines += [PLATE_NEGLECTED] if PLATE_NEGLECTED in self.summary["not_modelled"] else []

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
 from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey, nearest_of
 from ..dynamics.equilibria.search import free_of_bodies
@@ -31,12 +32,13 @@ from ..geometry.scene.files import scene_digest
 from .cli.console import note, to_json
 from .cli.options import COLUMNS, Answer, Models
 from .demagnetising import write_working_point
+from .figures.drive import drive_figure
 from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
 from .figures.run import field_figure, force_figure, trajectory_figure
 from .figures.style import save_figures
 from .levitation import Levitation
-from .plan import sources
+from .plan import check_drive, sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
 from .words import flight_words, headline, left_out_words, note_details
 
@@ -191,6 +193,7 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
         checkpoint.remove()
     elif checkpoint.read() is None:
         note(f"No checkpoint in {out}: the trajectory begins at t = 0.")
+    check_drive(scene, duration)
     levitation = Levitation(scene, requested)
     if isinstance(scene.start, OffsetStart):
         for line in left_out_words(levitation, levitation.survey.unknown):
@@ -204,7 +207,7 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
         result = Result(levitation, flight=flight)
         simulated = result.dataset().assign_attrs(headline=flight_words(levitation, flight))
         write_dataset(simulated, path, scene)
-        save_figures({"trajectory": trajectory_figure(simulated)}, out)
+        save_figures(_of_trajectory(simulated), out)
         return result
 
     try:
@@ -220,6 +223,11 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
     return values, [*result.text(), f"Trajectory in {path}, figure in {out / 'trajectory.png'}"]
 
 
+def _of_trajectory(result: xr.Dataset) -> dict[str, Figure]:
+    drive = {"drive": drive_figure(result)} if "motor_torque" in result else {}
+    return {"trajectory": trajectory_figure(result), **drive}
+
+
 def main_job(scene: Scene, requested: Models, spin: float, duration: float, out: Path) -> Answer:
     """Compute everything of a `scene` by `requested` models for a body `spin` and a trajectory of `duration` (s).
 
@@ -228,6 +236,7 @@ def main_job(scene: Scene, requested: Models, spin: float, duration: float, out:
     What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
     curves, a trajectory that the user stops its beginning; then the error goes on to the caller.
     """
+    check_drive(scene, duration)
     levitation = Levitation(scene, requested, spin)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
     chosen = levitation.table.model
@@ -354,7 +363,7 @@ def _write(
     with ThreadPoolExecutor(1) as beside:  # in three dimensions another process draws, meanwhile
         view = {out / "scene.png": last_view(scene, levitation.table, flight.time, flight.rotor)}
         in_space = beside.submit(render, view)
-        save_figures(figures | {"trajectory": trajectory_figure(result)}, out)
+        save_figures(figures | _of_trajectory(result), out)
         try:
             in_space.result()
         except RenderError as error:

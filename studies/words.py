@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..dynamics.continuation.branch import OSCILLATORY, REAL
+from ..dynamics.continuation.frequencies import BORDER, CONTACT, StableRange, stable_ranges
 from ..dynamics.equilibria.equilibrium import (
     FOLD,
     IN_PLATE,
@@ -31,6 +33,14 @@ COLUMNS = (
     "distance (mm)", "lateral offset (mm)", "polar angle (°)", "phase lag (°)", "least stable mode",
     "growth rate (s⁻¹)", "",
 )  # fmt: skip
+
+ENDS = {
+    FOLD: "fold",
+    OSCILLATORY: "growing oscillation",
+    REAL: "growth without oscillation",
+    CONTACT: "contact with the rotor",
+    BORDER: "not followed farther",
+}  # Of a range of stable frequencies
 
 
 def bracketed(value: float, error: float, digits: int = DIGITS) -> str:
@@ -209,11 +219,38 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
             f"its further motion is not known. {levitation.no_wider}".rstrip()
         )
     if flight.ended_by in ("contact", "lost"):
-        return f"Levitated for {time}, then {'contact' if flight.ended_by == 'contact' else 'lost'} ({kind})."
+        at = "" if flight.given is None else f" at {flight.lost_at_hz:.5g} Hz"
+        return f"Levitated for {time}, then {'contact' if flight.ended_by == 'contact' else 'lost'}{at} ({kind})."
+    if flight.given is not None:
+        return f"Simulated {time}: still levitating at {flight.rate[-1] / (2 * math.pi):.5g} Hz."
     how = {DRIFTING: ", drifting slowly", GROWING: ", with a growing oscillation"}.get(kind, "")
     if not levitation.absolute and (efolding := levitation.stability.efolding_s):
         how = f", with a growing oscillation (e-folding time {spoken_time(efolding)})"
     return f"Simulated {time}: still levitating{how}."
+
+
+def stable_near_start(levitation: Levitation) -> StableRange | None:
+    """Frequencies about that of the start at which the equilibrium where it begins is stable without the plate."""
+    frequency = levitation.scene.frequency
+    found = stable_ranges(levitation.branch)
+    return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter), default=None)
+
+
+def drive_words(levitation: Levitation, flight: Trajectory) -> list[str]:
+    """What the motor gave, and between which frequencies the equilibria are stable; nothing without a drive."""
+    if flight.given is None:
+        return []
+    momentum, work = flight.given[-1]
+    torque, power = (float(given) / max(flight.levitated_s, 1e-300) for given in (momentum, work))
+    lines = [
+        f"Motor, beside the rotor's own inertia and friction: {torque:.2g} N m and {power:.2g} W on the mean, "
+        f"{work:.2g} J in all."
+    ]
+    if stable := stable_near_start(levitation):
+        ends = [f"{end.parameter:.2f} Hz ({ENDS[end.kind]})" for end in (stable.low, stable.high)]
+        plate = " without the plate" if levitation.scene.plate else ""
+        lines.append(f"Equilibria at steady frequencies{plate} are stable from {ends[0]} to {ends[1]}.")
+    return lines
 
 
 def plate_words(levitation: Levitation) -> list[str]:

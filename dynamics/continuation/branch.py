@@ -25,7 +25,7 @@ def frequencies(scene: Scene, spin: float = 0.0) -> Problem:
     """The problem whose parameter is the rotor's frequency, Hz."""
 
     def problem(frequency: float) -> tuple[Array, float]:
-        there = replace(scene, frequency=frequency)
+        there = replace(scene, frequency=frequency, drive=())
         return parameters(there, Scales.of(there), frozen_spin=True), spin
 
     return problem

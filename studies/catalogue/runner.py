@@ -22,6 +22,7 @@ from ..cli.console import note, progress
 from ..cli.options import NAMES, Answer, Models, Workers, combinations
 from ..compare import compare_figure
 from ..exchange import field_map_figure
+from ..figures.drive import drive_figure
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
 from ..figures.run import (
@@ -52,6 +53,7 @@ DRAWN = {
     "axis_field": ("field", field_figure),
     "curve_force": ("force", force_figure),
     "position_rotor_frame": ("trajectory", trajectory_figure),
+    "motor_torque": ("drive", drive_figure),
     "mode_growth": ("modes", modes_figure),
 }  # By variable of a result that is no study: name of the figure and who draws it
 

@@ -35,6 +35,7 @@ from .options import (
     new_scene,
     parse_vary,
     positive,
+    ramp as parse_ramp,
     read_points,
     three_numbers,
 )
@@ -202,7 +203,8 @@ def compare(
 def simulate(
     scene: SceneFile,
     *,
-    duration_s: float,
+    duration_s: float | None = None,
+    ramp: str | None = None,
     requested: Models = Models(),
     resume: Flag = False,
     output: Output = Output(),
@@ -212,17 +214,29 @@ def simulate(
     Parameters
     ----------
     duration_s
-        Simulated time, s.
+        Simulated time, s; with a ramp, or a drive in the scene, until it is over where left out.
+    ramp
+        Turn the rotor from one frequency to another, FROM:TO:RATE in Hz and Hz/s, such as 160:80:0.2, until the floater
+        is lost: at which frequency, and the way there against the equilibria.
     resume
         Go on from the checkpoint of the same trajectory in --out, if one is there.
     """
-    positive("--duration-s", duration_s)
+    step = None if ramp is None else parse_ramp(ramp)
+    if duration_s is not None:
+        positive("--duration-s", duration_s)
     loaded = _loaded(scene)
+    if step:
+        from ...geometry.scene.files import driven
+
+        loaded = driven(loaded, [step[1]], str(scene), frequency_hz=step[0])
+    duration = float(loaded.knots[0, -1]) if duration_s is None else duration_s
+    if not duration:
+        raise InputError("Input --duration-s must be given, or --ramp, or [[drive]] in the scene; instead none is.")
     from ...fem.cache import owned
     from ..run import simulate_job
 
     with owned(output.folder):
-        return simulate_job(loaded, requested.checked(), duration_s, output.folder, resume)
+        return simulate_job(loaded, requested.checked(), duration, output.folder, resume)
 
 
 def plate(

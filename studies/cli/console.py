@@ -174,7 +174,7 @@ class Heartbeat(threading.Thread):
 
 
 LOG = logging.getLogger("spinlev")
-ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
+ERRORS = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
 def note(text: str) -> None:

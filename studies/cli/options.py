@@ -49,6 +49,18 @@ def three_numbers(name: str, text: str) -> Array:
     return np.array(numbers)
 
 
+def ramp(text: str) -> tuple[float, dict[str, float]]:
+    """First frequency (Hz) and the step of a `[[drive]]`, from FROM:TO:RATE in Hz and Hz/s. Raises InputError."""
+    numbers = _floats(text, ":")
+    if len(numbers) != 3 or min(numbers[:2]) < 0 or numbers[2] <= 0 or numbers[0] == numbers[1]:
+        raise InputError(
+            "Input --ramp must be FROM:TO:RATE, two frequencies that are not negative and differ, Hz, and a positive "
+            f"rate, Hz/s, such as 160:80:0.2; instead received {shown(text)}."
+        )
+    first, last, rate = numbers
+    return first, {"to_hz": last, "in_s": abs(last - first) / rate}
+
+
 def map_extent(text: str) -> Array:
     """(4,) m left, right, lower and upper end of a map, from HALF or the four in mm. Raises InputError."""
     numbers = _floats(text)
