@@ -246,10 +246,14 @@ def check_floater_metal(scene: Scene) -> None:
 def slow_error(scene: Scene) -> float:
     """Relative error, at most 1, of what a conducting floater's currents do to motions: they are taken as slow.
 
-    As for the rotor's metal (`fem.rotor_metal`) the fastest are at twice the rotor's frequency.
+    As for the rotor's metal (`fem.rotor_metal`) the fastest are at twice the rotor's frequency.  A drive of a
+    rate of change a adds a τ² of the slowest mode, which follows the lag with its delay τ.
     """
-    floater = scene.floater
-    return min(1.0, (2 * skin_number(floater.radius, floater.conductivity or 0.0, scene.fastest)) ** 2 / 105)
+    floater, (times, rates, _) = scene.floater, scene.knots
+    delay = skin_number(floater.radius, floater.conductivity or 0.0, 1 / (2 * np.pi)) / ZEROS[0][0] ** 2
+    ramp = float(np.abs(np.diff(rates) / np.diff(times)).max(initial=0.0)) * delay**2
+    number = skin_number(floater.radius, floater.conductivity or 0.0, scene.fastest)
+    return min(1.0, (2 * number) ** 2 / 105 + ramp)
 
 
 def too_slow(scene: Scene) -> bool:
