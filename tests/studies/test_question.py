@@ -219,5 +219,5 @@ def test_a_study_has_no_scene_to_show(spinlev, tmp_path):
     spinlev("study", SCENE, "--vary", "frequency_hz=110", "--ask", "field", "--at", "0,0,-20", *FAST)
     status, _, err = spinlev("show", tmp_path / "out" / "question.nc")
     assert status == 2
-    assert "must hold a flight" in err
+    assert "must hold a trajectory" in err
     shutil.rmtree(tmp_path / "out")

@@ -593,7 +593,7 @@ def test_a_file_replaced_before_a_flight_goes_on(replaceable, monkeypatch):
     write(0.9)
     status, answer, said = run("simulate", *flight, "--resume")
     assert (status, answer) == (2, None)
-    assert "must be a checkpoint of this flight; instead it was kept by another scene" in said
+    assert "must be a checkpoint of this trajectory; instead it was kept by another scene" in said
     Path("named").write_bytes(named)  # writing the same shape again gives it another date
     assert Path("out/checkpoint.npz").read_bytes() == before
     assert run("simulate", *flight, "--resume")[0] == 0
