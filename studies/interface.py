@@ -36,6 +36,7 @@ from .cli.options import (
     documented,
     finite,
     positive,
+    unknown_study,
 )
 from .compare import compared, compared_dataset
 from .demagnetising import working_point_dataset
@@ -479,7 +480,7 @@ def run_study(
         No point could be computed.
     """
     if name not in CATALOGUE:
-        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.")
+        raise unknown_study(name, CATALOGUE)
     study = CATALOGUE[name]
     return _computed(study, study.points(quick), Workers(workers, scheduler), Path(out))
 

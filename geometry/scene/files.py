@@ -31,7 +31,7 @@ LONGEST_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*
 # The unit at a key's end, and its size where it is not that of the objects of a scene.
 UNIT = re.compile(r"_(mm_s|mm|kA_m|hz|s|T|S_m|kg_m3|N_s_m|N_m_s|m_s2)$")
 IN_SI = {"_mm_s": 1e-3, "_mm": 1e-3, "_kA_m": 1e3, "_hz": 2 * np.pi}
-DECIMAL_COMMA = re.compile(r"(?m)^[^#\n\[]*=\s*[-+]?\d+,\s*\d")
+DECIMAL_COMMA = re.compile(r"\s*[\w.-]+\s*=\s*[-+]?\d+,\s*\d")
 DEEPEST = 10  # Tables and lists in each other; a scene has five
 LARGEST = 2**1000  # Integers below it are floats
 
@@ -106,7 +106,10 @@ def parse_scene(
     keys = _keys(text, source)
     for key, value in (changes or {}).items():
         _replace(keys, key, value, source)
-    scene = assemble(keys, source, known=known)
+    try:
+        scene = assemble(keys, source, known=known)
+    except SceneError as error:
+        raise SceneError(source, error.faults, text=text) from None
     return scene if changes else replace(scene, text=text)
 
 
@@ -117,8 +120,13 @@ def _keys(text: str, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        point = " Decimals have a point, lists square brackets." if DECIMAL_COMMA.search(text) else ""
-        raise SceneError(source, [f"Input scene must be TOML; instead: {str(error)[:200]}.{point}"]) from None
+        for number, line in enumerate(text.splitlines(), 1):
+            if DECIMAL_COMMA.match(line) and f"at line {number}," in str(error):
+                rule = "have a decimal point, not a comma (lists have square brackets)"
+                said = f"Input line {number} must {rule}; instead received {shown(line.strip())}."
+                raise SceneError(source, [said]) from None
+        why = str(error)[:200].replace("Cannot overwrite a value", "A key stands twice")
+        raise SceneError(source, [f"Input scene must be TOML; instead: {why}."]) from None
     except RecursionError:
         raise SceneError(
             source, ["Input scene must be TOML with few lists in each other; instead some are nested too deep."]

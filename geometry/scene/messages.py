@@ -1,6 +1,7 @@
 """Faults of a scene, in one grammar: Input KEY must be RULE; instead received VALUE."""
 
 import difflib
+import re
 from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
@@ -17,6 +18,10 @@ LONGEST = 60  # Characters of a key in a message
 LONGEST_SOURCE = 300  # Characters of a file's name in a message
 # Beyond these a scene is unusual: remanence, T, and sizes of magnets and floater, m
 STRONGEST, SIZES = 2.0, (1e-4, 1.0)
+# In the text of a scene file: a table or one of a list of tables, and a key; and the key that a fault is about.
+HEADER, KEY = re.compile(r"\s*(\[\[?)\s*([\w.-]+)\s*\]"), re.compile(r"\s*([\w.-]+)\s*=")
+NAMED = re.compile(r"(?:unknown key `|Input )([\w.\[\]-]+)")
+COMMA = re.compile(r"[-+]?\d+,\d+")  # a number as many languages write it
 MOST = 20  # Faults of a scene that are listed; the rest are counted
 # The kinds of error of pydantic.
 RULES = {
@@ -35,16 +40,44 @@ RULES = {
 
 
 class SceneError(InputError):
-    """A scene file that cannot be used; `faults` lists everything that is wrong with it."""
+    """A scene file that cannot be used; `faults` lists everything that is wrong with its `text`, if that is given."""
 
-    def __init__(self, source: str, faults: Sequence[str]) -> None:
+    def __init__(self, source: str, faults: Sequence[str], text: str = "") -> None:
         self.faults = tuple(faults)
+        lines = lines_of_keys(text)
         source = printable(source).replace("\n", "\\n")
         if len(source) > LONGEST_SOURCE:
             source = f"…{source[-LONGEST_SOURCE:]}"
-        listed = [f"{source}: {fault}" for fault in self.faults[:MOST]]
+        listed = [f"{source}: {_with_line(fault, lines)}" for fault in self.faults[:MOST]]
         more = len(self.faults) - len(listed)
         super().__init__("\n".join([*listed, f"{source}: and {more} more faults."] if more else listed))
+
+
+def lines_of_keys(text: str) -> dict[str, int]:
+    """Line, from 1, of each key and table of a scene file's `text`, as messages name them, `rotor.magnets[0].file`."""
+    lines, table, count = dict[str, int](), "", dict[str, int]()
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := HEADER.match(line):
+            table = header[2]
+            if header[1] == "[[":
+                count[table] = count.get(table, -1) + 1
+                table = f"{table}[{count[table]}]"
+            lines.setdefault(table, number)
+        elif key := KEY.match(line):
+            lines.setdefault(f"{table}.{key[1]}".removeprefix("."), number)
+    return lines
+
+
+def _with_line(fault: str, lines: dict[str, int]) -> str:
+    """A `fault` with the line of its key, or else of the table in which it is."""
+    named = NAMED.match(fault)
+    key = named[1] if named else ""
+    while key and key not in lines:
+        key = key[: max(key.rfind("."), key.rfind("["), 0)]
+    if not key:
+        return fault
+    end = fault.endswith(".")
+    return f"{fault.removesuffix('.')} (line {lines[key]}){'.' if end else ''}"
 
 
 def described_faults(details: Sequence[ErrorDetails]) -> list[str]:
@@ -77,6 +110,8 @@ def _described(detail: ErrorDetails) -> str:
     if kind == "float_type" and isinstance(received, int) and not isinstance(received, bool):
         kind = "finite_number"  # no float is so large
     rule = RULES.get(kind, detail["msg"]).format(**detail.get("ctx", {}))
+    if kind == "float_type" and isinstance(received, str) and COMMA.fullmatch(received.strip()):
+        rule = "a number with a decimal point, not a comma"
     if "recoil_permeability" in place[-2:]:
         key = key.removesuffix("[0]")
         rule = "a number, or two: along the easy axis and across it" if kind in ("too_short", "too_long") else rule
@@ -115,6 +150,10 @@ def unusual(scene: Scene) -> str:
     said = [f"a remanence of {strongest:.4g} T (NdFeB has up to 1.5 T)"] if strongest > STRONGEST else []
     said += [f"a size of {1e3 * size:.4g} mm" for size in (min(sizes), max(sizes)) if not SIZES[0] < size < SIZES[1]]
     said += [f"a magnet {farthest:.4g} m from the rotor's origin"] if farthest > SIZES[1] else []
+    others = {"plate": scene.plate.body.center} if scene.plate else {}
+    others |= {"start": scene.start.position} if isinstance(scene.start, AbsoluteStart) else {}
+    for name, place in others.items():
+        said += [f"a {name} {apart:.4g} m from the rotor"] if (apart := float(np.linalg.norm(place))) > SIZES[1] else []
     return f"Unusual: {', '.join(dict.fromkeys(said))}. Is that meant? Every key names its unit." if said else ""
 
 

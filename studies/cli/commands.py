@@ -38,6 +38,7 @@ from .options import (
     ramp as parse_ramp,
     read_points,
     three_numbers,
+    unknown_study,
 )
 
 if TYPE_CHECKING:
@@ -335,8 +336,7 @@ def study(
         summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
         return {"studies": summaries}, [f"{k:22} {v}" for k, v in summaries.items()]
     if name not in CATALOGUE:
-        more = " A scene needs --vary." if name and name.endswith(".toml") else ""
-        raise InputError(f"Input name must be one of {', '.join(CATALOGUE)}; instead received {name}.{more}")
+        raise unknown_study(name, CATALOGUE)
     from ..catalogue.runner import study_job
 
     return study_job(name, quick, engine.checked(), output.folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import inspect
 import io
 import math
@@ -347,6 +348,16 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
     return called
 
 
+def unknown_study(name: str | None, known: Iterable[str]) -> InputError:
+    """The error of a study that is none of those `known`: the one that was meant, or what takes a scene."""
+    names = sorted(known)
+    close = difflib.get_close_matches(name or "", names, n=1)
+    hint = f" Did you mean {close[0]}?" if close else ""
+    if name and name.endswith(".toml"):
+        hint = f" For this scene: spinlev compare {name}, or spinlev study {name} --vary KEY=FIRST:LAST:STEP."
+    return InputError(f"Input name must be a study of spinlev study --list; instead received {name or 'none'}.{hint}")
+
+
 MOST_VALUES = 100_000  # points of a sweep, at most
 
 
@@ -408,7 +419,7 @@ def frequency_grid(text: str) -> Array:
     if not numbers or numbers[0] <= 0:
         raise InputError(
             "Input --frequency-hz must be FIRST:LAST:STEP or VALUE,VALUE,... of positive numbers, such as 100:180:5; "
-            f"instead received {shown(text)}."
+            f"instead received {shown(text)}.{_decimal_point(text)}"
         )
     return np.array(numbers)
 
@@ -437,8 +448,13 @@ def _numbers(values: str) -> list[float] | None:
 def _wrong(text: str) -> InputError:
     return InputError(
         f"Input --vary must be KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,... with a key of the scene file, such as "
-        f"rotor.displacement_mm=1:4:0.5; instead received {shown(text)}."
+        f"rotor.displacement_mm=1:4:0.5; instead received {shown(text)}.{_decimal_point(text)}"
     )
+
+
+def _decimal_point(text: str) -> str:
+    """A sentence where a range has commas: in a list they stand between values."""
+    return " Write decimals with a point, not a comma." if ":" in text and "," in text else ""
 
 
 # Which of the scenes that come with the program shows which kind of rotor.

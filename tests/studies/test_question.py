@@ -137,7 +137,7 @@ def test_field_over_one_parameter(spinlev):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("study", SCENE), "A scene needs --vary"),
+        (("study", SCENE), "--vary KEY=FIRST:LAST:STEP"),
         (("study", "--vary", "frequency_hz=1"), "must be a scene file"),
         (("study", "none.toml", "--vary", "frequency_hz=1"), "must be a TOML file; instead there is no none.toml."),
         (("study", SCENE, "--vary", "frequency_hz=-1"), "frequency_hz must be at least 0"),

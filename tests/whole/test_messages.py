@@ -18,6 +18,7 @@ FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for
 INPUT = re.compile(r"(\{\}: )?Input \S.* must .+; instead[ :].+", re.DOTALL)
 SENTENCE = re.compile(r"[A-Z].*[.}]", re.DOTALL)
 RELAYED = {
+    "error.faults": "scene/files: those of scene/making, beside the text in which they have lines",
     "faults": "scene/making: found by the rules between keys and by overlaps, whose sentences are literals here too",
     "described_faults(error.errors())": "scene/making: sentences of scene/messages",
     "refusal(plate, frequency, rtol, best)": "plate_network/reaction: a sentence of limits",

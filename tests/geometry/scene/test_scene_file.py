@@ -19,7 +19,7 @@ from spinlev.geometry.common import MU_0
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, OffsetStart
 from spinlev.geometry.scene.files import load_scene, parse_scene, scene, scene_keys, scene_text
 from spinlev.geometry.scene.making import sphere, tilt
-from spinlev.geometry.scene.messages import SceneError
+from spinlev.geometry.scene.messages import SceneError, lines_of_keys
 
 GOOD = (SCENES / "horizontal.toml").read_text()
 
@@ -164,7 +164,7 @@ def nested(levels):
         ("0x" + "f" * 5000, "frequency_hz must be a finite number; instead received a value (int) that is too long"),
         ("'" + "x" * 100_000 + "'", "frequency_hz must be a number; instead received 'xxx"),
         (r'"\u001b[2J"', r"frequency_hz must be a number; instead received '\x1b[2J'."),
-        ("130,5", "Decimals have a point"),
+        ("130,5", "Input line 3 must have a decimal point, not a comma"),
         ("1979-05-27", "frequency_hz must be a number"),
     ],
     ids=["lists", "tables", "some lists", "digits", "no float", "no text", "long", "control", "comma", "date"],
@@ -341,3 +341,32 @@ def test_nearly_zero_is_refused_with_zero_and_the_least_as_the_way_out():
         sl.scene(**{**TABLE, "frequency_hz": 1e-300})
     with pytest.raises(SceneError, match=r"plate.lowering.speed_mm_s must be at least 1e-06; instead received 5e-324"):
         sl.scene(**{**TABLE, "plate": {**TABLE["plate"], "lowering": LOWERING | {"speed_mm_s": 5e-324}}})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("frequency_hz = 110.0", 'frequency_hz = "110,5"', "a decimal point, not a comma; instead received '110,5'"),
+        ("displacement_mm = 2.0", "displacment_mm = 2.0", "(did you mean `displacement_mm`?)"),
+        ("displacement_mm = 2.0", "displacement_mm = -1e9", "rotor.displacement_mm must be"),
+        ("diameter_mm = 12.7", "", "Input floater.diameter_mm must be given"),
+        ("[drag]", "[drga]", "unknown key `drga`"),
+    ],
+)
+def test_a_slip_is_one_message_with_its_line(old, new, said):
+    """A key that is missing has the line of its table."""
+    text = GOOD.replace(old, new)
+    assert text != GOOD
+    with pytest.raises(SceneError) as error:
+        parse_scene(text, "my.toml")
+    (line,) = str(error.value).splitlines()
+    assert line.startswith("my.toml: ")
+    assert said in line
+    number = next(k for k, words in enumerate(text.splitlines(), 1) if words.startswith(new or "[floater]"))
+    assert line.removesuffix(".").endswith(f"(line {number})")
+
+
+def test_lines_are_those_of_tables_in_lists():
+    text = "a = 1\n[[rotor.magnets]]\nsize_mm = 1\n\n[[rotor.magnets]]\nsize_mm = 2\n[plate]\nx = 3\n"
+    known = {"a": 1, "rotor.magnets[0]": 2, "rotor.magnets[0].size_mm": 3, "rotor.magnets[1]": 5}
+    assert lines_of_keys(text) == known | {"rotor.magnets[1].size_mm": 6, "plate": 7, "plate.x": 8}
