@@ -27,7 +27,7 @@ from .figures.style import PALETTE, legend_below, panels, save_figures, styled
 from .levitation import Levitation
 from .plan import PlatePlan, sources
 from .result import variable, write_dataset
-from .words import bracketed, worth_a_row
+from .words import STABILITIES, bracketed, worth_a_row
 
 TRUE_MOMENT, MUTUAL = "dipole, true moment", "{} + mutual"
 BESIDE = 0.1  # of the frequency: how far beyond the ranges of stability the branches are drawn
@@ -202,7 +202,7 @@ def compare_words(rows: Sequence[Compared]) -> list[str]:
         share = abs(apart) / (1e3 * best.found.distance)
         error = 1e3 * best.found.position_error
         more = "more" if apart > 0 else "less"
-        one, other = dipole.found.stability, best.found.stability
+        one, other = (STABILITIES[row.found.stability] for row in (dipole, best) if row.found)
         verdict = f"both are {one}" if one == other else f"the dipole is {one}, {best.name} {other}"
         said = [
             f"Levitation distance by the point dipole: {bracketed(abs(apart), error, 2)} mm {more} "
@@ -236,7 +236,7 @@ def _cells(row: Compared) -> tuple[str, ...]:
         f"{e.growth_per_s:.2g}",
         " ".join(f"{f:.3g}" for f in e.frequencies_hz),
         ranged,
-        e.stability,
+        STABILITIES[e.stability],
     )
 
 

@@ -291,6 +291,9 @@ def main_job(scene: Scene, requested: Models, spin: float, duration: float, out:
         dataset = xr.merge([dataset, simulated], combine_attrs="no_conflicts")
     _write(levitation, dataset, values, flight, out)
     if failure and (flight is None or isinstance(failure, FlightStopped)):
+        for line in lines:  # what is known all the same, before the error
+            if line != str(failure):
+                note(line)
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
 
@@ -298,26 +301,25 @@ def main_job(scene: Scene, requested: Models, spin: float, duration: float, out:
 def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:
     """Levitation distances (mm) by the point dipole, that of the true moment and the best model, without the plate.
 
-    Of the dipoles' equilibria those nearest to where the floater levitates; None where the dipole or the best model, of
-    this `name`, has none.
+    Of the dipoles' equilibria those nearest to where the floater levitates by the best model, of this `name`, or else
+    where it does by the dipole; a model without any has None. None where neither has one.
     """
     true = most_like_levitation(best.equilibria)
-    if true is None:
+    rough = nearest_of(dipole.equilibria, true.position) if true else most_like_levitation(dipole.equilibria)
+    if (known := true or rough) is None:
         return None
-    rough, moment = (nearest_of(found.equilibria, true.position) for found in (dipole, true_moment))
-    if rough is None:
-        return None
-    distances = [-float(e.position[2]) * 1e3 for e in (rough, true)]
+    moment = nearest_of(true_moment.equilibria, known.position)
+    distances = [None if e is None else -float(e.position[2]) * 1e3 for e in (rough, moment, true)]
     return {
         "true_model": name,
-        "dipole_stability": rough.stability,
-        "true_stability": true.stability,
+        "dipole_stability": rough.stability if rough else None,
+        "true_stability": true.stability if true else None,
         "dipole_distance_mm": distances[0],
-        "true_moment_distance_mm": None if moment is None else -float(moment.position[2]) * 1e3,
-        "true_distance_mm": distances[1],
-        "difference_mm": distances[0] - distances[1],
+        "true_moment_distance_mm": distances[1],
+        "true_distance_mm": distances[2],
+        "difference_mm": None if distances[0] is None or distances[2] is None else distances[0] - distances[2],
         # The dipole's own position error says how wrong its field is, which is what is measured here.
-        "difference_error_mm": true.position_error * 1e3,
+        "difference_error_mm": true.position_error * 1e3 if true else None,
     }
 
 

@@ -29,6 +29,7 @@ SAME = 1e-6
 CLEAR = 0.5  # share of the decay rate that must be gone without the plate before it is called the plate's
 FINEST = 0.01  # of distances from the axis, mm
 SWINGS = 0.1  # polar angles that differ by more in a turn (°) are given with their extremes
+STABILITIES = {"stable": "stable", "marginal": "marginally unstable", "unstable": "unstable"}
 COLUMNS = (
     "distance (mm)", "lateral offset (mm)", "polar angle (°)", "phase lag (°)", "least stable mode",
     "growth rate (s⁻¹)", "",
@@ -146,7 +147,7 @@ def equilibria_rows(levitation: Levitation, equilibria: Sequence[Equilibrium]) -
                 f"{e.lag_deg + 0.0:.2f}".replace("-0.00", "0.00"),
                 _least_stable(e),
                 f"{e.growth_per_s:.2g}",
-                e.stability + (" (plate not included)" if without else ""),
+                STABILITIES[e.stability] + (" (plate not included)" if without else ""),
             )
         )
     return [COLUMNS, *rows] if rows else []
@@ -188,16 +189,23 @@ def comparison_words(compared: Mapping[str, Any] | None, plate: bool = False) ->
     """Levitation distance by the point dipole against the finite magnets', both without a `plate` where one is."""
     if compared is None:
         return []
-    apart, error = compared["difference_mm"], compared["difference_error_mm"]
-    kinds = "" if compared["dipole_stability"] == compared["true_stability"] else f" ({compared['dipole_stability']})"
+    rough, true, moment = (compared[f"{name}_distance_mm"] for name in ("dipole", "true", "true_moment"))
+    best, apart, error = NAMES[compared["true_model"]], compared["difference_mm"], compared["difference_error_mm"]
     conditions = "same conditions without the plate" if plate else "same conditions"
-    said = f"Point-dipole model, {conditions}: levitation distance {compared['dipole_distance_mm']:.2f} mm{kinds}, "
-    if abs(apart) <= max(error, SAME):
+    if rough is None:
+        stability = STABILITIES[compared["true_stability"]]
+        return [f"Point-dipole model, {conditions}: no equilibrium; with {best} {true:.2f} mm ({stability})."]
+    stability = STABILITIES[compared["dipole_stability"]]
+    kind = "" if compared["dipole_stability"] == compared["true_stability"] else f" ({stability})"
+    said = f"Point-dipole model, {conditions}: levitation distance {rough:.2f} mm{kind}, "
+    if true is None:
+        said += f"where there is no equilibrium with {best}"
+        error = 0.0
+    elif abs(apart) <= max(error, SAME):
         return [f"{said}no difference beyond its error of {max(error, SAME):.0e} mm."]
-    more = "more" if apart > 0 else "less"
-    said += f"{bracketed(abs(apart), error, 2)} mm {more} than with {NAMES[compared['true_model']]}"
-    moment = compared["true_moment_distance_mm"]
-    if moment is None or abs(moment - compared["dipole_distance_mm"]) <= max(error, SAME):
+    else:
+        said += f"{bracketed(abs(apart), error, 2)} mm {'more' if apart > 0 else 'less'} than with {best}"
+    if moment is None or abs(moment - rough) <= max(error, SAME):
         return [f"{said}."]
     return [f"{said}; with the magnets' true moments {moment:.2f} mm."]
 

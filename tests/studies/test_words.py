@@ -135,6 +135,7 @@ def test_what_could_not_be_computed_is_told(levitation):
 def test_a_difference_below_its_error_is_none(apart, error, said):
     compared = {"true_model": "fem", "dipole_distance_mm": 18.83, "difference_mm": apart, "difference_error_mm": error}
     compared |= {"dipole_stability": "stable", "true_stability": "stable", "true_moment_distance_mm": None}
+    compared |= {"true_distance_mm": 18.83 - apart}
     (line,) = comparison_words(compared)
     assert line == f"Point-dipole model, same conditions: levitation distance {said}"
     if "than with" in said:
@@ -150,6 +151,16 @@ def test_the_dipole_is_compared_whatever_its_stability():
     assert (found["dipole_stability"], found["true_stability"], found["difference_mm"]) == ("unstable", "stable", 0.0)
     (line,) = comparison_words(found)
     assert "levitation distance 17.21 mm (unstable), no difference" in line
+
+
+def test_the_comparison_says_which_model_has_no_equilibrium():
+    nothing, one = Survey((), ()), Survey((equilibrium(),), ())
+    assert compared_models(nothing, nothing, nothing, "fem") is None
+    (line,) = comparison_words(compared_models(nothing, nothing, one, "fem"))
+    assert line == "Point-dipole model, same conditions: no equilibrium; with finite elements 17.21 mm (stable)."
+    (line,) = comparison_words(compared_models(one, nothing, nothing, "fem"), plate=True)
+    assert line.endswith("17.21 mm (stable), where there is no equilibrium with finite elements.")
+    assert "same conditions without the plate" in line
 
 
 def test_a_flight_from_an_unstable_equilibrium_is_never_called_stable():
