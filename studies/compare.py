@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..dynamics.continuation.branch import BranchPoint
 from ..dynamics.continuation.frequencies import branch_through, levitates, on_branch, stable_ranges
-from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
+from ..dynamics.equilibria.equilibrium import MARGINAL, STABILITIES, Equilibrium, EquilibriumError, nearest_of
 from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.state import Scales
 from ..fem.files import write_whole
@@ -27,7 +27,7 @@ from .figures.style import PALETTE, legend_below, panels, save_figures, styled
 from .levitation import Levitation
 from .plan import PlatePlan, sources
 from .result import variable, write_dataset
-from .words import STABILITIES, bracketed, worth_a_row
+from .words import bracketed, worth_a_row
 
 TRUE_MOMENT, MUTUAL = "dipole, true moment", "{} + mutual"
 BESIDE = 0.1  # of the frequency: how far beyond the ranges of stability the branches are drawn

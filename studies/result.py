@@ -342,6 +342,10 @@ def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
         values = np.array([_read(e, name, unit) for e in rows], bool if name == "stable" else float)
         shape = (len(rows), *(len(SIZES[dim]) for dim in dims))
         data[name] = variable(("equilibrium", *dims), values.reshape(shape), unit, label)
+    kinds = np.array([e.stability for e in rows], dtype=str)
+    data["stability"] = xr.Variable(("equilibrium",), kinds, {"long_name": "stable, marginal or unstable"})
+    growing = [e.efolding_s or np.inf for e in rows]
+    data["efolding"] = variable(("equilibrium",), growing, "s", "e-folding time of the least stable mode")
     modes = [{mode.name: (mode.growth_per_s, mode.frequency_hz) for mode in e.modes} for e in rows]
     known = np.array([[each.get(name, (np.nan, np.nan)) for name in MODES] for each in modes], float)
     known = known.reshape(len(rows), len(MODES), 2)

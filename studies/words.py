@@ -13,6 +13,7 @@ from ..dynamics.equilibria.equilibrium import (
     MODE_NAMES,
     NOT_CONVERGED,
     PAST_TABLE,
+    STABILITIES,
     Equilibrium,
     LeftOut,
     Survey,
@@ -29,7 +30,6 @@ SAME = 1e-6
 CLEAR = 0.5  # share of the decay rate that must be gone without the plate before it is called the plate's
 FINEST = 0.01  # of distances from the axis, mm
 SWINGS = 0.1  # polar angles that differ by more in a turn (°) are given with their extremes
-STABILITIES = {"stable": "stable", "marginal": "marginally unstable", "unstable": "unstable"}
 COLUMNS = (
     "distance (mm)", "lateral offset (mm)", "polar angle (°)", "phase lag (°)", "least stable mode",
     "growth rate (s⁻¹)", "",

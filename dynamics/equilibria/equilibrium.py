@@ -24,12 +24,14 @@ FOLD, NOT_CONVERGED, PAST_TABLE = "fold", "not converged", "past the plate's tab
 
 # Growth rate (1/s) up to which an unstable equilibrium is marginal: e-folding in 250 s, the article's criterion.
 MARGINAL = 0.004
+# What is said of each kind.
+STABILITIES = {"stable": "stable", "marginal": "marginally unstable", "unstable": "unstable"}
 
 
-# The slower and the faster of each kind, in the rotor's frame.
-SIDE, TILT = ("side, backward", "side, forward"), ("precession", "nutation")
+# Names of the modes in data: along the axis; the slower and the faster of the others, in the rotor's frame.
+AXIAL, SIDE, TILT = "bounce", ("side, backward", "side, forward"), ("precession", "nutation")
 # Names on the console of modes whose names in data are older.
-MODE_NAMES = {"bounce": "axial", SIDE[0]: "backward whirl", SIDE[1]: "forward whirl"}
+MODE_NAMES = {AXIAL: "axial", SIDE[0]: "backward whirl", SIDE[1]: "forward whirl"}
 
 
 @dataclass(frozen=True, eq=False)

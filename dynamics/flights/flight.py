@@ -23,7 +23,7 @@ from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array, ComputationError, InputError
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..continuation.frequencies import way_out
-from ..equilibria.equilibrium import Equilibrium, EquilibriumError
+from ..equilibria.equilibrium import AXIAL, Equilibrium, EquilibriumError
 from ..equilibria.search import find_equilibria
 from ..motion.effects import with_effects
 from ..motion.equations import Equations, equations_of_motion, parameters
@@ -557,9 +557,11 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
     """Where a trajectory begins, or, where none may, the equilibrium whose modes grow least; None without any.
 
-    A brake destabilises those near the rotor the most.
+    Of those that are stable along the axis, if there are some: others attract the floater or let it fall, and belong to
+    other branches. A brake destabilises those near the rotor the most.
     """
-    return starting_point(equilibria) or min(equilibria, key=lambda e: e.growth_per_s, default=None)
+    along = [e for e in equilibria if any(m.name == AXIAL and m.growth_per_s <= SLOWLY for m in e.modes)]
+    return starting_point(equilibria) or min(along or equilibria, key=lambda e: e.growth_per_s, default=None)
 
 
 def displaced(start: State, offset: Array, angular_velocity: float) -> State:

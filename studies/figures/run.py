@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import ConvexHull
 
+from ...dynamics.equilibria.equilibrium import MARGINAL, STABILITIES
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ...geometry.solids import Solid
@@ -24,12 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DISTANCE = "levitation distance (mm)"
-MARKS = (
-    (False, 1, "o", None, "stable, no plate"),
-    (False, 0, "o", "white", "unstable, no plate"),
-    (True, 1, "D", None, "stable, with the plate"),
-    (True, 0, "D", "white", "unstable, with the plate"),
-)  # Of equilibria: whether the plate's currents act, whether it is stable, marker, its face, and what it means
+PLATE_MARKS = ((False, "o", "no plate"), (True, "D", "with the plate"))  # whether the plate's currents act
+FILLS = {"stable": "full", "marginal": "left", "unstable": "none"}  # of the marker of an equilibrium
 PARTS = 120  # Intervals of an envelope: more than a printed figure tells apart
 SHOWN = 200  # Samples of a trajectory that are drawn one by one
 COARSE = 0.05
@@ -38,6 +35,7 @@ HOURS = 7200.0  # Trajectories that take longer are drawn over hours, s
 MODE_MARKERS = "osD^v"
 FAMILY = 6  # curves that a panel tells apart, at most
 APART = 0.3  # of the distance: farther from the last point of a branch the next is of another one
+CRITERION = f"growth rate at most {MARGINAL:g} s⁻¹, e-folding time {1 / MARGINAL:g} s or more"
 NO_GROWTH = 1e-9  # Growth that counts as none, 1/s
 QUANTITIES = {
     "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
@@ -111,12 +109,20 @@ def field_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
+def _kinds(result: xr.Dataset, prefix: str = "") -> xr.DataArray:
+    """Of equilibria: "stable", "marginal" or "unstable"; also of results that do not have it as text."""
+    stable = result[f"{prefix}stable"]
+    lasts = result.get(f"{prefix}growth", xr.full_like(stable, np.inf, float)) <= MARGINAL
+    return xr.where(stable == 1, "stable", xr.where(lasts, "marginal", "unstable"))
+
+
 @styled
 def force_figure(result: xr.Dataset) -> Figure:
     """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
     figure, ((axes, near),) = panels(1, 2, 3.6)
     weight = -1e3 * float(result.attrs["weight_N"])
     acting = result.get("equilibrium_with_plate", 0 * result["equilibrium_stable"]) == 1  # older results do not say
+    kinds = _kinds(result, "equilibrium_")
     depth = -1e3 * result["equilibrium_position"].sel(axis="z")
     curves = result[["curve_model", "curve_number", "curve_position", "curve_force"]]  # without the trajectory
     peaks = [3.5 * weight]
@@ -131,18 +137,19 @@ def force_figure(result: xr.Dataset) -> Figure:
                 distance, force = -1e3 * one["curve_position"].sel(axis="z").values, 1e3 * one["curve_force"].values
                 panel.plot(*_smooth(np.arange(float(len(force))), distance, force), **look)
                 peaks += force[1:-1][(force[1:-1] > force[:-2]) & (force[1:-1] > force[2:])].tolist()
-        for plate, stable, marker, fill, label in MARKS:
-            chosen = (acting == plate) & (result["equilibrium_stable"] == stable)
+        for (plate, marker, label), (kind, fill) in product(PLATE_MARKS, FILLS.items()):
+            chosen = (acting == plate) & (kinds == kind)
+            white: dict[str, Any] = {"fillstyle": fill, "markerfacecoloralt": "white"}
             if chosen.any():
-                panel.plot([], [], marker, color="0.3", mfc=fill or "0.3", label=label)
+                panel.plot([], [], marker, color="0.3", label=f"{STABILITIES[kind]}, {label}", **white)
             for model in np.unique(result["equilibrium_model"].values[chosen.values]).tolist():
                 place = depth.values[(chosen & (result["equilibrium_model"] == model)).values]
-                panel.plot(place, 0 * place + weight, marker, color=COLORS[model], mfc=fill or COLORS[model], ms=5)
+                panel.plot(place, 0 * place + weight, marker, color=COLORS[model], ms=5, **white)
         panel.set(xlabel=DISTANCE)
     axes.set(xlim=(5, 60), ylabel="axial magnetic force (mN), up positive")
     if weight > 0:
         axes.set_ylim(-2.5 * weight, min(1.1 * max(peaks), 30 * weight))
-    first = depth.values[result["equilibrium_stable"].values == 1][:1]
+    first = depth.values[(kinds != "unstable").values][:1]
     if first.size and weight > 0:
         near.set(xlim=(first[0] - 1.0, first[0] + 1.0), ylim=(0.0, 2 * weight))
         near.locator_params(nbins=5)
@@ -245,10 +252,11 @@ def modes_figure(result: xr.Dataset) -> Figure:
     """Rate and frequency of every normal mode; open where it decays, filled where it grows."""
     figure, ((axes,),) = panels(1, 1, 3.4)
     listed = result if "equilibrium" in result.dims else result.expand_dims("equilibrium")
+    kinds = _kinds(listed).values.tolist()
     for k, color in zip(range(listed.sizes["equilibrium"]), PALETTE * 9, strict=False):
         one = listed.isel(equilibrium=k)
-        height = 1e3 * float(one["position"].sel(axis="z"))
-        axes.plot([], [], "s", color=color, label=f"z = {height:.2f} mm, {'stable' if one['stable'] else 'unstable'}")
+        distance = -1e3 * float(one["position"].sel(axis="z"))
+        axes.plot([], [], "s", color=color, label=f"{distance:.2f} mm, {STABILITIES[kinds[k]]}")
         for name, marker in zip(one["mode"].values.tolist(), MODE_MARKERS, strict=True):
             mode = one.sel(mode=name)
             rate = float(mode["mode_growth"])
@@ -274,7 +282,7 @@ def drawable(result: xr.Dataset) -> bool:
 def question_figure(result: xr.Dataset) -> Figure:
     """Curves over the number with most values, one for each combination of the others, or maps where they are many.
 
-    Of equilibria the branch on which the floater levitates; solid and filled where it is stable.
+    Of equilibria the branch on which the floater levitates; solid and filled where it is stable or marginal.
     """
     shown, (along, others) = _derived(result), _axes(result)
     names = _shown(shown)
@@ -311,7 +319,8 @@ def _derived(result: xr.Dataset) -> xr.Dataset:
     """The result with what is drawn instead of what is kept."""
     if "position" in result:
         depth = (-1e3 * result["position"].sel(axis="z")).assign_attrs(units="mm", long_name="levitation distance")
-        result = result.assign(depth=depth)
+        lasts = (result["stable"] == 1) | (result["growth"] <= MARGINAL)  # as ranges of stable frequencies have it
+        result = result.assign(depth=depth, stable=lasts)
     if "lateral_offset" in result:
         offset = (1e3 * result["lateral_offset"]).assign_attrs(units="mm", long_name="lateral offset")
         angle = result["polar_angle"].assign_attrs(long_name="polar angle")
@@ -390,7 +399,7 @@ def question_lines(result: xr.Dataset) -> list[str]:
     shown = _derived(result)
     if "stable" in shown:
         some = (shown["stable"] == 1).any("equilibrium")
-        lines.append(f"A stable equilibrium at {int(some.sum())} of {some.size} points.")
+        lines.append(f"Stable levitation ({CRITERION}) at {int(some.sum())} of {some.size} points.")
         shown = shown.where(shown["stable"] == 1)
     if "unknown" in result and (result["unknown"] > 0).any():
         lines.append(f"At {int((result['unknown'] > 0).sum())} points not all equilibria could be computed.")
