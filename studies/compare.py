@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..dynamics.continuation.branch import BranchPoint
 from ..dynamics.continuation.frequencies import branch_through, levitates, on_branch, stable_ranges
-from ..dynamics.equilibria.equilibrium import MARGINAL, STABILITIES, Equilibrium, EquilibriumError, nearest_of
+from ..dynamics.equilibria.equilibrium import MARGINAL, STABILITIES, Equilibrium, EquilibriumError, Survey, nearest_of
 from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.state import Scales
 from ..fem.files import write_whole
@@ -64,6 +64,31 @@ class Compared:
             "stability": e.stability,
             "frequencies_hz": e.frequencies_hz,
         }
+
+
+def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:
+    """Levitation distances (mm) by the point dipole, that of the true moment and the best model, without the plate.
+
+    Of the dipoles' equilibria those nearest to where the floater levitates by the best model, of this `name`, or else
+    where it does by the dipole; a model without any has None. None where neither has one.
+    """
+    true = most_like_levitation(best.equilibria)
+    rough = nearest_of(dipole.equilibria, true.position) if true else most_like_levitation(dipole.equilibria)
+    if (known := true or rough) is None:
+        return None
+    moment = nearest_of(true_moment.equilibria, known.position)
+    distances = [None if e is None else -float(e.position[2]) * 1e3 for e in (rough, moment, true)]
+    return {
+        "true_model": name,
+        "dipole_stability": rough.stability if rough else None,
+        "true_stability": true.stability if true else None,
+        "dipole_distance_mm": distances[0],
+        "true_moment_distance_mm": distances[1],
+        "true_distance_mm": distances[2],
+        "difference_mm": None if distances[0] is None or distances[2] is None else distances[0] - distances[2],
+        # The dipole's own position error says how wrong its field is, which is what is measured here.
+        "difference_error_mm": true.position_error * 1e3 if true else None,
+    }
 
 
 def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compared]:

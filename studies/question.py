@@ -3,6 +3,7 @@
 Trajectories that begin in one field are simulated in SIMD batches (`dynamics/flights/batch.py`).
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -17,13 +18,15 @@ from ..dynamics.continuation.rotor_family import rotor_family
 from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import simulate_together
 from ..dynamics.flights.flight import initial_state
+from ..fem.rotor.models import of_true_moment
 from ..fem.rotor.table import canonical
 from ..geometry.common import Array, InputError, SpinlevError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text, startless_text
 from .cli.options import NAMES, Models, Quantity, positive
+from .compare import compared_models
 from .levitation import Levitation
-from .plan import equations_key, nearest_faces
+from .plan import equations_key, nearest_faces, sources
 from .result import AXIS, found_dataset, label_of_key, variable
 from .study import Point
 from .words import kind_of_flight
@@ -107,6 +110,11 @@ CHOICES = (*NAMES, "spin")  # what can be varied beside the keys of the scene fi
 ROTOR = ("rotor", "model", "interaction", "floater")  # how keys begin whose values need a table of their own
 # How many points are answered together at most, and lost together if the program is killed among them.
 LARGEST: Mapping[Quantity, int] = {"equilibria": 60, "flight": 32, "field": 60}
+COMPARED = {
+    "dipole": "the point dipole, without the plate",
+    "true_moment": "the dipole of the true moment, without the plate",
+    "true": "the model of the sweep, without the plate",
+}
 PARTS = 4  # batches of a small sweep: as many workers share it
 
 
@@ -145,7 +153,16 @@ class Question:
 
     def __call__(self, point: Point) -> xr.Dataset:
         """The answer at a point: a dataset over `case`, whose coordinates are the values varied."""
-        return self._answer(point, self.levitation(point))
+        levitation = self.levitation(point)
+        return self._answer(point, levitation, self._dipoles(point, levitation))
+
+    def _dipoles(self, point: Point, levitation: Levitation) -> tuple[Levitation, ...]:
+        """The scene by the point dipole and by that of the true moment, to compare; none where models are varied."""
+        if self.ask != "equilibria" or "model" in point or levitation.table.model == "dipole":
+            return ()
+        models, rotor = replace(levitation.models, model="dipole", interaction="rigid"), levitation.scene.rotor
+        true = of_true_moment(rotor, sources(levitation.table))
+        return levitation.elsewhere(models), levitation.elsewhere(models, rotor=true)
 
     def prepared(self, points: Sequence[Point]) -> list[Callable[[], xr.Dataset]]:
         """Functions that compute the points, which share what they can; one that cannot be raises when called."""
@@ -155,17 +172,19 @@ class Question:
         for k, point in enumerate(points):
             with suppress(SpinlevError):  # what cannot be made or found here is left to each scene, which says why
                 one = self.levitation(point)
-                jobs[k] = partial(self._answer, point, one)
+                dipoles = self._dipoles(point, one)
+                jobs[k] = partial(self._answer, point, one, dipoles)
                 made.append(one)
-                one.share(first.setdefault(one.equations_key, one))
                 # Trajectories begin at equilibria, or have a plate whose table is made about one.
                 requested = self.ask == "equilibria" or (
                     self.ask == "flight" and (one.scene.plate is not None or not one.absolute)
                 )
-                if requested and one.scene.frequency and one.scene.floater.body is None:
-                    key, *family = _family(one)
-                    place = tuple(axis.index(point[name]) for name, axis in axes.items())
-                    families.setdefault(key, []).append((one, *family, place))
+                for each in (one, *dipoles):
+                    each.share(first.setdefault(each.equations_key, each))
+                    if requested and each.scene.frequency and each.scene.floater.body is None:
+                        key, *family = _family(each)
+                        place = tuple(axis.index(point[name]) for name, axis in axes.items())
+                        families.setdefault(key, []).append((each, *family, place))
         for members in families.values():
             if len(members) > 1:
                 with suppress(SpinlevError):
@@ -181,8 +200,10 @@ class Question:
         size = min(max(-(-len(order) // PARTS), 6), LARGEST[self.ask])
         return [order[k : k + size] for k in range(0, len(order), size)]
 
-    def _answer(self, point: Point, levitation: Levitation) -> xr.Dataset:
+    def _answer(self, point: Point, levitation: Levitation, dipoles: Sequence[Levitation] = ()) -> xr.Dataset:
         answer = ANSWERS[self.ask](self, levitation)
+        if dipoles:
+            answer = answer.assign(_beside(levitation, dipoles))
         return answer.expand_dims("case").assign_coords({key: ("case", [value]) for key, value in point.items()})
 
     def gather(self, parts: Sequence[xr.Dataset], values: Mapping[str, Sequence[Any]]) -> xr.Dataset:
@@ -216,6 +237,21 @@ def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:
     unknown = variable((), float(len(levitation.survey.unknown)), "1", "equilibria that could not be computed")
     found = found_dataset(levitation.equilibria).assign(found_by=((), found_by), unknown=unknown)
     return found.assign_attrs(levitation.labels)
+
+
+def _beside(levitation: Levitation, dipoles: Sequence[Levitation]) -> dict[str, xr.Variable]:
+    """What `compared_models` says of dipole, dipole of the true moment and the scene's model, all without the plate."""
+    found: Mapping[str, Any] = {}
+    with suppress(SpinlevError):
+        surveys = [one.without_plate for one in (*dipoles, levitation)]
+        found = compared_models(*surveys, levitation.table.model) or {}
+    distances = {
+        f"{name}_distance": variable((), 1e-3 * value, "m", f"levitation distance by {words}")
+        for name, words in COMPARED.items()
+        for value in [found.get(f"{name}_distance_mm") or math.nan]
+    }
+    kinds = {f"{name}_stability": ((), found.get(f"{name}_stability") or "") for name in ("dipole", "true")}
+    return distances | {name: xr.Variable(*kind) for name, kind in kinds.items()}
 
 
 def _flight(question: Question, levitation: Levitation) -> xr.Dataset:

@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey, nearest_of
+from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey
 from ..dynamics.equilibria.search import free_of_bodies
-from ..dynamics.flights.flight import most_like_levitation, starting_point
+from ..dynamics.flights.flight import starting_point
 from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
 from ..fem.cache import program_digest
 from ..fem.closed_forms.eddy_sphere import ComplexArray
@@ -31,6 +31,7 @@ from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
 from .cli.console import note, to_json
 from .cli.options import COLUMNS, Answer, Models
+from .compare import compared_models
 from .demagnetising import write_working_point
 from .figures.drive import drive_figure
 from .figures.pictures import last_view
@@ -296,31 +297,6 @@ def main_job(scene: Scene, requested: Models, spin: float, duration: float, out:
                 note(line)
         raise failure
     return values, [*lines, f"Results and figures in {out}/"]
-
-
-def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:
-    """Levitation distances (mm) by the point dipole, that of the true moment and the best model, without the plate.
-
-    Of the dipoles' equilibria those nearest to where the floater levitates by the best model, of this `name`, or else
-    where it does by the dipole; a model without any has None. None where neither has one.
-    """
-    true = most_like_levitation(best.equilibria)
-    rough = nearest_of(dipole.equilibria, true.position) if true else most_like_levitation(dipole.equilibria)
-    if (known := true or rough) is None:
-        return None
-    moment = nearest_of(true_moment.equilibria, known.position)
-    distances = [None if e is None else -float(e.position[2]) * 1e3 for e in (rough, moment, true)]
-    return {
-        "true_model": name,
-        "dipole_stability": rough.stability if rough else None,
-        "true_stability": true.stability if true else None,
-        "dipole_distance_mm": distances[0],
-        "true_moment_distance_mm": distances[1],
-        "true_distance_mm": distances[2],
-        "difference_mm": None if distances[0] is None or distances[2] is None else distances[0] - distances[2],
-        # The dipole's own position error says how wrong its field is, which is what is measured here.
-        "difference_error_mm": true.position_error * 1e3 if true else None,
-    }
 
 
 def _static_dataset(levitation: Levitation, survey: Survey, alone: Mapping[str, Survey], best: str) -> xr.Dataset:

@@ -36,6 +36,9 @@ MODE_MARKERS = "osD^v"
 FAMILY = 6  # curves that a panel tells apart, at most
 APART = 0.3  # of the distance: farther from the last point of a branch the next is of another one
 CRITERION = f"growth rate at most {MARGINAL:g} s⁻¹, e-folding time {1 / MARGINAL:g} s or more"
+UNITS = {"1": "", "deg": "°", "1/s": "s⁻¹"}  # as text has them
+ANSWERED = {"equilibria": "Equilibria", "flight": "Trajectories", "field": "Field"}
+BESIDE = {"dipole": "-.", "true_moment": ":"}  # lines of the dipoles beside a sweep's model
 NO_GROWTH = 1e-9  # Growth that counts as none, 1/s
 QUANTITIES = {
     "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
@@ -295,8 +298,16 @@ def question_figure(result: xr.Dataset) -> Figure:
             chosen = dict(zip(others, values, strict=True))
             label = ", ".join(
                 NAMES[v] if isinstance(v, str) else _label(shown[k], f" = {v:g}") for k, v in chosen.items()
-            )
+            ) or NAMES.get(str(result.attrs.get("model", "")), "")
             _curve(panel, shown.sel(chosen), name, along, color, label)
+            if name == "depth" and "dipole_distance" in shown and shown[along].dtype.kind in "iuf":
+                for beside, style in BESIDE.items():
+                    one = 1e3 * shown[f"{beside}_distance"].sel(chosen)
+                    panel.plot(one[along], one, style, color=color if len(members) > 1 else "0.4", lw=1.0)
+    if "dipole_distance" in shown and len(members) <= FAMILY and shown[along].dtype.kind in "iuf":
+        plate = " without plate" if shown.attrs.get("plate_model", "none") != "none" else ""
+        for style, words in zip(BESIDE.values(), ("point dipole", "dipole, true moment"), strict=True):
+            axes[0].plot([], [], style, color="0.4", lw=1.0, label=f"{words}{plate}")
     if "stable" in shown and len(members) <= FAMILY:
         axes[0].plot([], [], "o--", ms=3, color="0.3", mfc="white", label="unstable")
     legend_below(figure)
@@ -387,15 +398,15 @@ def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
 
 def _label(values: xr.DataArray, value: str = "") -> str:
     """Name and unit as of an axis, or with a value between them."""
-    unit = {"1": "", "deg": "°", "1/s": "s⁻¹"}.get(units := str(values.attrs.get("units", "1")), units)
+    unit = UNITS.get(units := str(values.attrs.get("units", "1")), units)
     return f"{values.attrs.get('long_name', values.name)}{value} {unit if value or not unit else f'({unit})'}".rstrip()
 
 
 def question_lines(result: xr.Dataset) -> list[str]:
     """What was found, in a few lines."""
     varied, ask = np.atleast_1d(result.attrs["varied"]), str(result.attrs["ask"])
-    grid = " × ".join(f"{key} ({result.sizes[key]})" for key in varied)
-    lines = [f"Asked for {ask} over {grid}."]
+    grid = " × ".join(f"{key} ({result.sizes[key]} values)" for key in varied)
+    lines = [f"{ANSWERED[ask]} over {grid}."]
     shown = _derived(result)
     if "stable" in shown:
         some = (shown["stable"] == 1).any("equilibrium")
@@ -407,6 +418,30 @@ def question_lines(result: xr.Dataset) -> list[str]:
         values = shown[name].values[np.isfinite(shown[name].values)]
         if len(values):
             what = f"{shown[name].attrs['long_name']}{' where stable' if 'stable' in shown else ''}"
-            units = {"1": ""}.get(shown[name].attrs["units"], shown[name].attrs["units"])
-            lines.append(f"{what}: {values.min():.6g} to {values.max():.6g} {units}".rstrip())
-    return lines
+            units = UNITS.get(shown[name].attrs["units"], shown[name].attrs["units"])
+            lines.append(f"{what}: {values.min():.4g} to {values.max():.4g} {units}".rstrip())
+    return lines + (_beside_lines(result) if ask == "equilibria" else [])
+
+
+def _beside_lines(result: xr.Dataset) -> list[str]:
+    """How the dipoles differ from the sweep's model, all without the plate, whatever the stability of either."""
+    if "dipole_distance" not in result:
+        model = str(result.attrs.get("model", ""))
+        return ["Against finite elements: --vary model=dipole,fem."] if model == "dipole" else []
+    plate = " without the plate" if result.attrs.get("plate_model", "none") != "none" else ""
+    best = NAMES.get(str(result.attrs.get("model", "")), "the sweep's model")
+    said = []
+    for name, words in (("dipole", "point dipole"), ("true_moment", "dipole of the magnets' true moments")):
+        apart = 1e3 * (result[f"{name}_distance"] - result["true_distance"]).values
+        known = apart[np.isfinite(apart)]
+        if known.size:
+            span = f"{known.min():+.2g} to {known.max():+.2g}" if np.ptp(known) > 0 else f"{known[0]:+.2g}"
+            said.append(f"{words} {span} mm")
+    text = f"Levitation distance against {best}, same conditions{plate}: {', '.join(said)}."
+    missing = int((result["dipole_distance"].isnull() & result["true_distance"].notnull()).sum())
+    other = int((result["dipole_distance"].notnull() & result["true_distance"].isnull()).sum())
+    lines = [text] if said else []
+    lines += [f"No equilibrium by the point dipole at {missing} points where {best} has one."] if missing else []
+    lines += [f"No equilibrium by {best} at {other} points where the point dipole has one."] if other else []
+    lasts = int((result["dipole_stability"].isin(["stable", "marginal"])).sum())
+    return [*lines, f"Stable levitation by the point dipole, same conditions{plate}: at {lasts} points."]

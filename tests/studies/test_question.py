@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -12,12 +13,14 @@ import xarray as xr
 from hypothesis import given, strategies as st
 from places import HORIZONTAL
 
+import spinlev as sl
 from spinlev.geometry.common import InputError
 from spinlev.geometry.scene.files import load_scene, parse_scene
 from spinlev.geometry.scene.messages import SceneError
 from spinlev.studies.catalogue.report import used_references
 from spinlev.studies.cli.main import _status
 from spinlev.studies.cli.options import combinations, parse_vary
+from spinlev.studies.figures.run import question_lines
 
 SCENE = str(HORIZONTAL)
 FAST = ("--plate-model", "none", "--model", "dipole", "--workers", "1", "--json")
@@ -221,3 +224,20 @@ def test_a_study_has_no_scene_to_show(spinlev, tmp_path):
     assert status == 2
     assert "must hold a trajectory" in err
     shutil.rmtree(tmp_path / "out")
+
+
+def test_a_sweep_is_beside_the_dipole_whatever_the_stability(tmp_path):
+    """The dipoles of every point are those of `compare`'s table, which searches each for itself."""
+    found = sl.sweep(SCENE, {"frequency_hz": [110.0, 118.0]}, model="surface", rtol=1e-3, out=tmp_path, workers=1)
+    dipole = sl.equilibria(replace(load_scene(SCENE), frequency=110.0), model="dipole", plate_model="none")
+    nearest = np.abs(dipole.distance.values - float(found.true_distance[0])).argmin()
+    place = -dipole.position.sel(axis="z").values[nearest]
+    assert found.dipole_distance.values[0] == pytest.approx(place, rel=1e-9)
+    kinds = set(found.dipole_stability.values) | set(found.true_stability.values)
+    assert kinds <= {"stable", "marginal", "unstable"}
+    assert (found.true_moment_distance < found.dipole_distance).all()  # the true moment is 1.6 % weaker
+    lines = "\n".join(question_lines(found))
+    assert "same conditions" in lines
+    assert "dipole of the magnets' true moments" in lines
+    beside = sl.sweep(SCENE, {"frequency_hz": [110.0, 118.0]}, model="dipole", out=tmp_path, workers=1)
+    assert question_lines(beside)[-1] == "Against finite elements: --vary model=dipole,fem."

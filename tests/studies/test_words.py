@@ -22,9 +22,9 @@ from spinlev.geometry.rotor import Conductor
 from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.shapes import Box
 from spinlev.studies.cli.options import Models
+from spinlev.studies.compare import compared_models
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.result import Result
-from spinlev.studies.run import compared_models
 from spinlev.studies.words import (
     bracketed,
     comparison_words,
