@@ -23,7 +23,7 @@ from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from .cli.console import note, to_json
 from .cli.options import Answer, FieldModel, Models
-from .figures.style import PALETTE, legend_below, panels, save_figures, styled
+from .figures.style import COLORS, NAMES, PALETTE, legend_below, panels, save_figures, styled
 from .levitation import Levitation
 from .plan import PlatePlan, sources
 from .result import variable, write_dataset
@@ -167,7 +167,8 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
     if frequencies is None:
         ends = [f for row in rows for f in row.stable or ()] or [scene.frequency * (1 - BESIDE)]
         low, high = min(*ends, scene.frequency), max(*ends, scene.frequency)
-        frequencies = np.linspace(low * (1 - BESIDE), high * (1 + BESIDE), GRID)
+        low, high = low * (1 - BESIDE), high * (1 + BESIDE)
+        frequencies = low + (high - low) * np.linspace(0.0, 1.0, GRID) ** 2  # dense at the fold, where branches turn
     points = [
         on_branch(replace(row.levitation.scene, plate=None), row.levitation.rates, row.branch, frequencies)
         for row in rows
@@ -270,12 +271,14 @@ def compare_figure(result: xr.Dataset) -> Figure:
     """Levitation distance of every model by frequency, and how far each is from the best."""
     figure, ((left, right),) = panels(1, 2, 2.9)
     best = result.isel(model=-1)
-    for k, color in zip(range(result.sizes["model"]), PALETTE, strict=False):
-        one = result.isel(model=k)
+    colors = {TRUE_MOMENT: PALETTE[5], MUTUAL.format("fem"): PALETTE[3]}
+    names = {name: NAMES[name].replace("fem +", f"{NAMES['fem']} +") for name in result["model"].values.tolist()}
+    for model, name in names.items():
+        one, color = result.sel(model=model), colors.get(model, COLORS[model])
         for panel, share in ((left, 0.0), (right, 1.0)):
             curve = 1e3 * (one["branch_distance"] - share * best["branch_distance"])
             panel.plot(curve["frequency"], curve, ":", color=color)
-            panel.plot(curve["frequency"], curve.where(one["branch_stable"]), color=color, label=one["model"].item())
+            panel.plot(curve["frequency"], curve.where(one["branch_stable"]), color=color, label=name)
             scene = 1e3 * (one["distance"] - share * best["distance"])
             panel.plot(result.attrs["frequency_hz"], scene, "o", color=color, ms=3)
     left.plot([], [], "k:", label="unstable")
@@ -284,7 +287,7 @@ def compare_figure(result: xr.Dataset) -> Figure:
     for panel in (left, right):
         panel.set_xlabel("rotor frequency (Hz)")
     left.set_ylabel("levitation distance (mm)")
-    right.set_ylabel(f"difference from {best['model'].item()} (mm)")
+    right.set_ylabel(f"difference from {names[best['model'].item()]} (mm)")
     legend_below(figure, left)
     return figure
 

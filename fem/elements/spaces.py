@@ -7,7 +7,7 @@ component on its plane: a Dirichlet condition for A there.  An even class has th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -82,11 +82,11 @@ class IntegrationPoints:
 
     def value_matrix(self, space: Any, basis: Any) -> scipy.sparse.csr_matrix:
         """(3n, unknowns) values here of a space's `basis` of three components, those of one point together."""
-        return value_matrix(space, basis, self.space, lambda integrand: integrand * self.measure, self.weights)
+        return value_matrix(space, basis, self.space, self.region, self.space.GetIntegrationRules(), self.weights)
 
 
 def value_matrix(
-    space: Any, basis: Any, points: Any, integral: Callable[[Any], Any], weights: Array
+    space: Any, basis: Any, points: Any, region: Any, rules: Mapping[Any, Any], weights: Array
 ) -> scipy.sparse.csr_matrix:
     """(3n, unknowns) values at points of a `basis` of three components, those of one point together.
 
@@ -94,12 +94,16 @@ def value_matrix(
     ----------
     space : of the unknowns
     points : NGSolve space with one unknown per point
-    integral : of a function, with exactly these points
-    weights : (n,) of the points in it
+    region, rules : that they are of, and its integration rules
+    weights : (n,) of the points, times what the basis was multiplied by
     """
     components = points**3
+    # Not vectorised: NGSolve's vectorised integrals are wrong for elements of many points (order 4 on).
+    integral = ng.SymbolicBFI(basis * ng.CF(tuple(components.TestFunction())), definedon=region, simd_evaluate=False)
+    for element, rule in rules.items():
+        integral.SetIntegrationRule(element, rule)
     form = ng.BilinearForm(trialspace=space, testspace=components)
-    form += integral(basis * ng.CF(tuple(components.TestFunction())))
+    form += integral
     form.Assemble()
     # integrals with one point each: the weight taken off, they are the basis's values there
     rows, columns, values = (np.asarray(part) for part in form.mat.COO())

@@ -116,15 +116,8 @@ class EddySpace:
     def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> scipy.sparse.csr_matrix:
         """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
         points = ngsolve.comp.IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region)
-
-        def integral(integrand: Any) -> Any:
-            # Not vectorised: NGSolve's vectorised integrals are wrong beyond 256 points an element (order 4 on).
-            found = ngsolve.SymbolicBFI(self.sigma * integrand, definedon=self.region, simd_evaluate=False)
-            for element, rule in self._rules.items():
-                found.SetIntegrationRule(element, rule)
-            return found
-
-        return value_matrix(space, basis, points, integral, self.weights / MILLIMETRE**3)
+        weights = self.weights / MILLIMETRE**3
+        return value_matrix(space, self.sigma * basis, points, self.region, self._rules, weights)
 
     def free_unknowns(self, parity_class: Sequence[int], space: ngsolve.FESpace) -> ngsolve.BitArray:
         """Coupling unknowns of one parity class: without odd planes, the far boundary and a spanning tree in air."""

@@ -283,10 +283,12 @@ def place_figure(result: xr.Dataset) -> Figure:
         top.grid(False)
         titled(top, f"{label}, {float(one['rotor_frequency']):.0f} Hz")
         ends = 1e3 * height[[-1, 0]]
-        top.set(xlabel="lateral offset (mm)", ylabel="farther from the rotor (mm)", ylim=ends)
+        top.set(xlabel="lateral offset (mm)", ylim=ends)
         lean = np.digitize(np.degrees(one["lean"].values), edges) - 1
         _shares(bottom, (edges[1:] + edges[:-1]) / 2, [hits[lean == k] for k in range(BINS)], PALETTE[0], "")
-        bottom.set(xlabel="moment to the axis (°)", ylabel="capture probability (%)", ylim=(-2, 102))
+        bottom.set(xlabel="initial polar angle (°)", ylim=(-2, 102))
+    maps[0].set_ylabel("initial distance beyond the equilibrium's (mm)")
+    leans[0].set_ylabel("capture probability (%)")
     colour_bar(figure, shades, maps, label="captured (%)")
     return figure
 

@@ -9,11 +9,13 @@ from the prior gives the evidence of every single fact, of every pair and of all
 """
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from scipy.special import logsumexp, ndtri
 from scipy.stats import qmc
 
@@ -323,7 +325,7 @@ def _labels(result: xr.Dataset) -> dict[str, str]:
 def corner_figure(result: xr.Dataset) -> Figure:
     """The posterior of some unknowns, alone and in pairs; grey: the middle 68 % of the prior."""
     some = result.isel(variant=0).sel(unknown=SHOWN)
-    labels = [label.replace(" ", "\n") for label in _labels(some).values()]
+    labels = [fill(label, 12) for label in _labels(some).values()]
     scale = np.where(some["unit"] == "S/m", 1e-6, 1.0)
     before, draws = prior_quantiles(some) * scale[:, None], some["posterior"].dropna("draw").values * scale
     limits = np.quantile(draws, (0.003, 0.997), axis=0).T
@@ -343,8 +345,8 @@ def corner_figure(result: xr.Dataset) -> Figure:
             panel.plot(draws[:, j], draws[:, i], ".", ms=1, alpha=0.3, color=PALETTE[0], rasterized=True)
             panel.set_ylim(*limits[i])
             panel.tick_params(labelleft=j == 0)
-        panel.locator_params("x", nbins=2, steps=[1, 2, 5, 10])
-        panel.locator_params("y", nbins=2)
+        for axis in (panel.xaxis, panel.yaxis)[: 1 + (i != j)]:
+            axis.set(major_locator=MaxNLocator(3, steps=[1, 2, 5, 10], min_n_ticks=1), major_formatter="{x:g}")
         panel.set_xlabel(labels[j] if i == len(SHOWN) - 1 else "")
         panel.set_ylabel(labels[i] if i and not j else "")
     return figure

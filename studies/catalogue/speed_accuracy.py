@@ -323,7 +323,7 @@ def speed_figure(result: xr.Dataset) -> Figure:
             explain(panel, {family: "o-"}, color=color, ms=4)
         own = float(at["truth_error"].where(at["problem"] == problem).max())
         panel.axhspan(1e-17, max(own, 1e-16), facecolor="0.9", edgecolor="0.6", label="error of the reference")
-        panel.set_ylim(1e-16, None)
+        panel.set_ylim(1e-17, None)
     explain(panels[0][0], {"error that the table states": "o"}, mfc="none", ms=4)
     return figure
 
