@@ -41,7 +41,7 @@ print(found[["distance", "polar_angle", "growth", "stable"]].to_dataframe())
 modes = sl.stability(scene, model="cuboid")
 print(modes[["mode_frequency", "mode_growth"]].to_dataframe())
 # [simulate]
-motion = sl.simulate(scene, duration=1.0, model="cuboid")
+motion = sl.simulate(scene, duration_s=1.0, model="cuboid")
 distance = -1e3 * motion.position.sel(axis="z")  # mm
 print(motion.attrs["ended_by"], float(distance.min()), float(distance.max()))
 # [rotor_table]
@@ -49,11 +49,11 @@ table = sl.rotor_table(scene, model="cuboid")
 field, gradient = table.evaluate([[0.0, 0.0, -0.02]])  # T, T/m; points in m
 print(1e3 * field, table.relative_error([[0.0, 0.0, -0.02]]))
 # [field_map]
-plane = sl.field_map(scene, plane="xz", extent=[-0.02, 0.02, -0.03, 0.01], steps=21)
+plane = sl.field_map(scene, plane="xz", extent_mm=[-20, 20, -30, 10], steps=21)
 size = (plane.B**2).sum("component") ** 0.5  # T, over model, x and z
 print(size.sel(model="fem").sel(x=0.0, method="nearest").to_series())
 # [floater_force]
-force = sl.floater_force(scene, [0.0, 0.0, -0.02], [-1.0, 0.0, 0.0], model="cuboid")  # m, direction of the moment
+force = sl.floater_force(scene, [0.0, 0.0, -20.0], [-1.0, 0.0, 0.0], model="cuboid")  # mm, direction of the moment
 print(force.force.values, force.torque.values)
 # [plate_table]
 over_plate = sl.load_scene("scenes/tilt-over-plate.toml")
@@ -67,7 +67,7 @@ print(worked[["lowest", "knee", "share_below"]].to_dataframe())
 compared = sl.compare(scene, [120.0, 130.0])
 print(compared[["distance", "growth", "stability"]].to_dataframe())
 # [ensemble]
-endings = sl.ensemble(scene, n=20, seed=1, spread={"offset_mm": 0.5}, duration=1.0, model="cuboid")
+endings = sl.ensemble(scene, n=20, seed=1, spread={"offset_mm": 0.5}, duration_s=1.0, model="cuboid")
 print(endings.ended_by.to_series().value_counts())
 # [sweep]
 swept = sl.sweep(scene, {"frequency_hz": [110.0, 130.0, 150.0], "model": ["dipole", "cuboid"]})

@@ -23,12 +23,12 @@ COARSE = 12  # degree of the rule whose difference from the full one is the erro
 @documented
 def floater_force(
     scene: SceneLike,
-    position: ArrayLike,
+    position_mm: ArrayLike,
     moment: ArrayLike,
     body_x: ArrayLike | None = None,
     model: FieldModel = "auto",
     rtol: float = Models.rtol,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> xr.Dataset:
     """Force and torque of the rotor's field on the floater fixed in any pose: a sphere, a cuboid or a cylinder.
 
@@ -37,8 +37,8 @@ def floater_force(
 
     Parameters
     ----------
-    position : array_like
-        (n, 3) or (3,) of the floater's centre, m, rotor's frame.
+    position_mm : array_like
+        (n, 3) or (3,) of the floater's centre, mm, rotor's frame.
     moment : array_like
         (n, 3) or (3,) directions of its moment, the body's z.
     body_x : array_like, optional
@@ -62,13 +62,14 @@ def floater_force(
     >>> disc = {"shape": "cylinder", "diameter_mm": 12.0, "height_mm": 6.0}
     >>> disc |= {"remanence_T": 1.305, "recoil_permeability": 1.0, "density_kg_m3": 7500.0}
     >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=disc)
-    >>> found = sl.floater_force(scene, [0.0, 0.0, -0.02], [-1.0, 0.0, 0.0], model="cuboid")
+    >>> found = sl.floater_force(scene, [0.0, 0.0, -20.0], [-1.0, 0.0, 0.0], model="cuboid")
     >>> print(f"{found.force.values[0, 2]:.3f} N")
     1.466 N
     """
     levitation = Levitation(scene, Models(model, rtol=rtol))
     floater, table = levitation.scene.floater, levitation.table
-    places, pointing = np.broadcast_arrays(_vectors("position", position), _directions("moment", moment))
+    centres = 1e-3 * _vectors("position_mm", position_mm)
+    places, pointing = np.broadcast_arrays(centres, _directions("moment", moment))
     axes = np.array([floater.axes(m) for m in pointing])
     if body_x is not None:
         axes = _turned(axes, np.broadcast_to(_directions("body_x", body_x), places.shape))
@@ -130,7 +131,7 @@ def _check_free(scene: Scene, places: Array, axes: Array) -> None:
         if depth > 0:
             where = ", ".join(f"{1e3 * c:.6g}" for c in place)
             raise InputError(
-                f"Input position must leave the floater free of the rotor; instead received ({where}) mm, where it "
+                f"Input position_mm must leave the floater free of the rotor; instead received ({where}) mm, where it "
                 f"overlaps it by {1e3 * depth:.3g} mm. Move it away by as much."
             )
 
@@ -140,6 +141,6 @@ def _acting(sources: FloaterSources, table: FieldTable, places: Array, axes: Arr
         return force_and_torque(sources, table, places, axes)
     except RangeError as error:
         raise InputError(
-            f"Input position must be where the field of the rotor is known all over the floater; instead {error} "
+            f"Input position_mm must be where the field of the rotor is known all over the floater; instead {error} "
             'Move it away, or take model="cuboid".'
         ) from None

@@ -64,7 +64,7 @@ def equilibria(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    progress: bool = False,
+    progress: bool | None = None,
     **requested: Unpack[Requested],
 ) -> xr.Dataset:
     """All synchronous equilibria, the stable ones first, with errors, growth rate and frequency of each mode.
@@ -88,18 +88,18 @@ def equilibria(
 @documented
 def compare(
     scene: SceneLike,
-    frequencies: Sequence[float] | None = None,
+    frequencies_hz: Sequence[float] | None = None,
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
     rtol: float = Models.rtol,
     plate_rtol: float = Models.plate_rtol,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> xr.Dataset:
     """Every field model's results for one scene, under the same conditions: may the point dipole be used for it?
 
     Parameters
     ----------
-    frequencies : sequence of float, optional
+    frequencies_hz : sequence of float, optional
         (n,) of the rotor, Hz, for the branches; left out: about the stable ones.
 
     Returns
@@ -125,9 +125,10 @@ def compare(
     >>> (1e3 * found.distance.sel(model=["dipole", "cuboid"])).round(2).values.tolist()
     [18.83, 19.1]
     """
-    grid = None if frequencies is None else np.array(checked_values({"frequencies": frequencies})["frequencies"])
+    name = "frequencies_hz"
+    grid = None if frequencies_hz is None else np.array(checked_values({name: frequencies_hz})[name])
     if grid is not None and grid.min() <= 0:
-        raise InputError(f"Input frequencies must be positive; instead received {grid.min():g}.")
+        raise InputError(f"Input frequencies_hz must be positive; instead received {grid.min():g}.")
     requested = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
     return compared_dataset(compared(given_scene(scene), requested, spin), grid)
 
@@ -138,7 +139,7 @@ def stability(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    progress: bool = False,
+    progress: bool | None = None,
     **requested: Unpack[Requested],
 ) -> xr.Dataset:
     """The five modes of the equilibrium at which a trajectory begins, the nearest stable one if there is one.
@@ -163,10 +164,10 @@ def stability(
 @documented
 def simulate(
     scene: SceneLike,
-    duration: float,
+    duration_s: float,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
-    progress: bool = False,
+    progress: bool | None = None,
     drive: Sequence[Mapping[str, Any]] | None = None,
     **requested: Unpack[Requested],
 ) -> xr.Dataset:
@@ -174,7 +175,7 @@ def simulate(
 
     Parameters
     ----------
-    duration : float
+    duration_s : float
         Simulated time, s.
     drive : list of dict, optional
         Steps of the rotor's frequency in place of the scene's: "to_hz" or "stop" (True) with "in_s", or "hold_s".
@@ -192,20 +193,20 @@ def simulate(
     """
     given = given_scene(scene)
     levitation = Levitation(given if drive is None else driven(given, drive), Models(model, plate_model, **requested))
-    simulated = Result(levitation, flight=levitation.flight(duration)).dataset()
+    simulated = Result(levitation, flight=levitation.flight(duration_s)).dataset()
     return simulated.assign_attrs(scene=scene_text(levitation.scene))
 
 
 @documented
 def rotor_table(
-    scene: SceneLike, model: FieldModel = "auto", rtol: float = Models.rtol, progress: bool = False
+    scene: SceneLike, model: FieldModel = "auto", rtol: float = Models.rtol, progress: bool | None = None
 ) -> FieldTable:
     """The rotor's field as a table, accurate to `rtol` wherever the floater can be.
 
     Returns
     -------
     FieldTable
-        Its `evaluate(points)` gives B (n, 3) T and its gradient (n, 3, 3) T/m at points (n, 3) m of the rotor's frame,
+        Its `evaluate(points)` gives B (..., 3) T and its gradient (..., 3, 3) T/m at points (..., 3) m, rotor's frame,
         `relative_error(points)` the estimated errors. With "cuboid" and "fem" also in the magnets, in gaps and at
         faces, there to `rtol` or 1e-4 of the remanence, whichever is more; `fields(points)` has H and M, too.
 
@@ -224,10 +225,10 @@ def rotor_table(
 def field_map(
     scene: SceneLike,
     plane: Literal["xy", "xz", "yz"] = "xz",
-    extent: Sequence[float] | None = None,
-    offset: float = 0.0,
+    extent_mm: Sequence[float] | None = None,
+    offset_mm: float = 0.0,
     steps: int = 121,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> xr.Dataset:
     """B, H and M on a plane through or beside the rotor, by dipole, closed form and finite elements.
 
@@ -235,10 +236,10 @@ def field_map(
     ----------
     plane : {"xz", "xy", "yz"}
         Across and up, in the rotor's frame at t = 0.
-    extent : sequence of 4 floats, optional
-        Left, right, lower and upper end, m; left out: twice the rotor's size.
-    offset : float
-        Third coordinate, m.
+    extent_mm : sequence of 4 floats, optional
+        Left, right, lower and upper end, mm; left out: twice the rotor's size.
+    offset_mm : float
+        Third coordinate, mm.
     steps : int
         Points along the longer side, 5 to 1001.
 
@@ -256,11 +257,11 @@ def field_map(
     if plane not in PLANES:
         raise InputError(f"Input plane must be one of {', '.join(PLANES)}; instead received {plane}.")
     check_steps("steps", steps)
-    ends = None if extent is None else np.array([finite("extent", end) for end in extent])
+    ends = None if extent_mm is None else 1e-3 * np.array([finite("extent_mm", end) for end in extent_mm])
     if ends is not None and not (len(ends) == 4 and ends[0] < ends[1] and ends[2] < ends[3]):
-        said = "left, right, lower and upper end in rising order, m"
-        raise InputError(f"Input extent must be {said}; instead received {extent}.")
-    return plane_map(given_scene(scene), plane, ends, finite("offset", offset), steps)
+        said = "left, right, lower and upper end in rising order, mm"
+        raise InputError(f"Input extent_mm must be {said}; instead received {extent_mm}.")
+    return plane_map(given_scene(scene), plane, ends, 1e-3 * finite("offset_mm", offset_mm), steps)
 
 
 @documented
@@ -268,7 +269,7 @@ def plate_table(
     scene: SceneLike,
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
-    progress: bool = False,
+    progress: bool | None = None,
     **requested: Unpack[Requested],
 ) -> PlateMemory | None:
     """The plate's currents around the place where the floater levitates.
@@ -288,7 +289,7 @@ def working_point(
     model: FieldModel = "auto",
     rtol: float = Models.rtol,
     interaction: InteractionModel = "auto",
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> xr.Dataset:
     """The lowest μ0 H along each magnet's easy axis, with the floater where it levitates, against the knee.
 
@@ -316,7 +317,7 @@ def working_point(
 def ensemble(
     scene: SceneLike,
     starts: Mapping[Any, Any] | None = None,
-    duration: float = 3.0,
+    duration_s: float = 3.0,
     n: int | None = None,
     seed: int = 0,
     spread: Mapping[str, Any] | None = None,
@@ -324,7 +325,7 @@ def ensemble(
     rtol: float = Models.rtol,
     interaction: InteractionModel = "auto",
     workers: int | None = 1,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> xr.Dataset:
     """Endings of very many trajectories of one scene, in SIMD batches; a plate is an obstacle without eddy currents.
 
@@ -333,7 +334,7 @@ def ensemble(
     starts : dict or xarray.Dataset, optional
         By key of the scene file's `[start]`, three numbers for each trajectory (n, 3), or three for all: "offset_mm"
         from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
-    duration : float
+    duration_s : float
         Of each trajectory, s.
     n : int, optional
         Instead of `starts`: so many trajectories from about where the scene begins.
@@ -368,7 +369,7 @@ def ensemble(
     >>> flights.ended_by.values.tolist()
     ['duration', 'contact']
     """
-    positive("duration", duration)
+    positive("duration_s", duration_s)
     if (starts is None) == (n is None):
         raise InputError("Input starts must be given, or n with spread; instead received both or neither.")
     number = Workers(workers).checked().workers or os.cpu_count() or 1
@@ -378,7 +379,7 @@ def ensemble(
     else:
         begun, drawn = drawn_starts(levitation, n, seed, spread or {}), {"seed": seed, "spread": repr(spread)}
     together = min(TOGETHER, -(-len(begun.position) // number))
-    requested = levitation.scene, levitation.interaction, begun, duration
+    requested = levitation.scene, levitation.interaction, begun, duration_s
     found = simulated(*requested, map if number == 1 else mapped(number), together)
     last = found.last.to_lab(levitation.scene.angle(found.levitated_s))
     data = {
@@ -391,7 +392,7 @@ def ensemble(
         **state_columns(begun, "flight", ", at t = 0", "start_"),  # where the rotor's axes are the laboratory's
     }
     return xr.Dataset(data, {"axis": list(AXIS)}).assign_attrs(
-        study="ensemble", scene=scene_text(levitation.scene), duration_s=duration, **levitation.labels, **drawn
+        study="ensemble", scene=scene_text(levitation.scene), duration_s=duration_s, **levitation.labels, **drawn
     )
 
 
@@ -403,12 +404,12 @@ def sweep(
     model: FieldModel = "auto",
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    duration: float = 3.0,
-    place: Sequence[float] = (0.0, 0.0, -0.02),
+    duration_s: float = 3.0,
+    place_mm: Sequence[float] = (0.0, 0.0, -20.0),
     workers: int | None = 1,
     scheduler: str | None = None,
     out: str | Path = "out",
-    progress: bool = False,
+    progress: bool | None = None,
     **requested: Unpack[Requested],
 ) -> xr.Dataset:
     """Any quantity of a scene over a grid of its parameters; each key becomes a dimension, `_` for its dots.
@@ -422,10 +423,10 @@ def sweep(
         `spin`, names for `model`, `plate_model` and `interaction`.
     ask : {"equilibria", "flight", "field"}
         What is computed at each point.
-    duration : float
+    duration_s : float
         Duration of a trajectory, s.
-    place : sequence of 3 floats
-        Where the field is asked for, m, rotor's frame.
+    place_mm : sequence of 3 floats
+        Where the field is computed, mm, rotor's frame.
 
     Returns
     -------
@@ -441,10 +442,10 @@ def sweep(
     """
     loaded = given_scene(scene)
     models = Models(model, plate_model, **requested).checked()
-    where = tuple(finite("place", coordinate) for coordinate in place)
+    where = tuple(1e-3 * finite("place_mm", coordinate) for coordinate in place_mm)
     if len(where) != 3:
-        raise InputError(f"Input place must be three numbers, m; instead received {place!r}.")
-    question = Question(loaded, "scene", ask, models, finite("spin", spin), finite("duration", duration), where)
+        raise InputError(f"Input place_mm must be three numbers; instead received {place_mm!r}.")
+    question = Question(loaded, "scene", ask, models, finite("spin", spin), finite("duration_s", duration_s), where)
     grid = checked_values(values)
     return _computed(question_study(question, grid), combinations(grid), Workers(workers, scheduler), Path(out))
 
@@ -456,7 +457,7 @@ def run_study(
     workers: int | None = 1,
     scheduler: str | None = None,
     out: str | Path = "out",
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> xr.Dataset:
     """The result of a study of the catalogue; points finished before an interruption are kept.
 

@@ -243,8 +243,8 @@ def _beside(levitation: Levitation, dipoles: Sequence[Levitation]) -> dict[str, 
     """What `compared_models` says of dipole, dipole of the true moment and the scene's model, all without the plate."""
     found: Mapping[str, Any] = {}
     with suppress(SpinlevError):
-        surveys = [one.without_plate for one in (*dipoles, levitation)]
-        found = compared_models(*surveys, levitation.table.model) or {}
+        rough, moment, best = (one.without_plate for one in (*dipoles, levitation))
+        found = compared_models(rough, moment, best, levitation.table.model) or {}
     distances = {
         f"{name}_distance": variable((), 1e-3 * value, "m", f"levitation distance by {words}")
         for name, words in COMPARED.items()

@@ -22,7 +22,7 @@ rest = find_equilibria(scene, rotor_table(scene, "cuboid"))[0]
 kick = np.array([0.0, 0.0, 5e-3])  # m/s
 start = AbsoluteStart(rest.state.position, rest.state.velocity + kick, rest.state.moment, rest.state.spin)
 
-flight = simulate(replace(scene, start=start), duration=1.0, model="cuboid")
+flight = simulate(replace(scene, start=start), duration_s=1.0, model="cuboid")
 height = flight["position"].sel(axis="z").values - rest.position[2]
 upwards = np.flatnonzero((height[:-1] < 0) & (height[1:] >= 0))
 time = flight["time"].values

@@ -37,7 +37,7 @@ offset_mm = [0.0, 0.0, 0.2]     # released 0.2 mm above the equilibrium
 
 found = equilibria(scene, model="dipole")
 height_mm = 1e3 * float(found["position"].sel(axis="z")[0])
-flight = simulate(scene, duration=0.5, model="dipole")
+flight = simulate(scene, duration_s=0.5, model="dipole")
 print(f"Equilibrium at {height_mm:.2f} mm; the trajectory ended by {flight.attrs['ended_by']}")
 
 figure = draw(flight)["trajectory"]

@@ -204,6 +204,11 @@ class _Printed(logging.Handler):
         super().close()
 
 
+def read_by_a_person() -> bool:
+    """Whether standard error is a terminal, or the program runs in a notebook."""
+    return sys.stderr.isatty() or ERRORS.is_jupyter
+
+
 @contextmanager
 def printing(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
     """Messages and progress on standard error inside the block, if they are wanted; details too where `verbose`."""

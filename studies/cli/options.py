@@ -23,7 +23,7 @@ from cyclopts import Parameter
 from ...geometry.common import Array, InputError, no_argument, shown
 from ...geometry.files import file_content
 from ..figures.style import FigureWidth
-from .console import printing
+from .console import printing, read_by_a_person
 
 Answer = tuple[Mapping[str, Any], list[str]]  # of a command: numbers for a program, lines for a person
 COLUMNS = ("x_mm", "y_mm", "z_mm")
@@ -299,8 +299,8 @@ spin : float
     Body spin S = Ω·m̂/ω of the floater about its own moment.
 out : str or Path
     Folder in which finished points are kept until all are done; the same sweep goes on there.
-progress : bool
-    Whether messages and a progress bar go to standard error.
+progress : bool, optional
+    Whether messages and a progress bar go to standard error; left out: on terminals and in notebooks.
 """
 UNUSABLE = "InputError\n    A model, a tolerance or a file that cannot be used."
 SECTIONS = ("Parameters", "Returns", "Raises", "Examples")
@@ -328,7 +328,8 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
     def called(*args: P.args, **kwargs: P.kwargs) -> T:
         for name in kwargs.keys() - known:
             raise TypeError(no_argument(function.__name__, name, known))
-        with printing(bool(signature.bind(*args, **kwargs).arguments.get("progress"))):
+        wanted = signature.bind(*args, **kwargs).arguments.get("progress")
+        with printing(read_by_a_person() if wanted is None else bool(wanted)):
             return function(*args, **kwargs)
 
     own = [parameter for parameter in signature.parameters.values() if parameter.kind != parameter.VAR_KEYWORD]

@@ -116,7 +116,8 @@ def _kinds(result: xr.Dataset, prefix: str = "") -> xr.DataArray:
     """Of equilibria: "stable", "marginal" or "unstable"; also of results that do not have it as text."""
     stable = result[f"{prefix}stable"]
     lasts = result.get(f"{prefix}growth", xr.full_like(stable, np.inf, float)) <= MARGINAL
-    return xr.where(stable == 1, "stable", xr.where(lasts, "marginal", "unstable"))
+    kinds = np.where(stable == 1, "stable", np.where(lasts, "marginal", "unstable"))
+    return stable.copy(data=kinds)
 
 
 @styled

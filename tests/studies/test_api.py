@@ -61,7 +61,7 @@ def test_no_value_of_another_kind_goes_further_than_a_sentence(tmp_path, value):
         lambda: sl.sweep(scene, {"frequency_hz": [value]}, **few, out=tmp_path),
         lambda: sl.sweep(scene, {"frequency_hz": value}, **few, out=tmp_path),
         lambda: sl.sweep(scene, {repr(type(value)): [1.0]}, **few, out=tmp_path),
-        lambda: sl.sweep(scene, {"frequency_hz": [1.0]}, "field", **few, place=(value, 0, 0), out=tmp_path),
+        lambda: sl.sweep(scene, {"frequency_hz": [1.0]}, "field", **few, place_mm=(value, 0, 0), out=tmp_path),
     ):
         with pytest.raises(sl.InputError) as error:
             call()
@@ -237,7 +237,7 @@ def test_a_flight_from_a_place_needs_no_equilibrium(tmp_path):
         start={"position_mm": (0, 0, -60)},
     )
     alone = sl.simulate(falling, 0.01, "dipole")
-    swept = sl.sweep(falling, {"frequency_hz": [0.0]}, "flight", "dipole", duration=0.01, out=tmp_path)
+    swept = sl.sweep(falling, {"frequency_hz": [0.0]}, "flight", "dipole", duration_s=0.01, out=tmp_path)
     assert alone.attrs["ended_by"] == str(swept["ended_by"].values[0]) == "duration"
     np.testing.assert_allclose(alone["distance"][-1], -alone["position"][-1, 2], rtol=1e-3)
     assert 0 <= float(alone["polar_angle"].min()) <= 180
@@ -248,6 +248,22 @@ def test_python_is_quiet_unless_asked(capfd):
     assert capfd.readouterr() == ("", "")
     sl.equilibria(HORIZONTAL, "dipole", "none", progress=True)
     assert "Equilibria" in capfd.readouterr().err
+
+
+def test_progress_is_shown_on_terminals(capfd, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    sl.equilibria(HORIZONTAL, "dipole", "none")
+    assert "Equilibria" in capfd.readouterr().err
+    sl.equilibria(HORIZONTAL, "dipole", "none", progress=False)
+    assert capfd.readouterr().err == ""
+
+
+LENGTHS_AND_TIMES = {"duration", "place", "position", "extent", "offset", "frequencies", "frequency", "displacement"}
+
+
+def test_arguments_say_their_unit():
+    for name in (n for n in dir(sl) if n.islower() and inspect.isroutine(getattr(sl, n))):
+        assert LENGTHS_AND_TIMES.isdisjoint(inspect.signature(getattr(sl, name)).parameters), name
 
 
 def test_the_front_door_is_light():
@@ -280,6 +296,9 @@ def test_magnitudes_that_no_magnet_has_are_told(caplog):
     far = {"size_mm": [0.012, 10, 10], "center_mm": [0, 0, 2e4], "polarization_T": [1.3, 0, 0]}
     sl.scene(frequency_hz=130.0, rotor=sl.magnets(far), floater=ball)
     assert "a size of 0.012 mm, a magnet 20 m from the rotor's origin" in caplog.text
+    below = sl.plate(size_mm=[100, 100, 10], center_mm=[0, 0, -2e4], conductivity_S_m=3.5e7)
+    sl.scene(frequency_hz=130.0, rotor=sl.tilt(**cube, remanence_T=1.3), floater=ball, plate=below)
+    assert "Unusual: a plate 20 m from the rotor. Is that meant?" in caplog.text
 
 
 def test_a_scene_is_drawn_before_anything_is_computed(tmp_path):

@@ -32,7 +32,7 @@ def test_force_is_that_which_moves_the_energy_of_a_brick():
         return -scene.floater.moment * weights @ table.evaluate(place + grid @ axes.T)[0][:, 2]
 
     place, first = np.array([3e-3, 1e-3, -0.018]), np.array([0.8, 0.6, 0.0])
-    found = sl.floater_force(scene, place, UP, first, model="cuboid").isel(pose=0)
+    found = sl.floater_force(scene, 1e3 * place, UP, first, model="cuboid").isel(pose=0)
     work = [energy(place - way, first) - energy(place + way, first) for way in step * np.eye(3)]
     assert found.force.values == pytest.approx(np.array(work) / (2 * step), rel=1e-6, abs=1e-6)
     turned = [
@@ -47,12 +47,12 @@ def test_force_is_that_which_moves_the_energy_of_a_brick():
 @pytest.mark.parametrize(
     ("pose", "said"),
     [
-        (([0.0, 0.0], UP), "position must be three numbers"),
-        (("near", UP), "position must be three numbers"),
-        (([0.0, 0.0, np.nan], UP), "position must be three numbers"),
+        (([0.0, 0.0], UP), "position_mm must be three numbers"),
+        (("near", UP), "position_mm must be three numbers"),
+        (([0.0, 0.0, np.nan], UP), "position_mm must be three numbers"),
         ((PLACE, [0.0, 0.0, 0.0]), "moment must be a direction, not zero"),
         ((PLACE, UP, UP), "body_x must not be along the moment"),
-        (([0.0, 0.0, -0.009], UP), "position must leave the floater free of the rotor; .* overlaps it by"),
+        (([0.0, 0.0, -9.0], UP), "position_mm must leave the floater free of the rotor; .* overlaps it by"),
     ],
 )
 def test_what_is_no_pose_is_told(pose, said):

@@ -36,7 +36,7 @@ def test_a_map_of_a_sphere_has_its_exact_field_inside_and_outside():
 
 
 def test_python_has_the_map_over_the_coordinates_of_its_plane():
-    found = sl.field_map(scene_of(SPHERE), "yz", (-8e-3, 8e-3, -9e-3, -6e-3), 1e-3, 9)
+    found = sl.field_map(scene_of(SPHERE), "yz", (-8.0, 8.0, -9.0, -6.0), 1.0, 9)
     assert found["B"].dims == ("model", "z", "y", "component")
     assert {name: found[name].attrs["units"] for name in ("y", "z", "B", "H", "error")} == {
         "y": "m", "z": "m", "B": "T", "H": "A/m", "error": "T"
@@ -50,12 +50,12 @@ def test_python_has_the_map_over_the_coordinates_of_its_plane():
     ("wrong", "said"),
     [
         ({"plane": "xq"}, "plane must be one of xy, xz, yz"),
-        ({"extent": (1.0, -1.0, 0.0, 1.0)}, "extent must be left, right, lower and upper end"),
-        ({"extent": (0.0, 1.0)}, "extent must be left"),
-        ({"extent": (0.0, float("nan"), 0.0, 1.0)}, "extent must be a finite number"),
+        ({"extent_mm": (1.0, -1.0, 0.0, 1.0)}, "extent_mm must be left, right, lower and upper end"),
+        ({"extent_mm": (0.0, 1.0)}, "extent_mm must be left"),
+        ({"extent_mm": (0.0, float("nan"), 0.0, 1.0)}, "extent_mm must be a finite number"),
         ({"steps": 3}, "steps must be between 5 and 1001"),
         ({"steps": 7.5}, "steps must be between 5 and 1001"),
-        ({"offset": "a"}, "offset must be a finite number"),
+        ({"offset_mm": "a"}, "offset_mm must be a finite number"),
     ],
 )
 def test_python_refuses_what_no_map_can_be_of(wrong, said):
