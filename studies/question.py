@@ -133,7 +133,7 @@ class Question:
     def __post_init__(self) -> None:
         if self.ask not in ANSWERS:
             raise InputError(f"Input ask must be one of {', '.join(ANSWERS)}; instead received {self.ask}.")
-        positive("duration", self.duration)
+        positive("duration_s", self.duration)
 
     @property
     def settings(self) -> Point:

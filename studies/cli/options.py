@@ -351,12 +351,14 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
 
 def unknown_study(name: str | None, known: Iterable[str]) -> InputError:
     """The error of a study that is none of those `known`: the one that was meant, or what takes a scene."""
-    names = sorted(known)
-    close = difflib.get_close_matches(name or "", names, n=1)
-    hint = f" Did you mean {close[0]}?" if close else ""
+    names = list(known)
+    hint = ""
     if name and name.endswith(".toml"):
         hint = f" For this scene: spinlev compare {name}, or spinlev study {name} --vary KEY=FIRST:LAST:STEP."
-    return InputError(f"Input name must be a study of spinlev study --list; instead received {name or 'none'}.{hint}")
+    elif close := difflib.get_close_matches(name or "", names, n=1):
+        hint = f" Did you mean {close[0]}?"
+    allowed = "a study of spinlev study --list" if hint else f"one of {', '.join(names)}"
+    return InputError(f"Input name must be {allowed}; instead received {name or 'none'}.{hint}")
 
 
 MOST_VALUES = 100_000  # points of a sweep, at most

@@ -222,7 +222,9 @@ def test_a_wrong_sweep(values, said, tmp_path):
         sl.sweep(HORIZONTAL, values, out=tmp_path)
 
 
-@pytest.mark.parametrize("wrong", [{"spin": "fast"}, {"duration": "long"}, {"duration": -1.0}, {"place": (0.0, 0.0)}])
+@pytest.mark.parametrize(
+    "wrong", [{"spin": "fast"}, {"duration_s": "long"}, {"duration_s": -1.0}, {"place_mm": (0.0, 0.0)}]
+)
 def test_a_sweep_of_wrong_arguments(wrong, tmp_path):
     with pytest.raises(sl.InputError, match=f"Input {next(iter(wrong))} must be"):
         sl.sweep(HORIZONTAL, {"frequency_hz": [110.0]}, out=tmp_path, **wrong)

@@ -67,7 +67,7 @@ def test_what_is_no_pose_is_told(pose, said):
         (lambda: sl.simulate(made(), 1.0, model="dipole"), "spinlev.floater_force gives force and torque"),
         (
             lambda: sl.ensemble(made(DISC), {"position_mm": [[0.0, 0.0, -30.0]]}, 0.1, model="dipole"),
-            "where many fly side by side",
+            "where many are simulated as one batch",
         ),
         (lambda: sl.equilibria(made(DISC), model="dipole", interaction="mutual"), "Choose --interaction rigid"),
         (
