@@ -77,6 +77,11 @@ class Body:
         object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
 
     @property
+    def mirrors(self) -> tuple[int, ...]:
+        """Body axes across which a plane through the centre mirrors it onto itself."""
+        return 0, 1, 2
+
+    @property
     @abstractmethod
     def circumradius(self) -> float:
         """Radius of the smallest sphere about the centre that holds the body, m."""

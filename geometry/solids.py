@@ -56,6 +56,13 @@ class Part(Body):
     def size(self) -> Array:
         return self.extent
 
+    @cached_property
+    def mirrors(self) -> tuple[int, ...]:
+        corners, allowed = self.triangles.reshape(-1, 3), SAME_SHAPE * float(self.extent.max())
+        images = [corners * np.where(np.arange(3) == axis, -1.0, 1.0) for axis in range(3)]
+        home = moved(self, np.zeros(3), np.eye(3))
+        return tuple(axis for axis, image in enumerate(images) if np.abs(home.distance(image)).max() < allowed)
+
     @property
     def circumradius(self) -> float:
         return float(1.001 * np.linalg.norm(self.triangles, axis=2).max())

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ...geometry.common import MU_0, Array, InputError, Watch, unwatched
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Plate, Scene
+from ...geometry.shapes import Box
 from ..cache import TableKind
 from ..rotor.models import Accuracy, AccuracyError, shortened_table
 from ..rotor.table import RotorTable
@@ -78,6 +79,8 @@ def resolve_plate_model(
         error = edge_error(plate, place)
         if error <= rtol:
             return PlateChoice("slab", f"the plate's edges take at most {error:.1e} of its reaction", error)
+        if not isinstance(plate.body, Box):
+            return PlateChoice("reduced", f"edges may take {error:.1e} of an infinite slab's reaction")
         report("Effect of the plate's edges ...")
         rotor = np.mean([magnet.box.center for magnet in scene.rotor], axis=0)
         error = cached_edge_error(plate, np.array([place, rotor]), scene.frequency, report)

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...geometry.common import MU_0, Array, Watch, unwatched
 from ...geometry.meshes.plate import MILLIMETRE, PLANES, ConductorMesh, MeshRule, plate_mesh, skin_depth
 from ...geometry.scene.contents import Plate
+from ...geometry.shapes import Box
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..closed_forms.potentials import HomogeneousField, unit_dipoles
 from ..elements.condensed import require_memory, solve_condensed
@@ -70,7 +71,10 @@ class EddySpace:
         self.region = mesh.Materials(conductors.pattern)
         self.sigma = mesh.MaterialCF(dict(conductors.conductivity), default=0.0)
         self.real = self.elements(complex_valued=False)
-        scalar = ngsolve.comp.IntegrationRuleSpace(mesh, order=order + 2, definedon=self.region)
+        # Exact for twice its order; of tetrahedra the rules of order 8 and less have few points.
+        bricks = mesh[ngsolve.ElementId(ngsolve.VOL, 0)].type == ngsolve.ET.HEX
+        self._rule_order = order + 2 if bricks else min(order + 1, max(order, 4))
+        scalar = ngsolve.comp.IntegrationRuleSpace(mesh, order=self._rule_order, definedon=self.region)
         self._rules = scalar.GetIntegrationRules()
         self._carrier = ngsolve.GridFunction(scalar**3)
         self._carrier.Interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z)), definedon=self.region)
@@ -115,7 +119,7 @@ class EddySpace:
 
     def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> scipy.sparse.csr_matrix:
         """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
-        points = ngsolve.comp.IntegrationRuleSpace(self.conductors.mesh, order=self.order + 2, definedon=self.region)
+        points = ngsolve.comp.IntegrationRuleSpace(self.conductors.mesh, order=self._rule_order, definedon=self.region)
         weights = self.weights / MILLIMETRE**3
         return value_matrix(space, self.sigma * basis, points, self.region, self._rules, weights)
 
@@ -331,7 +335,9 @@ class Ladder:
     ) -> None:
         self.mesh = plate_mesh(plate.body, plate.conductivity, places, frequency, rule)
         cells = int(self.mesh.mesh.ne)
-        orders = [p for p in range(3, HIGHEST_ORDER + 1) if cells * (3 * p * (p + 2) + 2 * p + 1) <= MOST_UNKNOWNS]
+        bricks = isinstance(plate.body, Box)  # else tetrahedra, of which few meet in a face
+        each = {p: 3 * p * (p + 2) + 2 * p + 1 if bricks else p * (p + 2) for p in range(3, HIGHEST_ORDER + 1)}
+        orders = [p for p, unknowns in each.items() if cells * unknowns <= MOST_UNKNOWNS]
         if not orders:
             raise MeshTooLargeError(
                 f"Input mesh must have at most {MOST_UNKNOWNS} unknowns; instead one of {cells} cells has more. Lower "

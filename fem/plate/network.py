@@ -203,8 +203,8 @@ def from_elements(
     def joined(parts: Sequence[Array]) -> list[Array]:
         return [np.concatenate([parts[number] for number in group], axis=1) for group in groups]
 
-    probes = probe_places(region, fold=True)
-    grid = region.grid(grid_counts(region, plate.box.half_edges), fold=True)
+    probes = probe_places(region, plate.body.mirrors)
+    grid = region.grid(grid_counts(region, plate.box.half_edges), plate.body.mirrors)
     driving, testing = (
         [np.concatenate(pair) for pair in zip(space.dipole_couplings(places), space.couplings(more), strict=True)]
         for places, more in ((grid, others.training), (probes, others.probes))

@@ -10,7 +10,7 @@ and floater is not in these sums.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -80,17 +80,19 @@ class Region:
         slack = SYMMETRIC * (self.upper - self.lower)
         return np.asarray(np.all((points >= self.lower - slack) & (points <= self.upper + slack), axis=1))
 
-    def grid(self, counts: tuple[int, int, int], fold: bool = False) -> Array:
-        """Chebyshev-Lobatto grid (n, 3), m, bounds included; folded, only the non-negative half of mirrored axes."""
+    def grid(self, counts: tuple[int, int, int], fold: Sequence[int] = ()) -> Array:
+        """Chebyshev-Lobatto grid (n, 3), m, bounds included; of the mirrored axes in `fold` the non-negative half."""
         axes = []
         for axis, count in enumerate(counts):
             nodes = -np.cos(np.pi * np.arange(count) / (count - 1)) if count > 1 else np.zeros(1)
             line = self.center[axis] + (self.upper - self.lower)[axis] / 2 * nodes
-            keep = line >= -SYMMETRIC * self.upper[axis] if fold and axis in self.mirrors else np.full(count, True)
+            keep = (
+                line >= -SYMMETRIC * self.upper[axis] if axis in fold and axis in self.mirrors else np.full(count, True)
+            )
             axes.append(line[keep])
         return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
 
-    def surface(self, counts: tuple[int, int, int], fold: bool = False) -> Array:
+    def surface(self, counts: tuple[int, int, int], fold: Sequence[int] = ()) -> Array:
         """The points of `grid` that lie on the region's surface."""
         points = self.grid(counts, fold)
         on_face = (points <= self.lower + 1e-12) | (points >= self.upper - 1e-12)

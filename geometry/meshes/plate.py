@@ -1,4 +1,4 @@
-"""Meshes of conductors, above all structured hexahedral ones of boxes on a tensor-product grid."""
+"""Meshes of conductors: hexahedral ones of boxes on a tensor-product grid, curved tetrahedra of any other solid."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from functools import partial
 
 import netgen.meshing as netgen
+import netgen.occ as occ
 import ngsolve
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..common import MU_0, Array, frozen_array
 from ..shapes import Box
-from ..solids import Solid
+from ..solids import Solid, moved
+from .solids import occ_solid
 
 MILLIMETRE = 1e-3  # Length unit of all meshes, m
 PLANES = ("x0", "y0", "z0")  # Boundary names of the mirror planes
@@ -157,26 +159,26 @@ def plate_mesh(
 
     Parameters
     ----------
-    body : the plate; a shape other than a cuboid needs a mesh of its own here
+    body : the plate
     conductivity, frequency : S/m and Hz, of which the skin depth follows
     rule : how fine the mesh is
-    endless : on the same cells, the plate reaches to the end of the air along its two longer edges
+    endless : on the same cells, the plate reaches to the end of the air along its two longer edges: of a cuboid only
 
     Raises
     ------
-    ValueError : the plate is no cuboid, a size is not positive, or a position is not outside the plate
+    ValueError : a size is not positive, or a position is not outside the plate
     """
-    rule, half = rule or MeshRule(), body.half_edges
-    if not isinstance(body, Box):
-        raise ValueError(f"Input body must be a cuboid; instead received a {body.kind}, {body.described_size}.")
+    rule, half, places = rule or MeshRule(), body.half_edges, np.asarray(positions, float).reshape(-1, 3)
     if not np.all(half > 0):
         raise ValueError(f"Input size_m must be positive; instead received {body.size.tolist()}.")
-    places = np.abs(np.asarray(positions, float).reshape(-1, 3))
-    inside = np.all(places <= half, axis=1)
+    inside = moved(body, np.zeros(3), np.eye(3)).distance(places) <= 0
     if inside.any():
         raise ValueError(
             f"Input positions_m must lie outside the plate; instead received {places[inside][0].tolist()} in its frame."
         )
+    if not isinstance(body, Box):
+        return _solid_mesh(body, conductivity, places, skin_depth(conductivity, frequency), rule)
+    places = np.abs(places)
     depth = skin_depth(conductivity, frequency)
     far = rule.reach * 2 * half.max()
     lines = []
@@ -199,3 +201,44 @@ def _cell_size(coordinate: Array, axis: int, half: Array, places: Array, depth: 
     inner = np.minimum(rule.distance_share * distance, edge)
     skin = rule.skin_share * depth + rule.growth * below_face
     return np.asarray(np.where(coordinate <= edge, np.minimum(inner, skin), inner + rule.growth * above_face))
+
+
+# Of tetrahedra: degree at round surfaces, growth over a rule's and at most, and their number in a radius of curvature.
+CURVED, GRADING, STEEPEST, ROUND = 6, 0.25, 0.4, 1.0
+FLAT = 1e-5  # How far from a mirror plane a face on it may reach, mm
+LOOKS = 2  # Meshes whose points ask for the sizes of the next
+
+
+def _solid_mesh(body: Solid, conductivity: float, places: Array, depth: float, rule: MeshRule) -> ConductorMesh:
+    """`plate_mesh` of a solid of any shape in a ball of air, of which planes that mirror it leave a part."""
+    at_home = moved(body, np.zeros(3), np.eye(3))
+    mirrors, solid = body.mirrors, occ_solid(at_home, np.zeros(3), MILLIMETRE)
+    far = rule.reach * float(body.size.max()) / MILLIMETRE
+    kept = occ.Box(occ.Pnt(*(0.0 if a in mirrors else -2 * far for a in range(3))), occ.Pnt(2 * far, 2 * far, 2 * far))
+    air = occ.Sphere(occ.Pnt(0, 0, 0), far)
+    air.faces.name = "far"
+    solid, air = solid * kept, air * kept - solid
+    solid.mat("plate")
+    air.mat("air")
+    # a thin body's elements are flat: as wide as its thickness and the edge of a cube of its volume are in the mean
+    solid.maxh = min((body.size.min() * body.volume ** (1 / 3)) ** 0.5, body.half_edges.max()) / MILLIMETRE
+    shape = occ.Glue([solid, air])
+    for face, axis in itertools.product(shape.faces, mirrors):
+        if all(abs(corner[axis]) < FLAT for corner in face.bounding_box):
+            face.name = PLANES[axis]
+    geometry, grading = occ.OCCGeometry(shape), min(GRADING * rule.growth, STEEPEST)
+    sizes = netgen.MeshingParameters(maxh=far, grading=grading, curvaturesafety=ROUND, parallel_meshing=False)
+    mesh = geometry.GenerateMesh(sizes)
+    for _ in range(LOOKS):
+        points = np.array([list(point.p) for point in mesh.Points()]) * MILLIMETRE
+        below = -at_home.distance(points)
+        inner, below = points[below > -FLAT * MILLIMETRE], below[below > -FLAT * MILLIMETRE]
+        away = np.array([np.linalg.norm(places - point, axis=1).min(initial=np.inf) for point in inner])
+        wanted = np.minimum(rule.distance_share * away, rule.skin_share * depth + rule.growth * below)
+        for point, size in zip(inner, wanted, strict=True):
+            if np.isfinite(size):
+                sizes.RestrictH(*(point / MILLIMETRE).tolist(), float(size) / MILLIMETRE)
+        mesh = geometry.GenerateMesh(sizes)
+    found = ngsolve.Mesh(mesh)
+    found.Curve(CURVED)
+    return ConductorMesh(found, {"plate": conductivity}, mirrors)

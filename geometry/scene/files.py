@@ -306,12 +306,13 @@ def scene_digest(scene: Scene) -> str:
 
     Comments do not count. Of a file that was read with the scene it is the content that was read.
     """
-    keys, rotor = canonical_keys(scene), [magnet.body for magnet in scene.rotor]
-    contents = {str(body.file): str(body.shape_numbers) for body in rotor if isinstance(body, Part)}
+    keys, bodies = canonical_keys(scene), [thing.body for thing in (*scene.rotor, scene.plate) if thing]
+    contents = {str(body.file): str(body.shape_numbers) for body in bodies if isinstance(body, Part)}
     contents |= {path: digest for path, digest in scene.files if digest}
     keys["rotor"]["field_map"] = map_digest(scene)
-    for magnet in keys["rotor"].get("magnets", ()):
-        magnet["file"] = contents.get(magnet["file"])
+    for table in (*keys["rotor"].get("magnets", ()), keys["plate"] or {}):
+        if "file" in table:
+            table["file"] = contents.get(table["file"])
     return hashlib.sha256(json.dumps(keys, sort_keys=True).encode()).hexdigest()
 
 

@@ -16,7 +16,7 @@ from ..files import regular_file
 from ..step_file import read_part
 from .contents import Scene
 from .messages import SceneError, described_faults, overlap_faults
-from .schema import AnyRotor, ExplicitRotor, SceneTable, key_faults
+from .schema import OF_MAP, OF_PLATE, ExplicitRotor, SceneTable, key_faults
 
 LARGEST = 2**30  # Bytes of a file that a scene may name
 MOST_BODIES = 64  # Magnets and conductors of a scene beside a known one, unless that has more
@@ -50,11 +50,11 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     if faults:
         raise SceneError(source, faults)
     try:
-        paths = _named_files(rotor, Path(source).parent if folder is None else folder, known)
-        field_map, of_magnets = paths.get(-1), {k: path for k, path in paths.items() if k >= 0}
+        paths = _named_files(table, Path(source).parent if folder is None else folder, known)
+        field_map, of_bodies = paths.get(OF_MAP), {k: path for k, path in paths.items() if k != OF_MAP}
         read = {part.file: part for part in known.parts} if known else {}
-        parts = {path: read.get(path) or read_part(path) for path in of_magnets.values()}
-        scene = table.scene({k: parts[path] for k, path in of_magnets.items()}, field_map)
+        parts = {path: read.get(path) or read_part(path) for path in of_bodies.values()}
+        scene = table.scene({k: parts[path] for k, path in of_bodies.items()}, field_map)
         files = {str(path): content_digest(path) for path in paths.values()} if known is None else dict(known.files)
     except InputError as error:  # a file
         raise SceneError(source, [str(error)]) from None
@@ -63,8 +63,8 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         raise SceneError(source, faults)
     own = copy.deepcopy(dict(keys))
     own["rotor"].update({"field_map": str(field_map)} if field_map else {})
-    for k, path in of_magnets.items():
-        own["rotor"]["magnets"][k]["file"] = str(path)
+    for k, path in of_bodies.items():
+        (own["plate"] if k == OF_PLATE else own["rotor"]["magnets"][k])["file"] = str(path)
     scene = replace(scene, files=tuple(files.items()), parts=tuple(parts.values()))
     return replace(scene, keys=(own, scene))
 
@@ -86,24 +86,25 @@ def _digest(path: Path, state: tuple[int, ...]) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _named_files(rotor: AnyRotor, folder: Path, known: Scene | None) -> dict[int, Path]:
-    """The files that a rotor names: those of magnets by their number, that of its map by -1.
+def _named_files(table: SceneTable, folder: Path, known: Scene | None) -> dict[int, Path]:
+    """The files that a scene names: of magnets by their number, of its map and plate by `OF_MAP` and `OF_PLATE`.
 
     Beside a known scene a name means one of its files, which is `folder / name` or ends so. No disk is asked.
     """
-    names = {-1: rotor.field_map}
+    rotor = table.rotor
+    names = {OF_MAP: rotor.field_map, OF_PLATE: table.plate.file if table.plate else None}
     if isinstance(rotor, ExplicitRotor):
         names |= {k: magnet.file for k, magnet in enumerate(rotor.magnets)}
     found = {k: folder / name for k, name in names.items() if name}
     for k, path in found.items() if known else ():
         assert known is not None
-        name, own = str(names[k]), [known.field_map] if k < 0 else [part.file for part in known.parts]
+        name, own = str(names[k]), [known.field_map] if k == OF_MAP else [part.file for part in known.parts]
         end = Path(name).parts
         alike = [file for file in own if file and (file == path or file.parts[-len(end) :] == end)]
         if not alike:
-            key = "field_map" if k < 0 else f"magnets[{k}].file"
+            key = {OF_MAP: "rotor.field_map", OF_PLATE: "plate.file"}.get(k, f"rotor.magnets[{k}].file")
             raise InputError(
-                f"Input rotor.{key} must be a file of the scene that was opened first; instead received "
+                f"Input {key} must be a file of the scene that was opened first; instead received "
                 f"{shown(name)}. Give the scene to the command line."
             )
         found[k] = path if path in alike else alike[0]
@@ -220,21 +221,28 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
 
 
 @spelled
-def plate(*, size_mm: Sequence[float], center_mm: Sequence[float], conductivity_S_m: float, **more: Any) -> Table:
+def plate(
+    *, center_mm: Sequence[float], conductivity_S_m: float, size_mm: Sequence[float] | None = None, **more: Any
+) -> Table:
     """A conducting plate.
 
     Parameters
     ----------
-    size_mm, center_mm : sequence of 3 floats
-        Edges, and centre in the laboratory frame, mm.
+    center_mm : sequence of 3 floats
+        Centre in the laboratory frame, mm.
     conductivity_S_m : float
         S/m.
-    **more : list or dict
-        Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}.
+    size_mm : sequence of 3 floats, optional
+        Edges of a cuboid, mm; left out for another shape.
+    **more : list, dict or text
+        Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}; in place of
+        size_mm shape "disc" with diameter_mm and height_mm, "ring" with inner_diameter_mm beside, "sphere" with
+        diameter_mm, or "file" with the name of a STEP file as file.
 
     Returns
     -------
     dict
         The table `[plate]` of a scene file.
     """
-    return {"size_mm": size_mm, "center_mm": center_mm, "conductivity_S_m": conductivity_S_m, **more}
+    size = {} if size_mm is None else {"size_mm": size_mm}
+    return {**size, "center_mm": center_mm, "conductivity_S_m": conductivity_S_m, **more}

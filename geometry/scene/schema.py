@@ -17,6 +17,7 @@ from .contents import AbsoluteStart, Drag, DriveStep, Floater, Lowering, MapRead
 
 MILLI = 1e-3
 ORIGIN = (0.0, 0.0, 0.0)
+OF_MAP, OF_PLATE = -1, -2  # Numbers of named files that are no magnet's
 
 
 def _zero_or(least: float) -> AfterValidator:
@@ -63,6 +64,7 @@ SIZES: dict[str, tuple[str, ...]] = {
     "cube": ("edge_mm",),
     "ring": ("diameter_mm", "inner_diameter_mm", "height_mm"),
     "cylinder": ("diameter_mm", "height_mm"),
+    "disc": ("diameter_mm", "height_mm"),
     "sphere": ("diameter_mm",),
 }
 SIZE_KEYS = tuple(dict.fromkeys(key for keys in SIZES.values() for key in keys))
@@ -81,10 +83,16 @@ def solid_of(table: Table) -> Solid:
     shape, radius = given.get("shape", "cuboid"), (given.get("diameter_mm") or 0.0) * MILLI / 2
     if shape == "sphere":
         return Sphere(radius, *pose)
-    if shape in ("cylinder", "ring"):
+    if shape in ("cylinder", "disc", "ring"):
         hole = (given.get("inner_diameter_mm") or 0.0) * MILLI / 2
         return Cylinder(radius, given["height_mm"] * MILLI, *pose, inner_radius=hole)
     return Box(np.array([given["edge_mm"]] * 3 if shape == "cube" else given["size_mm"]) * MILLI, *pose)
+
+
+def placed_part(part: Part, center_mm: list[float], rotation_deg: list[float]) -> Part:
+    """The solid of a file with the file's origin in a place, turned about it."""
+    turn = rotation_matrix(rotation_deg)
+    return replace(part, center=MILLI * np.array(center_mm) - turn @ part.origin, rotation=turn)
 
 
 class _Placed(Table):
@@ -127,10 +135,9 @@ class MagnetTable(_Placed):
         polarization = np.array(self.polarization_T)
         if part is None:
             return Magnet(solid_of(self), polarization, *material)
-        turn = rotation_matrix(self.rotation_deg)
-        part = replace(part, center=MILLI * np.array(self.center_mm) - turn @ part.origin, rotation=turn)
+        part = placed_part(part, self.center_mm, self.rotation_deg)
         body = known_shape(part) or part
-        return Magnet(body, polarization if body is part else body.rotation.T @ turn @ polarization, *material)
+        return Magnet(body, polarization if body is part else body.rotation.T @ part.rotation @ polarization, *material)
 
 
 class AnyRotor(Table):
@@ -226,19 +233,22 @@ class LoweringTable(Table):
     distance_mm: Annotated[NotNegative, Field(le=1e6), _zero_or(1e-6)]
 
 
-class PlateTable(Table):
+class PlateTable(_Placed):
     """The conducting plate."""
 
-    size_mm: Three[Length]
-    center_mm: Three[Coordinate]
-    rotation_deg: Three[Angle] = [0.0, 0.0, 0.0]
+    shape: Literal["cuboid", "disc", "cylinder", "ring", "sphere", "file"] = "cuboid"
+    inner_diameter_mm: Length | None = None
+    file: Name | None = None
     conductivity_S_m: Metal
     lowering: LoweringTable | None = None
 
-    def plate(self) -> Plate:
+    def plate(self, part: Part | None) -> Plate:
         down = self.lowering
         lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-        return Plate(solid_of(self), self.conductivity_S_m, lowering)
+        if part is None:
+            return Plate(solid_of(self), self.conductivity_S_m, lowering)
+        body = placed_part(part, self.center_mm, self.rotation_deg)
+        return Plate(known_shape(body) or body, self.conductivity_S_m, lowering)
 
 
 class DragTable(Table):
@@ -308,14 +318,14 @@ class SceneTable(Table):
     drive: list[DriveTable] | None = None
 
     def scene(self, parts: Mapping[int, Part], field_map: Path | None) -> Scene:
-        """The scene in SI units, its `parts` by the numbers of their magnets."""
+        """The scene in SI units, its `parts` by the numbers of their magnets, the plate's by `OF_PLATE`."""
         rotor, floater = self.rotor, self.floater.floater()
         return Scene(
             frequency=self.frequency_hz,
             gravity=np.array(self.gravity_m_s2),
             rotor=rotor.in_si(parts),
             floater=floater,
-            plate=self.plate.plate() if self.plate else None,
+            plate=self.plate.plate(parts.get(OF_PLATE)) if self.plate else None,
             drag=(self.drag or DragTable()).drag(floater),
             start=(self.start or StartTable()).start(),
             field_map=field_map,
@@ -367,6 +377,7 @@ def key_faults(table: SceneTable) -> list[str]:
     for k, conductor in enumerate(rotor.conductors):
         faults += _shape_faults(f"rotor.conductors[{k}]", conductor)
     faults += _shape_faults("floater", floater)
+    faults += _shape_faults("plate", table.plate) if table.plate else []
     if floater.shape != "sphere" and floater.conductivity_S_m is not None:
         faults.append(
             "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
@@ -406,8 +417,11 @@ def _start_faults(start: StartTable) -> list[str]:
 def _shape_faults(place: str, table: Any) -> list[str]:
     """Faults of the sizes of a shape at a place of the scene file."""
     given = [key for key in SIZE_KEYS if getattr(table, key, None) is not None]
-    if getattr(table, "file", None):
-        if table.shape != "cuboid":
+    file = getattr(table, "file", None)
+    if table.shape == "file" and not file:
+        return [f"Input {place}.file must be given, as the shape is 'file'; instead it is missing."]
+    if file:
+        if table.shape not in ("cuboid", "file"):
             return [f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."]
         sizes = " and ".join(given)
         return [f"Input {place} must have no size beside file; instead received {sizes}."] if given else []

@@ -41,7 +41,7 @@ ROTORS = [rotor_table(r, "cuboid") for r in (horizontal(0.002, 0.01, 1.3, 1.0), 
 
 @pytest.fixture(scope="module")
 def space():
-    mesh = plate_mesh(PLATE.body, PLATE.conductivity, REGION.grid((2, 2, 2), fold=True), 250.0, RULE)
+    mesh = plate_mesh(PLATE.body, PLATE.conductivity, REGION.grid((2, 2, 2), fold=(0, 1, 2)), 250.0, RULE)
     return EddySpace(mesh, 2)
 
 
@@ -69,7 +69,7 @@ def test_what_residuals_bound_is_no_larger(space, frequency):
     probes = REGION.lower + (REGION.upper - REGION.lower) * np.random.default_rng(1).random((3, 3))
     exact = solve_eddy(space.conductors, 2, frequency, unit_dipoles(probes), space).couplings
     for allowed in (1e-2, 1e-4):
-        grid = REGION.grid((3, 3, 3), fold=True)
+        grid = REGION.grid((3, 3, 3), fold=(0, 1, 2))
         made, worst, *_ = train(space, grid, probes, OtherSources(), FREQUENCIES, allowed)
         found = space_couplings(made.dipole_couplings(probes), made.inductances, 2j * np.pi * frequency)
         blocks = [np.einsum("iaib->iab", c.reshape(3, 3, 3, 3)) for c in (found, exact)]
@@ -85,7 +85,7 @@ def test_the_bound_for_a_rotor_that_was_not_trained_holds(solution, rotor):
     probes = turning_rotor(PLATE, rotor).probes
     stated = error_of(solution, probes)
     places = solution.probes[solution.boxes[0].contains(solution.probes)]
-    corners = np.concatenate([box.grid((2, 2, 2), fold=True) for box in solution.boxes])
+    corners = np.concatenate([box.grid((2, 2, 2), fold=(0, 1, 2)) for box in solution.boxes])
     mesh = plate_mesh(PLATE.body, PLATE.conductivity, corners, 250.0, RULE)
     response = solve_eddy(mesh, solution.space.order, 250.0, probes)
     exact = response.couplings_to(unit_dipoles(places)).T
@@ -166,7 +166,9 @@ def test_a_solution_survives_the_disk(solution, tmp_path):
 
 def test_a_tolerance_that_a_mesh_misses_is_named_as_the_user_gave_it():
     """`--plate-rtol` is what was given, not `rtol`, and a mesh rule says nothing to whom did not choose one."""
-    ladder = Ladder(PLATE, REGION.grid((2, 2, 2), fold=True), FREQUENCIES[1], RULE, MESH_SHARE * 1e-5, growing=True)
+    ladder = Ladder(
+        PLATE, REGION.grid((2, 2, 2), fold=(0, 1, 2)), FREQUENCIES[1], RULE, MESH_SHARE * 1e-5, growing=True
+    )
     ladder.order, ladder.errors = ladder.highest, np.array([6e-3])
     with pytest.raises(AccuracyError) as refused:
         ladder.refuse()

@@ -135,7 +135,7 @@ def test_finite_elements_step_by_step_have_the_same_memory():
         return np.array([8e-2 * np.cos(80 * t), 0, 2.5e-3 * bounce * np.cos(bounce * t) + 0.02])
 
     _, dense = flight(table, place, speed, moment, lambda t: np.array([0, 0, omega]), turns / 100)
-    mesh = plate_mesh(PLATE.body, PLATE.conductivity, REGION.grid((2, 2, 2), fold=True), 250.0, MeshRule())
+    mesh = plate_mesh(PLATE.body, PLATE.conductivity, REGION.grid((2, 2, 2), fold=(0, 1, 2)), 250.0, MeshRule())
     space = EddySpace(mesh, solution.space.order)
     stepper = TimeStepper(space, step)
 

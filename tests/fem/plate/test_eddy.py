@@ -152,7 +152,7 @@ def test_parity_parts_add_up():
         (lambda m: ConductorMesh(m.mesh, {"copper": 1.0}), "Input conductivity must name one of"),
         (lambda m: plate_mesh(Box(SIZE), SIGMA, [(0, 0, 0.01)], 50.0), "Input positions_m must lie outside the plate"),
         (lambda m: plate_mesh(Box((0.1, 0.0, 1)), SIGMA, PLACES, 50.0), "Input size_m must be positive"),
-        (lambda m: plate_mesh(Cylinder(0.1, 0.01), SIGMA, PLACES, 50.0), "Input body must be a cuboid"),
+        (lambda m: plate_mesh(Cylinder(0.1, 0.08), SIGMA, PLACES, 50.0), "must lie outside the plate"),
     ],
 )
 def test_bad_input_is_named(coarse, call, message):

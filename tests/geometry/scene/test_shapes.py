@@ -1,9 +1,12 @@
 """Magnets of other shapes than the cuboid in the scene file: what they are, what is written, what is wrong."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from article import BALL
 
+from spinlev.geometry.meshes.solids import solid_of, step_text
 from spinlev.geometry.scene.files import parse_scene, scene, scene_text
 from spinlev.geometry.scene.making import magnets, tilt, vertical
 from spinlev.geometry.scene.messages import SceneError
@@ -114,3 +117,26 @@ def test_what_lies_in_the_hole_of_a_ring_does_not_overlap_it():
     assert len(of(PLACED | RING, PLACED | rod).rotor) == 2  # it touches all round
     with pytest.raises(SceneError, match=r"overlap by 0\.05 mm"):
         of(PLACED | RING, PLACED | rod | {"center_mm": [0.05, 0.0, 0.0]})
+
+
+PLATE = {"center_mm": [1.0, -2.0, -45.0], "rotation_deg": [0.0, 0.0, 20.0], "conductivity_S_m": 3.5e7}
+
+
+@pytest.mark.parametrize("shape", [DISC | {"shape": "disc"}, RING, {"shape": "sphere", "diameter_mm": 30.0}])
+def test_plates_of_other_shapes_are_read_and_written(shape):
+    made = scene(frequency_hz=100.0, rotor=magnets(PLACED | DISC), floater=BALL, plate=PLATE | shape)
+    written = replace(made, plate=replace(made.plate, conductivity=1e7))
+    assert repr(parse_scene(scene_text(written)).plate.body) == repr(made.plate.body)
+    size = [shape["diameter_mm"]] * 2 + [shape.get("height_mm", 30.0)]
+    assert made.plate.box.size == pytest.approx(1e-3 * np.array(size))
+
+
+def test_a_plate_from_a_file_is_the_shape_it_has(tmp_path):
+    step = step_text(solid_of(Cylinder(0.04, 0.006)))
+    (tmp_path / "disc.step").write_text(step)
+    table = PLATE | {"shape": "file", "file": str(tmp_path / "disc.step")}
+    body = scene(frequency_hz=100.0, rotor=magnets(PLACED | DISC), floater=BALL, plate=table).plate.body
+    assert isinstance(body, Cylinder)
+    assert (body.radius, body.height) == pytest.approx((0.04, 0.006))
+    with pytest.raises(SceneError, match=r"plate\.file must be given"):
+        scene(frequency_hz=100.0, rotor=magnets(PLACED | DISC), floater=BALL, plate=PLATE | {"shape": "file"})
