@@ -1,0 +1,120 @@
+"""How far a rotor can be turned down and up until its floater is lost, against the stable equilibria."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ...dynamics.continuation.frequencies import at_frequency, kicked
+from ...dynamics.flights.flight import simulate
+from ...geometry.scene.contents import DriveStep
+from ..figures.style import PALETTE
+from ..result import Columns
+from ..study import Point, Study, each_case, recorded
+from ..words import ENDS
+from . import article, showing
+
+RATES = (2.0, 8.0)  # Hz/s; a motor is turned by hand or by a program as slowly as that
+INSIDE, BELOW, ABOVE = 10.0, 10.0, 60.0  # Where a ramp begins inside the stable range, and ends beyond it, Hz
+KICK = 1e-3  # Velocity upwards at the start, m/s: an axial mode of some hundredths of a millimetre
+WAYS = ("down", "up")
+COLUMNS: Columns = {
+    "lowest": ((), "Hz", "lowest stable frequency, at steady frequencies"),
+    "highest": ((), "Hz", "highest stable frequency, at steady frequencies"),
+    "low_kind": ((), "", "what is at the lowest"),
+    "high_kind": ((), "", "what is at the highest"),
+    "lost_at": (("way", "rate"), "Hz", "frequency at which the floater was lost"),
+    "ended_by": (("way", "rate"), "", "what ended the trajectory"),
+    "motor_work": (("way", "rate"), "J", "work of the motor until then"),
+}
+
+
+def ramp_points(quick: bool) -> list[Point]:
+    """The twelve rotors that levitated; `quick` by point dipoles without losses, else with every effect."""
+    return [{**rotor, "model": "dipole" if quick else "fem"} for rotor in article.levitated_rotors(False)]
+
+
+def ramps(point: Point) -> xr.Dataset:
+    """Frequencies at which the floater of one rotor is lost, over the `way` and the `rate` of the ramp (Hz/s)."""
+    bare = article.rotor_scene(point["configuration"], point["measure"], drag=False)
+    alone = article.levitation_of(bare, point["model"], interaction="rigid" if point["model"] == "dipole" else "mutual")
+    whole = alone if point["model"] == "dipole" else alone.elsewhere(**article.losses(bare))
+    stable = article.stable_frequencies(bare, alone.rates)
+    low, high = stable.low.parameter, stable.high.parameter
+    inside = min(INSIDE, (high - low) / 3)
+    lost, ended, work = np.full((2, len(RATES)), np.nan), np.full((2, len(RATES)), "", "U8"), np.zeros((2, len(RATES)))
+    for way, begin, end in ((0, low + inside, low - BELOW), (1, high - inside, high + ABOVE)):
+        start = at_frequency(bare, alone.rates, stable.near(begin), begin)
+        for k, rate in enumerate(RATES):
+            seconds = abs(end - begin) / rate
+            scene = replace(kicked(whole.scene, start, KICK), drive=(DriveStep(end, seconds),))
+            flight = simulate(scene, whole.interaction, seconds)
+            assert flight.given is not None
+            lost[way, k] = np.nan if flight.lost_at_hz is None else flight.lost_at_hz
+            ended[way, k], work[way, k] = flight.ended_by, flight.given[-1, 1]
+    found = low, high, stable.low.kind, stable.high.kind, lost, ended, work
+    return recorded(point, COLUMNS, found, {"way": list(WAYS), "rate": ("rate", list(RATES), {"units": "Hz/s"})})
+
+
+@showing.drawn
+def ramps_figure(result: xr.Dataset) -> Figure:
+    """The stable range of each rotor as a bar, and where its floater is lost on the way down and up."""
+    figure, rows = showing.configuration_panels(result, 3.4, ylabel="frequency of the rotor (Hz)")
+    for axes, configuration, part in rows:
+        places = showing.rotor_places(axes, configuration, part)
+        span = (part["highest"] - part["lowest"]).values
+        axes.bar(places, span, 0.5, part["lowest"].values, color="0.85", label="stable at steady frequency")
+        for way, marker in zip(WAYS, "v^", strict=True):
+            for rate, color in zip(result["rate"].values, PALETTE, strict=False):
+                label = f"lost on the way {way}, {rate:g} Hz/s"
+                axes.plot(places, part["lost_at"].sel(way=way, rate=rate), marker, color=color, ms=4, label=label)
+    return figure
+
+
+def ramps_lines(result: xr.Dataset) -> list[str]:
+    """A table, and how far beyond the steady limits floaters are lost."""
+    rates, rows = result["rate"].values, []
+    for label, rotor in showing.by_rotor(result):
+        for one in each_case(rotor):
+            steady = f"{float(one['lowest']):.1f} to {float(one['highest']):.1f} ({ENDS[one['high_kind'].item()]})"
+            lost = [
+                "–" if np.isnan(at) else f"{at:.1f} ({end})"
+                for at, end in zip(one["lost_at"].values.ravel(), one["ended_by"].values.ravel(), strict=True)
+            ]
+            rows.append((label, steady, *lost))
+    head = [f"lost {way}, {rate:g} Hz/s" for way in WAYS for rate in rates]
+    late = (result["lowest"] - result["lost_at"].sel(way="down"), result["lost_at"].sel(way="up") - result["highest"])
+    spans = [[showing.span(beyond.sel(rate=rate).values, ".2g") for rate in rates] for beyond in late]
+    lines = [
+        f"At {rate:g} Hz/s floaters are lost {down} Hz below the lowest and {up} Hz above the highest stable frequency."
+        for rate, down, up in zip(rates, *spans, strict=True)
+    ]
+    return [*showing.text_table(("rotor", "stable (Hz)", *head), rows), *lines]
+
+
+def ramps_numbers(result: xr.Dataset) -> dict[str, Any]:
+    """Each rotor's frequencies as numbers: `ramps`."""
+    found = []
+    for one in each_case(result):
+        steady = {"lowest_stable_hz": float(one["lowest"]), "highest_stable_hz": float(one["highest"])}
+        lost = [
+            {"way": way, "rate_hz_per_s": rate, "lost_at_hz": None if at != at else at}
+            for way in WAYS
+            for rate, at in zip(one["rate"].values.tolist(), one["lost_at"].sel(way=way).values.tolist(), strict=True)
+        ]
+        rotor = {"configuration": one["configuration"].item(), "value": float(one["measure"])}
+        found.append({**rotor, **steady, "lost": lost})
+    return {"ramps": found}
+
+
+STUDY = Study(
+    name="ramps",
+    summary="how far a rotor can be turned down and up until its floater is lost",
+    points=ramp_points,
+    compute=ramps,
+    figures={"ramps": ramps_figure},
+    report=ramps_lines,
+    numbers=ramps_numbers,
+)
