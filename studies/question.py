@@ -257,8 +257,11 @@ def _beside(levitation: Levitation, dipoles: Sequence[Levitation]) -> dict[str, 
 def _flight(question: Question, levitation: Levitation) -> xr.Dataset:
     flight = levitation.flight(question.duration)
     height, memory = flight.lab.position[:, 2], levitation.flight_plate
+    lost = math.nan if flight.lost_at_hz is None else flight.lost_at_hz
+    of_drive = {"lost_at": variable((), lost, "Hz", "frequency at the loss")} if flight.given is not None else {}
     return xr.Dataset(
         {
+            **of_drive,
             "levitated": variable((), flight.levitated_s, "s", "levitation time"),
             "ended_by": ((), flight.ended_by),
             "kind": ((), kind_of_flight(levitation, flight)),

@@ -42,7 +42,7 @@ BESIDE = {"dipole": "-.", "true_moment": ":"}  # lines of the dipoles beside a s
 NO_GROWTH = 1e-9  # Growth that counts as none, 1/s
 QUANTITIES = {
     "equilibria": ("depth", "lateral_offset", "polar_angle", "growth"),
-    "flight": ("levitated", "height_spread"),
+    "flight": ("levitated", "height_spread", "lost_at"),
     "field": ("across", "along", "B_error"),
 }  # Quantities drawn for each question, those of the motion in the laboratory
 

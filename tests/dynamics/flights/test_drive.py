@@ -7,12 +7,14 @@ import pytest
 from article import FLOATER, MAGNETS, NO_DRAG
 from scipy.integrate import quad, solve_ivp
 
+from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.batch import simulate_together
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
+from spinlev.dynamics.flights.live import LiveFlight
 from spinlev.dynamics.motion.state import turned_about_z
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MAGNET_CONDUCTIVITY
-from spinlev.geometry.scene.contents import Drag, DriveStep, Scene
+from spinlev.geometry.scene.contents import Drag, DriveStep, OffsetStart, Scene
 
 TABLE = rotor_table(MAGNETS, "dipole")
 STEPS = DriveStep(100.0, 0.05), DriveStep(None, 0.02), DriveStep(140.0, 0.03)
@@ -128,6 +130,18 @@ def test_side_by_side_as_one_by_one():
         assert len(one.time) == len(alone.time)
         np.testing.assert_allclose(one.lab.position, alone.lab.position, atol=1e-10)
         np.testing.assert_allclose(one.given, alone.given, rtol=1e-6, atol=1e-6 * np.abs(alone.given).max())
+
+
+def test_a_live_motion_follows_the_drive():
+    """Piece by piece as in one; put elsewhere, the floater turns as fast as the rotor does then."""
+    scene = replace(STEADY, drive=STEPS, start=OffsetStart(np.zeros(3)))
+    live = LiveFlight(scene, TABLE, find_equilibria(scene, TABLE))
+    pieces = [live.onward(0.03) for _ in range(3)]
+    whole = simulate(scene, TABLE, 0.09)
+    assert pieces[-1].angle == pytest.approx(float(scene.angle(0.09)))
+    np.testing.assert_allclose(pieces[-1].lab.position[-1], whole.lab.position[-1], atol=1e-9)
+    live.put(np.array([1e-3, 0.0, -19e-3]))
+    np.testing.assert_allclose(live.now.velocity, np.cross([0.0, 0.0, scene.rate(0.09)], live.now.position), atol=1e-9)
 
 
 def test_begins_at_the_equilibrium_of_the_first_frequency():

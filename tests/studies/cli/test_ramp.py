@@ -13,7 +13,7 @@ from spinlev.geometry.scene.contents import DriveStep, OffsetStart, Plate
 from spinlev.geometry.scene.files import scene_text
 from spinlev.geometry.shapes import Box
 from spinlev.studies.cli.options import Models
-from spinlev.studies.interface import simulate
+from spinlev.studies.interface import simulate, sweep
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.result import Result
 
@@ -88,6 +88,15 @@ def test_a_plate_in_the_way_after_the_ramp():
     with pytest.raises(InputError, match=r"Input plate.center_mm must leave room .* where it levitates at 95 Hz"):
         Levitation(scene, DIPOLE).flight(1.0)
     Levitation(replace(scene, drive=(DriveStep(109.0, 0.01),)), DIPOLE).flight(0.02)
+
+
+def test_sweeps_vary_a_drive():
+    """Faster past the fold, later lost; three trajectories side by side."""
+    scene = replace(SCENE, frequency=92.0, drive=(DriveStep(82.0, 0.5),))
+    found = sweep(scene, {"drive.0.in_s": [0.5, 1.0, 2.0]}, "flight", "dipole", "none", duration=2.0)
+    assert found["ended_by"].values.tolist() == ["lost"] * 3
+    assert (np.diff(found["lost_at"].values) > 0.1).all()
+    assert found["lost_at"].attrs["units"] == "Hz"
 
 
 def test_python_takes_steps():
