@@ -93,7 +93,7 @@ def test_a_plate_in_the_way_after_the_ramp():
 def test_sweeps_vary_a_drive():
     """Faster past the fold, later lost; three trajectories side by side."""
     scene = replace(SCENE, frequency=92.0, drive=(DriveStep(82.0, 0.5),))
-    found = sweep(scene, {"drive.0.in_s": [0.5, 1.0, 2.0]}, "flight", "dipole", "none", duration=2.0)
+    found = sweep(scene, {"drive.0.in_s": [0.5, 1.0, 2.0]}, "flight", "dipole", "none", duration_s=2.0)
     assert found["ended_by"].values.tolist() == ["lost"] * 3
     assert (np.diff(found["lost_at"].values) > 0.1).all()
     assert found["lost_at"].attrs["units"] == "Hz"
