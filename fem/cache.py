@@ -13,6 +13,7 @@ import stat
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass, fields, is_dataclass
 from errno import ENOLCK, ENOSYS, EOPNOTSUPP
 from functools import cache
@@ -60,6 +61,23 @@ Table = TypeVar("Table")
 
 class TableFileError(InputError):
     """A table file that is damaged, or is not one."""
+
+
+class NotKeptError(InputError):
+    """A table that is not in the cache, where none may be made."""
+
+
+_kept_only = ContextVar("kept_only", default=False)
+
+
+@contextmanager
+def kept_only() -> Iterator[None]:
+    """Inside, a table that is not in the cache raises NotKeptError instead of being made: for who cannot wait."""
+    token = _kept_only.set(True)
+    try:
+        yield
+    finally:
+        _kept_only.reset(token)
 
 
 @cache
@@ -172,7 +190,7 @@ class TableKind(Generic[Table]):
         A damaged entry, or one that was kept under another key, is reported, computed anew and replaced; a cache that
         cannot be written is reported and does no harm.  While one process makes a table, others that need the same one
         wait for it.  All tables in its folder together keep `cache_limit` and `most`; what was not used for the longest
-        time makes room. Raises InputError: SPINLEV_CACHE_GB is no positive number.
+        time makes room. Raises InputError: SPINLEV_CACHE_GB is no positive number; NotKeptError: inside `kept_only`.
         """
         key, limit = self.key(*inputs), min(self.most or 2**63, cache_limit())
         path = cache_folder() / (self.name if self.most else "") / f"{self.name}-{key}.nc"
@@ -186,6 +204,8 @@ class TableKind(Generic[Table]):
                     with suppress(OSError):  # of a cache that cannot be written
                         os.utime(path)
                     return found, True
+            if _kept_only.get():
+                raise NotKeptError(f"The table {path.name} is not in the cache.")
             table = make()
             try:
                 self.save(table, path, key)

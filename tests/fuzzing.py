@@ -633,7 +633,7 @@ HEADERS = ["Host: evil.example", "Host: 127.0.0.1:x", "Host: [::1", "Host:", "Or
            "Range: bytes=5-1", "If-None-Match: \xff", f"X: {'y' * 60_000}",
            "Accept-Encoding: gzip;q=x", "X-Forwarded-For: ::x", "\x00: \x00", " folded"]  # fmt: skip
 METHODS = ["GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "get", "", "X" * 3000, "PRI"]
-PATHS = ["/", "/ws", "/page.js", "/plotly.js", "/static/js/../x", "//", "*", "http://x/",
+PATHS = ["/", "/ws", "/page.js", "/page.html", "/static/js/../x", "//", "*", "http://x/",
          "/%2e%2e/etc/passwd", "/autoload.js", "/metadata", "/\xff", "/%ff", "/%", ""]  # fmt: skip
 
 

@@ -51,7 +51,7 @@ codecs.register_error(READABLE, _readable)
 EXTRAS = {
     "view": ("pyvista", "vtkmodules", "imageio", "trame_vtk"),
     "studies": ("skfem", "magpylib", "dynesty", "jinja2"),
-    "explore": ("plotly", "tornado"),
+    "explore": ("tornado",),
     "cluster": ("distributed", "dask"),
 }
 FORTRAN, DRAWING = "libraries of Fortran", "3-D pictures"

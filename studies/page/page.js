@@ -1,8 +1,11 @@
 // What a page shows and sends: messages come over a line as {name: value}, each shown by the function of its name in
 // `show`; what its reader does goes back as [verb, value, ...].
 (() => {
-  const COLORS = { none: "#ffffff", unstable: "#d8dee9", stable: "#56b4e9", here: "#d55e00", curve: "#0072b2", ink: "#2e3440" };
-  const FRAME = 1000 / 12;  // between two pictures of a flight, ms
+  const COLORS = { stable: "#56b4e9", dipole: "#6b7689", north: "#d55e00", curve: "#0072b2", ink: "#2e3440", ball: "#9aa5b1", line: "#5e81ac" };
+  const FRAME = 1000 / 20;  // between two pictures, ms
+  const TURN = 6;  // of the rotor at rest, s
+  const SILENCE = 1500;  // after which a computation is said to go on, ms
+  const VIRIDIS = ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"];  // of |B| by decades
   const at = id => document.getElementById(id);
   const line = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/ws${location.search}`);
   const send = (...words) => line.readyState === WebSocket.OPEN && line.send(JSON.stringify(words));
@@ -67,14 +70,17 @@
   const map = new Chart("map", 420, 300, "Frequency (Hz)", "");
   const side = new Chart("side", 348, 378, "x (mm)", "z (mm)");
   const running = { height: new Chart("height", 420, 150, "Time (s)", "Height (mm)"), tilt: new Chart("tilt", 420, 150, "Time (s)", "Polar angle (°)") };
-  const regions = grow(map.plane, "image", { preserveAspectRatio: "none" });
-  const here = grow(map.plane, "circle", { r: 6, fill: COLORS.here, stroke: "white" });
+  const stable = grow(map.plane, "path", { fill: COLORS.stable });
+  const border = grow(map.plane, "path", { fill: "none", stroke: COLORS.dipole, "stroke-width": 1.8 });
+  const article = grow(map.svg, "g"), here = grow(map.svg, "circle", { r: 6, fill: COLORS.north, stroke: "white" });
+  const slice = grow(side.plane, "image", { preserveAspectRatio: "none", opacity: 0.6 });
   const bodies = grow(side.plane, "g"), crosses = grow(side.plane, "path", { stroke: COLORS.ink, "stroke-width": 2 });
-  const ball = grow(side.plane, "circle", { id: "ball", fill: "#9aa5b1", "fill-opacity": 0.6, stroke: COLORS.here });
+  const ball = grow(side.plane, "circle", { id: "ball", class: "ball", fill: COLORS.ball, "fill-opacity": 0.75, stroke: COLORS.north });
   const curves = Object.fromEntries(Object.entries(running).map(([key, chart]) =>
     [key, grow(chart.plane, "path", { fill: "none", stroke: COLORS.curve, "stroke-width": 1.5 })]));
-  let point = [0, 0], places = [], ghost = null, drawn = null, held = false, samples = [[], [], []], playing = false, asked = false, last = 0;
-  let pose = { position: [0, 0, -20], moment: [0, 0, 1], seen: [0, 0, -20], angle: 0 };
+  let point = [0, 0], places = [], ghost = null, drawn = null, field = null, held = false, samples = [[], [], []];
+  let playing = false, asked = false, last = 0, pending = 0;  // `last`, `pending`: since when a piece or the answer is waited for
+  let pose = { position: [0, 0, -20], moment: [0, 0, 1], seen: [0, 0, -20], angle: 0, plate: 0 };
 
   const drawHere = () => { here.setAttribute("cx", map.px(point[0])); here.setAttribute("cy", map.py(point[1])); };
   const drawBall = ([x, , z]) => {
@@ -86,24 +92,35 @@
   };
   const drawSide = () => {
     bodies.replaceChildren();
-    for (const { at: corners, faces, color, opacity } of [...drawn.turning, ...drawn.fixed]) {
+    const sunk = drawn.fixed.map(body => ({ ...body, at: body.at.map(([x, y, z]) => [x, y, z - pose.plate]) }));
+    for (const { at: corners, faces, color, opacity } of [...drawn.turning, ...sunk]) {
       const flat = faces.map(face => face.map(k => [corners[k][0], corners[k][2]]))
         .map(([a, b, c]) => (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0]) ? [a, c, b] : [a, b, c]);  // else front and back are a hole
       grow(bodies, "path", { d: flat.map(face => `${side.path(face)}Z`).join(""), fill: color, stroke: color, "stroke-width": 0.5, opacity });
     }
-    if (ghost) grow(bodies, "circle", { cx: side.px(ghost[0]), cy: side.py(ghost[2]), r: side.px(drawn.radius) - side.px(0), fill: "none", stroke: "#6b7689", "stroke-dasharray": "4 3" });
+    for (const [[x, , z], [u, , w]] of drawn.arrows) {
+      const head = [[1, 0], [0.45, 0.2], [0.45, 0.07], [-1, 0.07], [-1, -0.07], [0.45, -0.07], [0.45, -0.2]];
+      grow(bodies, "path", { d: `${side.path(head.map(([a, b]) => [x + a * u - b * w, z + a * w + b * u]))}Z`, fill: COLORS.north });
+    }
+    const [from, to] = [[0, side.y[0]], [0, side.y[1]]].map(([x, z]) => [side.px(x), side.py(z)]);
+    grow(grow(bodies, "line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], stroke: COLORS.ink, "stroke-width": 0.8, "stroke-dasharray": "9 3 2 3" }), "title", {}, "Axis of rotation");
+    if (ghost) grow(bodies, "circle", { cx: side.px(ghost[0]), cy: side.py(ghost[2]), r: side.px(drawn.radius) - side.px(0), fill: "none", stroke: COLORS.dipole, "stroke-width": 1.5, "stroke-dasharray": "4 3" });
+    if (field) for (const [key, value] of Object.entries({ href: field.url, x: side.px(field.x[0]), y: side.py(field.z[1]),
+      width: side.px(field.x[1]) - side.px(field.x[0]), height: side.py(field.z[0]) - side.py(field.z[1]) })) slice.setAttribute(key, value);
     crosses.setAttribute("d", places.map(([x, z]) => [[-1, -1], [1, 1], [-1, 1], [1, -1]]
       .map(([a, b], k) => `${k % 2 ? "L" : "M"}${side.px(x) + 4 * a} ${side.py(z) + 4 * b}`).join("")).join(""));
   };
   const drawCurves = () => ["height", "tilt"].forEach((key, k) => {
     const [time, values] = [samples[0], samples[k + 1]];
-    if (!time.length) { curves[key].setAttribute("d", ""); return; }
+    at(key).style.display = time.length > 1 ? "" : "none";
+    if (time.length < 2) return;
     const low = Math.min(...values), high = Math.max(...values), room = Math.max(0.05 * (high - low), 0.01);
     running[key].range([time[0], Math.max(time[time.length - 1], time[0] + 1e-3)], [low - room, high + room]);
     curves[key].setAttribute("d", running[key].path(time.map((t, n) => [t, values[n]])));
   });
 
-  // The picture that turns with the mouse, by Plotly
+  // The picture that turns with the mouse: seen from far away, so that a ball is round and the scale is one everywhere
+  const view = { yaw: 0.35, pitch: 0.2, angle: 0 }, brush = at("picture").getContext("2d");
   const turned = (points, angle) => {
     const c = Math.cos(angle), s = Math.sin(angle);
     return points.map(([x, y, z]) => [c * x - s * y, s * x + c * y, z]);
@@ -114,47 +131,106 @@
     const k = (v * x - u * y) / (1 + w);
     return [position[0] + w * x + u * z + k * v, position[1] + w * y + v * z - k * u, position[2] + w * z - u * x - v * y];
   });
-  const column = (points, k) => points.map(one => one[k]);
-  const xyz = points => ({ x: column(points, 0), y: column(points, 1), z: column(points, 2), hoverinfo: "skip" });
-  const mesh = (body, points) => ({
-    type: "mesh3d", ...xyz(points), i: column(body.faces, 0), j: column(body.faces, 1), k: column(body.faces, 2),
-    color: body.color, opacity: body.opacity, flatshading: body.faces.length < 20,
-    lighting: { ambient: 0.65, diffuse: 0.6, specular: 0.2, roughness: 0.6 },
-  });
-  const strokes = (lines, color, width) =>
-    ({ type: "scatter3d", mode: "lines", ...xyz(lines.flatMap(points => [...points, [null, null, null]])), line: { color, width } });
-  const axis = (low, high) => ({ range: [low, high], visible: false });
-  let busy = false, again = false, took = 0, waiting = null, idle = 0;
-  const draw = async () => {
-    if (!drawn) return;
-    if (busy) { again = true; return; }
-    busy = true;
-    const [half, low, high] = drawn.reach, began = performance.now(), turn = pose.flying ? 0 : idle;
-    const [position, moment] = turned([pose.position, pose.moment], turn);
-    await Plotly.react("picture", [
-      ...drawn.turning.map(body => mesh(body, turned(body.at, pose.angle + turn))),
-      strokes(drawn.lines.map(points => turned(points, pose.angle + turn)), "#5e81ac", 2),
-      ...drawn.floater.map(body => mesh(body, moved(body.at, position, moment))),
-      ...drawn.fixed.map(body => mesh(body, body.at)),
-      strokes(drawn.edges, "#4c566a", 3),
-    ], {
-      margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, uirevision: "kept",
-      scene: { aspectmode: "data", xaxis: axis(-half, half), yaxis: axis(-half, half), zaxis: axis(low, high),
-        camera: { eye: { x: 0.22, y: -1.45, z: 0.28 }, center: { x: 0, y: 0, z: 0 }, projection: { type: "perspective" } } },
-    }, { displaylogo: false, responsive: true, displayModeBar: false });
-    await new Promise(done => requestAnimationFrame(() => setTimeout(done)));
-    took = performance.now() - began;
-    busy = false;
-    if (again) { again = false; requestAnimationFrame(draw); }
+  const seen = ([x, y, z]) => {  // to the right, upwards, and towards the reader
+    const c = Math.cos(view.yaw), s = Math.sin(view.yaw), far = c * y - s * x;
+    return [c * x + s * y, z * Math.cos(view.pitch) + far * Math.sin(view.pitch), z * Math.sin(view.pitch) - far * Math.cos(view.pitch)];
   };
-  // At rest the floater is locked to the rotor: both turn slowly together, where the browser draws fast enough.
-  setInterval(() => {
-    if (!drawn || pose.flying || busy || !took || took > 60 || document.hidden || at("picture").matches(":active")) return;
-    idle += 0.08;
-    draw();
-  }, 80);
-  // While a slider moves its numbers come first; a picture that takes long to draw follows when it rests.
-  const drawSoon = () => { clearTimeout(waiting); waiting = setTimeout(draw, took < 40 ? 0 : 350); };
+  const shade = (color, light) => `rgb(${[1, 3, 5].map(k => Math.min(255, parseInt(color.slice(k, k + 2), 16) * light)).join()})`;
+  const draw = () => {
+    const canvas = at("picture"), ratio = devicePixelRatio || 1, [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (!drawn || !width) return;
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+    const [half, low, high] = drawn.reach, angle = pose.angle + (pose.flying ? 0 : view.angle);
+    const k = Math.min(width / (2 * half), height / (high - low + 6)), pieces = [];
+    const px = ([u, s]) => [width / 2 + k * u, height / 2 + k * ((high + low) / 2 * Math.cos(view.pitch) - s)];
+    const path = points => { brush.beginPath(); points.forEach((one, n) => brush[n ? "lineTo" : "moveTo"](...px(one))); };
+    const stroke = (points, color, thick, dash = []) => {
+      path(points.map(seen)); brush.strokeStyle = color; brush.lineWidth = thick; brush.setLineDash(dash); brush.stroke(); brush.setLineDash([]);
+    };
+    const later = (depth, paint) => pieces.push([depth, paint]);
+    const solid = (body, points) => {
+      const there = points.map(seen);
+      for (const face of body.faces) {
+        const [a, b, c] = face.map(n => there[n]), [p, q] = [0, 1].map(n => [b, c].map(one => one.map((value, m) => value - a[m]))[n]);
+        const normal = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+        if (normal[2] <= 0) continue;  // its back
+        const light = 0.75 + 0.45 * (-0.4 * normal[0] + 0.7 * normal[1] + 0.6 * normal[2]) / Math.hypot(...normal);
+        later((a[2] + b[2] + c[2]) / 3, () => {
+          path([a, b, c]); brush.closePath(); brush.globalAlpha = body.opacity; brush.fillStyle = brush.strokeStyle = shade(body.color, light);
+          brush.fill(); brush.lineWidth = 0.7; if (body.opacity === 1) brush.stroke(); brush.globalAlpha = 1;
+        });
+      }
+    };
+    const arrow = (center, half, from = -1) => {  // its shaft in pieces, which bodies hide one by one
+      const place = part => center.map((value, n) => value + part * half[n]), size = Math.hypot(...half);
+      for (let part = from; part < 0.45; part += 0.145) later(seen(place(part + 0.07))[2], () => stroke([place(part), place(Math.min(part + 0.16, 0.5))], COLORS.north, 0.14 * size * k));
+      later(seen(place(0.75))[2], () => {
+        const [tip, neck] = [seen(place(1)), seen(place(0.45))], long = Math.hypot(tip[0] - neck[0], tip[1] - neck[1]) || 1;
+        const across = [(neck[1] - tip[1]) / long, (tip[0] - neck[0]) / long].map(value => 0.2 * size * value);
+        path([tip, [neck[0] + across[0], neck[1] + across[1]], [neck[0] - across[0], neck[1] - across[1]]]); brush.fillStyle = COLORS.north; brush.fill();
+      });
+    };
+    brush.setTransform(ratio, 0, 0, ratio, 0, 0);
+    brush.clearRect(0, 0, width, height);
+    drawn.fixed.forEach(body => solid(body, body.at.map(([x, y, z]) => [x, y, z - pose.plate])));
+    pieces.splice(0).sort(([a], [b]) => a - b).forEach(([, paint]) => paint());  // the plate is behind all
+    if (field) {
+      const [corner, right, down] = [[field.x[0], 0, field.z[1]], [field.x[1], 0, field.z[1]], [field.x[0], 0, field.z[0]]].map(one => px(seen(turned([one], angle)[0])));
+      brush.save(); brush.globalAlpha = 0.5;
+      brush.transform((right[0] - corner[0]) / field.image.width, (right[1] - corner[1]) / field.image.width, (down[0] - corner[0]) / field.image.height, (down[1] - corner[1]) / field.image.height, ...corner);
+      brush.drawImage(field.image, 0, 0); brush.restore();
+    }
+    const [position, moment] = turned([pose.position, pose.moment], pose.flying ? 0 : angle), r = drawn.radius;
+    for (const body of drawn.turning) solid(body, turned(body.at, angle));
+    for (const ends of drawn.arrows) arrow(...turned(ends, angle));
+    for (const points of drawn.lines) turned(points, angle).reduce((a, b) => (later(seen(a)[2], () => stroke([a, b], COLORS.line, 1.2)), b));
+    for (const body of drawn.floater) solid(body, moved(body.at, position, moment));
+    if (!drawn.floater.length) later(seen(position)[2], () => {
+      const [x, y] = px(seen(position)), shine = brush.createRadialGradient(x - 0.4 * r * k, y - 0.45 * r * k, 0.1 * r * k, x, y, r * k);
+      [[0, 1.35], [0.5, 1], [1, 0.55]].forEach(([where, light]) => shine.addColorStop(where, shade(COLORS.ball, light)));
+      brush.beginPath(); brush.arc(x, y, r * k, 0, 2 * Math.PI); brush.fillStyle = shine; brush.fill();
+    });
+    const up = moment.map(value => 1.5 * r * value);
+    if (drawn.floater.length) arrow(position, up); else {
+      arrow(position, up, 0.66);
+      later(seen(position.map((value, n) => value - 0.83 * up[n]))[2], () => stroke([position.map((value, n) => value - up[n]), position.map((value, n) => value - 0.66 * up[n])], COLORS.north, 0.21 * r * k));
+    }
+    for (let z = low; z < high; z += 4) {  // the axis, dashed; not in the ball
+      if (Math.hypot(position[0], position[1], position[2] - z - 1.5) > r) later(seen([0, 0, z])[2], () => stroke([[0, 0, z], [0, 0, z + 3]], COLORS.ink, 1));
+    }
+    const ring = Array.from({ length: 41 }, (_, n) => [5 * Math.cos(n / 40 * 5.2 - 2.2), 5 * Math.sin(n / 40 * 5.2 - 2.2), high - 5]);
+    later(0, () => {
+      stroke(ring, COLORS.ink, 1.5);
+      const [tip, before] = [ring[40], ring[36]].map(one => px(seen(one))), way = Math.atan2(tip[1] - before[1], tip[0] - before[0]);
+      brush.beginPath(); [[7, 0], [-3, 4], [-3, -4]].forEach(([a, b], n) => brush[n ? "lineTo" : "moveTo"](tip[0] + a * Math.cos(way) - b * Math.sin(way), tip[1] + a * Math.sin(way) + b * Math.cos(way)));
+      brush.fillStyle = COLORS.ink; brush.fill();
+    });
+    pieces.sort(([a], [b]) => a - b).forEach(([, paint]) => paint());
+    brush.fillStyle = COLORS.ink; brush.font = "12px system-ui, sans-serif";
+    brush.fillText("axis of rotation", ...px(seen([7, 0, high - 4])));
+    if (ghost && !pose.flying && k * Math.hypot(...ghost.map((value, n) => value - pose.position[n])) > 1.5) {
+      const [x, y] = px(seen(turned([ghost], angle)[0]));
+      brush.beginPath(); brush.arc(x, y, r * k, 0, 2 * Math.PI); brush.strokeStyle = COLORS.dipole; brush.lineWidth = 1.5; brush.setLineDash([4, 3]); brush.stroke(); brush.setLineDash([]);
+    }
+    brush.fillRect(10, height - 12, 10 * k, 3); brush.fillText("10 mm", 10, height - 17);
+  };
+  // At rest the floater is locked to the rotor: both turn slowly together.
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let before = 0;
+  const animate = now => {
+    if (now - before >= FRAME) {
+      if (!pose.flying && !still) view.angle += Math.min(now - before, 200) / 1000 * 2 * Math.PI / TURN;
+      before = now;
+      draw();
+    }
+    requestAnimationFrame(animate);
+  };
+  requestAnimationFrame(animate);
+  at("picture").addEventListener("pointermove", event => {
+    if (!event.buttons) return;
+    view.yaw -= event.movementX / 120;
+    view.pitch = Math.max(-0.3, Math.min(1.4, view.pitch + event.movementY / 120));
+  });
 
   // One piece of a flight at a time; a page that draws too slowly for its speed falls behind.
   const fly = () => {
@@ -163,6 +239,12 @@
     [asked, last] = [true, now];
     send("fly", Math.max(seconds, 1e-3) * at("speed").value);
   };
+  // Nothing that takes long goes on without a word.
+  const since = start => `${Math.round((performance.now() - start) / 1000)} s`;
+  setInterval(() => {
+    if (asked && performance.now() - last > SILENCE) at("says").textContent = `The next piece of the trajectory is being computed (${since(last)}) ...`;
+    if (pending && performance.now() - pending > SILENCE) at("sign").textContent = `${at("sign").dataset.text} The selected models are being computed (${since(pending)}) ...`;
+  }, 500);
 
   const choose = (id, options, value) => {
     at(id).replaceChildren();
@@ -171,7 +253,7 @@
     at(id).hidden = !Object.keys(options).length;
   };
   const slide = (name, value) => { at(name).value = value; at(name).previousSibling.textContent = +(+value).toFixed(2); };
-  const millimetres = place => `${(-place[2]).toPrecision(4)} mm`;
+  const loaded = id => at(id).classList.remove("loading");
   const save = (name, blob) => {
     const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
     link.click();
@@ -180,16 +262,12 @@
   let copies = {};
   const texts = id => text => { at(id).textContent = text; };
   const show = {
-    message: texts("message"), says: texts("says"), map_says: texts("map_says"),
+    message: text => { at("message").textContent = text; if (text) pending = 0; },
+    says: texts("says"), map_says: texts("map_says"),
     copies: found => { copies = found; at("command").textContent = found.line; at("copied").textContent = ""; },
-    place: place => { at("place").textContent = place ? millimetres(place) : "–"; },
-    beside: found => {
-      ghost = found && found[0];
-      at("beside").textContent = found ? `${found[1]}: ${millimetres(ghost)}` : "";
-      if (drawn) drawSide();
-    },
     controls: known => {
       at("sliders").replaceChildren();
+      loaded("sliders");
       for (const { name, title, value, start, end, step } of known.sliders) {
         const label = grow(at("sliders"), "label", {}, title);
         grow(label, "output");
@@ -202,39 +280,76 @@
     },
     slider: ([name, value]) => slide(name, value),
     numbers: found => {
+      at("models").replaceChildren();
+      found.models.forEach(({ name, known, pose: there, polar_angle: angle, stability }, n) => {
+        const cell = grow(at("models"), "div", { class: `model${n ? " beside" : ""}${known ? "" : " loading"}` });
+        grow(cell, "span", {}, name);
+        grow(cell, "b", {}, there ? `${(-there[0][2]).toPrecision(4)} mm` : known ? "–" : "00.00 mm");
+        grow(cell, "span", {}, there ? `${angle.toFixed(1)}°, ${stability}` : known ? stability : "computed when you release");
+      });
+      ghost = found.models.find(({ name, pose: there }, n) => n && there && name === "point dipole")?.pose[0] || null;
       at("headline").textContent = found.headline;
-      at("sign").textContent = found.sign;
+      at("comparison").textContent = found.comparison.join(" ");
+      pending = found.complete ? 0 : pending || performance.now();
+      at("sign").dataset.text = at("sign").textContent = `${found.complete ? "All models under the same conditions" : "Preview"}${found.conditions && ": "}${found.conditions}.`;
       at("sign").dataset.number = found.number;
+      ["table", "modes"].forEach(loaded);
       table("table", found.rows, found.left_out);
       table("modes", found.modes);
+      if (drawn) drawSide();
+    },
+    slice: ({ x, z, pixel, strength }) => {
+      const data = Uint8Array.from(atob(strength), letter => letter.charCodeAt(0)), image = document.createElement("canvas");
+      [image.width, image.height] = [x, z].map(([low, high]) => Math.round((high - low) / pixel) + 1);
+      const pen = image.getContext("2d"), pixels = pen.createImageData(image.width, image.height);
+      const stops = VIRIDIS.map(color => [1, 3, 5].map(k => parseInt(color.slice(k, k + 2), 16)));
+      data.forEach((value, n) => {
+        const [row, across] = [Math.floor(n / image.width), n % image.width], part = value / 254 * (VIRIDIS.length - 1), first = Math.min(3, Math.floor(part));
+        const color = [0, 1, 2].map(k => stops[first][k] + (part - first) * (stops[first + 1]?.[k] - stops[first][k]));
+        pixels.data.set([...color, value === 255 ? 0 : 255], 4 * ((image.height - 1 - row) * image.width + across));
+      });
+      pen.putImageData(pixels, 0, 0);
+      const edges = [x, z].map(([low, high]) => [low - pixel / 2, high + pixel / 2]);  // pixels are about the values
+      field = { image, url: image.toDataURL(), x: edges[0], z: edges[1] };
+      if (drawn) drawSide();
     },
     point: value => { point = value; drawHere(); },
-    regions: found => {
-      regions.setAttribute("href", "data:,");
+    map: found => {
+      [stable, border].forEach(path => path.setAttribute("d", ""));
+      article.replaceChildren();
+      at("map_article").textContent = "";
+      at("map").classList.toggle("loading", Boolean(found));
+      at("map").style.display = found ? "" : "none";
       if (!found) return;
-      const { frequencies: x, measures: y, kind } = found;
-      const picture = Object.assign(document.createElement("canvas"), { width: x.length, height: y.length }), brush = picture.getContext("2d");
-      kind.forEach((row, i) => row.forEach((value, j) => {
-        brush.fillStyle = [COLORS.none, COLORS.unstable, COLORS.stable][value];
-        brush.fillRect(i, y.length - 1 - j, 1, 1);
-      }));
-      map.upwards = found.title;
-      map.range([x[0], x[x.length - 1]], [y[0], y[y.length - 1]]);
-      const half = [x, y].map(values => (values[1] - values[0]) / 2);  // pixels are about the values
-      const [left, right] = [x[0] - half[0], x[x.length - 1] + half[0]].map(value => map.px(value));
-      const [bottom, top] = [y[0] - half[1], y[y.length - 1] + half[1]].map(value => map.py(value));
-      const place = { href: picture.toDataURL(), x: left, y: top, width: right - left, height: bottom - top };
-      for (const [key, value] of Object.entries(place)) regions.setAttribute(key, value);
+      const { title, spans: [x, y], article: { tested, levitated, flights } } = found;
+      map.upwards = title;
+      map.range(x, y);
       drawHere();
+      for (const value of tested.filter(one => one >= y[0] && one <= y[1])) {
+        const did = levitated.includes(value), fill = did ? COLORS.ink : "white";
+        grow(grow(article, "circle", { cx: map.right - 6, cy: map.py(value), r: 3.5, fill, stroke: COLORS.ink }), "title", {}, `Article, ${value}: ${did ? "levitated" : "did not levitate"}`);
+      }
+      for (const [frequency, value, what] of flights) {
+        const mark = { x: map.px(frequency) - 4, y: map.py(value) - 4, width: 8, height: 8, fill: /^lev/.test(what) ? COLORS.ink : "white", stroke: COLORS.ink };
+        grow(grow(article, "rect", mark), "title", {}, `Article, ${frequency} Hz: ${what}`);
+      }
+      at("map_article").textContent = `Article's experiment: rotors that levitated (●) or did not (○), on the right as it gives no frequency${flights.length ? "; squares: its trajectories, filled if they levitated" : ""}.`;
     },
-    bodies: found => { drawn = found; drawSide(); drawSoon(); },
+    regions: ({ model, cells, border: pieces }) => {
+      loaded("map");
+      stable.setAttribute("d", cells.map(cell => `${map.path(cell)}Z`).join(""));
+      if (model === "dipole") border.setAttribute("d", pieces.map(piece => map.path(piece)).join(""));
+    },
+    bodies: found => { drawn = found; loaded("side"); drawSide(); drawBall(pose.seen); },
     equilibria: found => { places = found; if (drawn) drawSide(); },
-    pose: async found => {
+    pose: found => {
+      const sunk = found.plate !== pose.plate;
       pose = found;
       if (!held) drawBall(pose.seen);
-      if (!found.flying) { asked &&= playing; drawSoon(); return; }
+      if (drawn && sunk) drawSide();
+      at("motion").hidden = found.flying;
+      if (!found.flying) { asked &&= playing; return; }
       if (found.ended) show.playing(false);
-      await draw();
       if (found.piece) asked = false;  // the next one may come
       setTimeout(fly, Math.max(0, last + FRAME - performance.now()));
     },
@@ -268,7 +383,7 @@
     const charts = [map, side, running.height, running.tilt], whole = grow(document.createElementNS("http://www.w3.org/2000/svg", "g"), "svg");
     const places = [[10, 30], [450, 30], [10, 420], [450, 420]];
     for (const [key, value] of Object.entries({ viewBox: "0 0 880 580", width: 880, height: 580 })) whole.setAttribute(key, value);
-    grow(whole, "style", {}, "text { font: 11px sans-serif; fill: #2e3440; } image { image-rendering: pixelated; }");
+    grow(whole, "style", {}, "text { font: 11px sans-serif; fill: #2e3440; }");
     grow(whole, "text", { x: 10, y: 18 }, `${at("headline").textContent} ${at("sign").textContent}`);
     charts.forEach((chart, k) => {
       const copy = whole.appendChild(chart.svg.cloneNode(true));
@@ -285,9 +400,24 @@
     reader.onload = () => send("open", file.name, reader.result.split(",")[1] || "");
     if (file) reader.readAsDataURL(file.slice(0, 300000));  // more than is taken
   });
-  at("map").addEventListener("click", event => regions.getAttribute("href") !== "data:," && send("go", ...map.under(event)));
-  ball.addEventListener("pointerdown", event => { held = true; ball.setPointerCapture(event.pointerId); show.playing(false); event.preventDefault(); });
-  ball.addEventListener("pointermove", event => { if (held) { const [x, z] = side.under(event); drawBall([x, 0, z]); } });
-  ball.addEventListener("pointercancel", () => { held = false; });
-  ball.addEventListener("pointerup", () => { if (held) { held = false; send("put", ...ball.place); } });
+  at("map").addEventListener("click", event => send("go", ...map.under(event)));
+  // The ball is taken wherever it is pressed or nearly so, as it may move on before the press is heard.
+  at("side").addEventListener("pointerdown", event => {
+    const [x, z] = side.under(event);
+    if (!drawn || !ball.place || Math.hypot(x - ball.place[0], z - ball.place[1]) > 1.5 * drawn.radius) return;
+    held = true;
+    at("side").setPointerCapture(event.pointerId);
+    show.playing(false);
+    at("says").textContent = "Let go where the floater shall begin, at rest in the frame that turns with the rotor.";
+    event.preventDefault();
+  });
+  at("side").addEventListener("pointermove", event => { if (held) { const [x, z] = side.under(event); drawBall([x, 0, z]); } });
+  for (const kind of ["pointercancel", "pointerup", "lostpointercapture"]) at("side").addEventListener(kind, event => {
+    if (!held) return;
+    held = false;
+    if (kind === "pointercancel") { at("says").textContent = "The browser ended the drag; nothing was changed."; drawBall(pose.seen); return; }
+    at("says").textContent = `Putting the floater at x = ${ball.place[0].toFixed(1)} mm, z = ${ball.place[1].toFixed(1)} mm ...`;
+    send("put", ...ball.place);
+  });
+  at("bar").style.background = `linear-gradient(90deg, ${VIRIDIS.join()})`;
 })();

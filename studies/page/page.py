@@ -1,4 +1,4 @@
-"""One page in the browser: what its reader does, what is computed for it, and what it shows; lengths mm."""
+"""One page in the browser: what its reader does, what is computed for it, and what it is told to show; lengths mm."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..cli.options import KINDS, shipped_scene
-from ..figures.view import SQUARES, Surface, arrow, near_plate, triangles
+from ..figures.view import Surface, near_plate, triangles
 from . import work
 from .state import PageState, controls
 from .work import Frame, Regions, Shown
@@ -22,19 +22,18 @@ from .worker import PATIENCE, Worker
 
 REST = 0.25  # Seconds after which a slider is taken to rest
 QUICK, LONG = 60.0, 600.0  # Seconds that a scene with its preview, and other work, may take
-SLOWEST = 0.25  # Most seconds of a trajectory between two pictures
-POINTS = (13, 41)  # Of a map along each axis: first, and then
-ROLLING = 4000  # Samples of a trajectory that are kept
+SLOWEST = 0.25  # Most seconds of a flight between two pictures
+POINTS = 25  # Of a map along each axis
+ROLLING = 4000  # Samples of a flight that are kept
 PLATES = {
     "none": "Plate: only an obstacle",
     "slab": "Plate: infinite slab",
     "auto": "Plate: as the accuracy needs it",
     "reduced": "Plate: finite, as a network",
 }
-FOLLOW = "The selected models follow when you release the slider."
 NO_MAP = "No map: it needs a horizontal, vertical or tilted rotor and gravity along the axis."
-MAGNET, METAL, NORTH, BALL = "#434C5E", "#B08D57", "#D55E00", "#9AA5B1"
-SEEN = 0.06  # How far along its edges a plate is drawn, m
+MAGNET, METAL, BALL = "#434C5E", "#B08D57", "#9AA5B1"
+SEEN = 0.03  # How far along its edges a plate is drawn, m
 
 
 class Page:
@@ -43,11 +42,13 @@ class Page:
     Parameters
     ----------
     tell : sends the page what it shall show, each by its name in page.js
-    state : where it begins
+    state, preview : where it begins, and its preview if that is known
     asked : the keys of its address
     """
 
-    def __init__(self, tell: Callable[..., None], state: PageState, asked: Mapping[str, str]) -> None:
+    def __init__(
+        self, tell: Callable[..., None], state: PageState, preview: Shown | None, asked: Mapping[str, str]
+    ) -> None:
         self.tell, self.state = tell, state
         self.quick = Worker("Reading this scene", QUICK, self._failed)
         self.slow = Worker("The answer by the chosen models", LONG, self._failed, PATIENCE)
@@ -56,8 +57,7 @@ class Page:
         self.flyer = Worker("The trajectory", LONG, self._lost)
         self.number = 0  # of answers
         self.shown: Shown | None = None
-        self.preview: Shown | None = None
-        self.samples = np.zeros((3, 0))  # of the trajectory: time s, height mm and polar angle °
+        self.samples = np.zeros((3, 0))  # of the flight: time s, height mm and polar angle °
         self.resting: asyncio.TimerHandle | None = None
         self.mapped, self.begun = "", False
         self.flying, self.ended = False, False
@@ -78,7 +78,10 @@ class Page:
         """What the page's reader can do, by its name in page.js."""
         if not asked:
             self._begin()
-        self._become("with_query", dict(asked))
+        if not asked and preview is not None:
+            self._became(False, (state, preview))
+        else:
+            self._become("with_query", dict(asked))
 
     def close(self) -> None:
         """End all work."""
@@ -107,7 +110,12 @@ class Page:
         self.tell(message="")
         key = arguments[0] if method == "changed" else object()
         other = partial(self._became, method == "opened")
-        self.quick.ask(key, lambda: (work.become, self.state, method, arguments), other)
+        self.quick.ask(key, lambda: (work.become, self.state, method, arguments, self.near), other)
+
+    @property
+    def near(self) -> list[work.Pose]:
+        """Where the equilibria were last seen."""
+        return self.shown.places if self.shown else []
 
     def _became(self, is_other: bool, found: tuple[PageState, Shown | str]) -> None:
         """The state is another: show its preview, and ask for all of it when it rests."""
@@ -124,8 +132,7 @@ class Page:
         if isinstance(preview, str):
             self._failed(preview)
         else:
-            self.preview = preview
-            self._answered("" if self.state.is_preview else FOLLOW, preview)
+            self._answered(False, preview)
         if self.resting is not None:
             self.resting.cancel()
         self.resting = asyncio.get_running_loop().call_later(REST, self._rest)
@@ -146,17 +153,17 @@ class Page:
             self.tell(slider=[slider.name, value])
             self._become("changed", slider.name, value)
 
-    def _answered(self, follows: str, found: Shown) -> None:
+    def _answered(self, complete: bool, found: Shown) -> None:
         """Numbers at once, and later by the models asked for."""
         self.shown, self.number = found, self.number + 1
-        sign = f"Preview: {found.sign}. {follows}" if follows else f"By: {found.sign}."
-        tables = {"rows": found.rows, "modes": found.modes, "left_out": found.left_out}
-        self.tell(numbers={"number": self.number, "headline": found.headline, "sign": sign, **tables})
-        first, other = (one.places[0][0] if one and one.places else None for one in (found, self.preview))
-        beside = [other, self.preview.sign] if self.preview is not found and other and self.preview else None
-        self.tell(place=first, beside=beside)
+        told = {key: value for key, value in vars(found).items() if key not in ("lines", "strength")}
+        told["models"] = [vars(one) for one in found.models]
+        self.tell(numbers={**told, "number": self.number, "complete": complete})
         keys = self.state.keys
         rotor, whole = str(keys["rotor"]), str((keys["rotor"], keys["floater"], keys.get("plate")))
+        if complete or self.drawn[0] != rotor:
+            strength = base64.b64encode(found.strength).decode()
+            self.tell(slice={"x": work.SLICE[0], "z": work.SLICE[1], "pixel": work.PIXEL, "strength": strength})
         if found.lines or self.drawn[1] != whole:  # field lines are kept as far as they hold
             self.lines = found.lines or (self.lines if self.drawn[0] == rotor else [])
             self.drawn = rotor, whole
@@ -166,17 +173,20 @@ class Page:
 
     def _rest(self) -> None:
         self.tell(address=self.state.query())
-        self.slow.ask("", lambda: (work.complete, self.state), partial(self._answered, ""))
+        self.slow.ask("", lambda: (work.complete, self.state), partial(self._answered, True))
         if not work.has_map(self.state):
             self._forget_map(NO_MAP)
         elif (key := work.map_key(self.state)) != self.mapped:
-            self._forget_map("Map: being computed ...")
+            self._forget_map("The map is being computed by the point dipole ...")
             self.mapped = key
-            spans = tuple((control.start, control.end) for control in controls(self.state)[:2])
-            for model in ("dipole", "cuboid") if self.state.model == "cuboid" else ("dipole",):
-                for points in POINTS:
-                    call = (work.regions, self.state, spans, model, points)
-                    self.mapper.ask((model, points), lambda call=call: call, self._map)  # type: ignore[misc]
+            axes = controls(self.state)[:2]
+            spans = tuple((control.start, control.end) for control in axes)
+            self.tell(map={"title": axes[1].title, "spans": spans, "article": work.article_points(self.state)})
+            models = ("dipole",) if self.state.scene.field_map else ("dipole", "fem")
+            for model in models:
+                call = (work.regions, self.state, spans, model, POINTS)
+                last = partial(self._map, model == models[-1])
+                self.mapper.ask(model, lambda call=call: call, last)  # type: ignore[misc]
 
     def _failed(self, message: str) -> None:
         if not self.begun:  # what the address asks for cannot be made
@@ -187,16 +197,18 @@ class Page:
     def _forget_map(self, why: str) -> None:
         self.mapper.stop()
         self.mapped = ""
-        self.tell(regions=None, map_says=why)
+        self.tell(map=None, map_says=why)
 
     def _no_map(self, why: str) -> None:
         self.mapper.stop()
         self.tell(map_says=f"No map: {why}")
 
-    def _map(self, found: Regions) -> None:
-        name = {"dipole": "point dipole", "cuboid": "closed form"}[found.model]
-        says = f"Stable (blue), only unstable (grey): {name}, without the plate. Click to go there."
-        self.tell(regions={**vars(found), "title": controls(self.state)[1].title}, map_says=says)
+    def _map(self, last: bool, found: Regions) -> None:
+        name = work.MODEL_WORDS[found.model]
+        says = f"Blue: stable levitation without the plate, by {name}"
+        says += "; grey line: point dipole. " if found.model != "dipole" else ". "
+        says += "Click to go there." if last else "Finite elements follow ..."
+        self.tell(regions=vars(found), map_says=says)
 
     def _download(self, kind: str) -> None:
         """Send a file that goes home."""
@@ -208,10 +220,10 @@ class Page:
 
         self.porter.ask(kind, lambda: (work.content, kind, self.state), downloaded)
 
-    # The trajectory, which page.js asks for piece by piece
+    # The flight, which page.js asks for piece by piece
 
     def _land(self) -> None:
-        """Forget the trajectory."""
+        """Forget the flight."""
         self.flyer.stop()
         self.flying = self.ended = False
         self.tell(says="")
@@ -224,7 +236,8 @@ class Page:
         if places:
             position, moment = places[0]
             self._sample(np.array([[0.0], [position[2]], [work.polar_angle(np.array(moment))]]), fresh=True)
-            self.tell(pose={"position": position, "moment": moment, "seen": position, "angle": 0.0, "flying": False})
+            pose = {"position": position, "moment": moment, "seen": position, "angle": 0.0, "plate": 0.0}
+            self.tell(pose={**pose, "flying": False})
 
     def _take_off(self) -> None:
         if not self.flying:
@@ -240,7 +253,7 @@ class Page:
         self.flyer.ask("fly", lambda: (work.fly, min(float(seconds), SLOWEST)), partial(self._flown, piece=True))
 
     def _wish(self, what: str, vector: Sequence[float]) -> None:
-        """A floater that is dragged moves on; where it cannot be the page waits, so that the reason can be read."""
+        """A floater that is dragged flies on; where it cannot be the page waits, so that the reason can be read."""
         self._take_off()
         call = work.wish, what, [1e-3 * float(part) for part in vector]
 
@@ -272,29 +285,26 @@ class Page:
 def scene_bodies(scene: Scene, lines: Sequence[Array]) -> dict[str, Any]:
     """What page.js draws: what turns with the rotor, what stands still, and the floater about its centre, moment up.
 
-    `reach`: half the width of the picture, its lowest and its highest point.
+    `arrows`: centres of the magnets and vectors from there to the tips; `floater`: none for a ball; `reach`: half the
+    width of the picture, its lowest and its highest point.
     """
     size = max(float(np.linalg.norm(magnet.box.size)) for magnet in scene.rotor)
     turning = [_mesh(triangles(magnet.body), MAGNET) for magnet in scene.rotor]
     turning += [_mesh(triangles(conductor.body), METAL) for conductor in scene.conductors]
-    for magnet in scene.rotor:
-        direction = magnet.polarization_in_rotor
-        if (length := np.linalg.norm(direction)) > 0:
-            turning.append(_mesh(arrow(magnet.box.center, direction / length, 0.55 * size), NORTH))
-    up = arrow(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.45 * scene.floater.radius)
+    directions = [(magnet.box.center, magnet.polarization_in_rotor) for magnet in scene.rotor]
+    arrows = [(c, 0.55 * size * d / length) for c, d in directions if (length := np.linalg.norm(d)) > 0]
     found: dict[str, Any] = {
         "turning": turning,
-        "floater": [_mesh(triangles(scene.floater.solid), BALL), _mesh(up, NORTH)],
+        "arrows": np.round(1e3 * np.reshape(arrows, (-1, 2, 3)), 3),
+        "floater": [] if scene.floater.body is None else [_mesh(triangles(scene.floater.solid), BALL)],
         "fixed": [],
-        "edges": [],
         "lines": [np.round(1e3 * line, 2) for line in lines],
         "radius": 1e3 * scene.floater.radius,
-        "reach": [30.0, -50.0, 16.0],
+        "reach": [32.0, -50.0, 18.0],
     }
     if scene.plate is not None:
         near = near_plate(scene.plate.body, SEEN)
-        edges = np.round(1e3 * near.corners[np.column_stack([SQUARES, SQUARES[:, 0]])], 3)
-        found |= {"fixed": [_mesh(triangles(near), BALL, 0.25)], "edges": edges, "reach": [40.0, -64.0, 16.0]}
+        found |= {"fixed": [_mesh(triangles(near), BALL, 0.25)], "reach": [38.0, -62.0, 18.0]}
     return found
 
 

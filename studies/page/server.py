@@ -23,26 +23,26 @@ from urllib.parse import urlsplit
 from weakref import WeakSet
 
 import numpy as np
-from plotly.offline import get_plotlyjs
 from tornado.httpserver import HTTPServer
 from tornado.httputil import HTTPServerRequest
 from tornado.iostream import IOStream
 from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from ...geometry.common import ComputationError, InputError
+from ...geometry.common import ComputationError, InputError, SpinlevError
 from ...geometry.scene.contents import Scene
 from .page import Page
 from .state import PageState, first_state
+from .work import Shown, preview
 from .worker import context
 
 LOOPBACK = "127.0.0.1"
 PAGES = ("/", "/ws")  # For which the token is asked
-PROGRAMS = {"/": "text/html", "/page.js": "text/javascript", "/plotly.js": "text/javascript"}
+PROGRAMS = {"/": "text/html", "/page.js": "text/javascript"}
 CONTENT = (
-    "default-src 'none'; script-src 'self' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
-    "connect-src 'self'; frame-ancestors "
-)  # What a page may load: Plotly makes programs and styles
+    "default-src 'none'; script-src 'self'; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'; "
+    "frame-ancestors "
+)  # What a page may load
 NOTEBOOKS = "'self' http://127.0.0.1:* http://localhost:* vscode-webview:"  # a source has no place for [::1]
 """Where a page may be in a frame: in notebooks on the reader's own machine."""
 REFUSALS = {
@@ -167,8 +167,6 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
 
 def program(path: str) -> str:
     """The text of a program of the page, from the installed packages."""
-    if path == "/plotly.js":
-        return str(get_plotlyjs())
     return files(__package__).joinpath("page.html" if path == "/" else path[1:]).read_text(encoding="utf-8")
 
 
@@ -181,6 +179,9 @@ class _Gate(Application):
         )
         self.begin, self.ancestors = begin, ancestors
         self.opened: set[Page] = set()
+        self.preview: Shown | None = None  # of `begin`: a page shows something as soon as it opens
+        with suppress(SpinlevError):  # which the page will say
+            self.preview = preview(begin)
         self._token = token.encode()
         self._names = {name.lower() for name in ("localhost", host, socket.gethostname(), socket.getfqdn())}
         self.guests: WeakSet[Any] = WeakSet()
@@ -265,7 +266,7 @@ class _Line(_Answer, WebSocketHandler):
             return
         given = self.request.arguments.items()
         asked = {key: values[-1].decode(errors="replace") for key, values in given if key != "token" and values}
-        self.page = Page(self._tell, self.application.begin, asked)
+        self.page = Page(self._tell, self.application.begin, self.application.preview, asked)
         opened.add(self.page)
 
     def on_message(self, message: str | bytes) -> None:

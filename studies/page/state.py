@@ -34,11 +34,11 @@ SIZES = {"edge_mm": "edge (mm)", "diameter_mm": "diameter (mm)", "height_mm": "h
 
 @dataclass(frozen=True, eq=False)
 class PageState:
-    """All that decides what a page shows, but for the trajectory."""
+    """All that decides what a page shows, but for the flight."""
 
     scene: Scene
-    model: FieldModel = "dipole"  # of the field
-    plate_model: PlateModel = "slab"  # of the plate's currents
+    model: FieldModel = "fem"  # of the field
+    plate_model: PlateModel = "auto"  # of the plate's currents
     spin: float = 0.0  # of the body in its equilibria
     source: str = "scene"  # the scene's file, or another name of it in messages
     first: Scene | None = None  # that the page began with, whose files alone another one may name; None: `scene`
@@ -52,12 +52,6 @@ class PageState:
     def models(self) -> Models:
         """As the commands take them."""
         return Models(self.model, self.plate_model)
-
-    @property
-    def is_preview(self) -> bool:
-        """Whether a preview has the models that are asked for."""
-        felt = self.scene.plate is not None and self.plate_model != "none"
-        return self.model in ("dipole", "map") and not felt
 
     @property
     def command(self) -> str:
@@ -125,10 +119,9 @@ class PageState:
 
 
 def first_state(scene: Scene, source: str = "scene") -> PageState:
-    """Where a page begins: everything by what takes no time, the plate as an infinite slab if that can be."""
-    model: FieldModel = "map" if scene.field_map else "dipole"
-    felt = scene.plate is not None and scene.floater.body is None
-    return PageState(scene, model, "slab" if felt else "none", source=source)
+    """Where a page begins: finite elements, or the scene's map of the field, and the plate as the commands take it."""
+    model: FieldModel = "map" if scene.field_map else "fem"
+    return PageState(scene, model, "none" if scene.plate is None else "auto", source=source)
 
 
 def _flat(keys: Mapping[str, Any], table: str = "") -> list[tuple[str, str]]:

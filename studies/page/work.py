@@ -3,29 +3,44 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
-from ...dynamics.continuation.map import equilibrium_map
-from ...dynamics.continuation.rotor_family import rotor_family
-from ...dynamics.equilibria.equilibrium import MODE_NAMES
-from ...dynamics.equilibria.search import survey
+from ...dynamics.continuation.map import EquilibriumMap, equilibrium_map
+from ...dynamics.continuation.rotor_family import RotorFamily, rotor_family
+from ...dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
+from ...dynamics.equilibria.equilibrium import MODE_NAMES, Equilibrium, Survey, is_stable, nearest_of, spectra
+from ...dynamics.equilibria.path import NEAR, NEWTON_STEPS
+from ...dynamics.equilibria.search import FixedPoints, check_turning, field_doubts, survey, survey_of
 from ...dynamics.flights.live import LiveFlight, Piece
-from ...geometry.common import Array, ComputationError, SpinlevError
+from ...dynamics.motion.equations import parameters
+from ...dynamics.motion.events import plate_depth
+from ...dynamics.motion.state import Scales
+from ...fem.cache import NotKeptError, kept_only
+from ...fem.rotor.choice import PERMEABLE
+from ...fem.rotor.models import of_true_moment
+from ...geometry.common import Array, ComputationError, InputError, SpinlevError
 from ...geometry.scene.files import canonical_keys, scene_text
+from ..catalogue import article
 from ..cli.console import to_json
-from ..cli.options import Models
+from ..cli.options import FieldModel, Models
 from ..figures.pictures import drawn_field
 from ..figures.view import field_lines
 from ..levitation import Levitation
+from ..plan import sources
 from ..result import Result, write_dataset
-from ..words import equilibria_rows, headline, left_out_words, worth_a_row
+from ..run import compared_models
+from ..words import comparison_words, equilibria_rows, headline, left_out_words, worth_a_row
 from .state import MEASURES, PageState
 
 SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)  # The box in which field lines are drawn, m
+SLICE = (-34.0, 34.0), (-60.0, 15.0)  # Where |B| is shown in the plane of the moments, x and z in mm
+PIXEL, WEAKEST = 1.0, -3.0  # of it: mm, and log10 of |B| in T
 ENDS = {
     "beyond": "left the region for which the plate's response was computed",
     "contact": "touched the rotor or the plate",
@@ -38,8 +53,15 @@ MODEL_WORDS = {
     "fem": "finite elements",
     "map": "map of the field",
 }
-PLATE_WORDS = {"none": "without the plate's currents", "slab": "plate as an infinite slab"}
-PLATE_WORDS |= dict.fromkeys(("reduced", "fem"), "finite plate")
+STABILITY = {"stable": "stable", "marginal": "marginally unstable", "unstable": "unstable"}
+PLATE_WORDS = {"none": "without the plate's eddy currents", "slab": "over the plate as an infinite slab"}
+PLATE_WORDS |= dict.fromkeys(("reduced", "fem"), "over the finite plate")
+HALVINGS = 6  # of a step of the map, until where its region of stability ends is known
+ARTICLE_FLIGHTS = {
+    "horizontal": ((115.0, 1.0, "fell"), (140.0, 1.0, "levitated for 250 s"), (150.0, 1.0, "lost in oscillations")),
+    "vertical": ((60.0, 14.0, "levitated for 24 h"),),
+}
+"""Trajectories of the article whose frequency it gives: Hz, mm and what became of them."""
 MODE_COLUMNS = ("normal mode", "frequency (Hz)", "growth rate (s⁻¹)")
 FILES = {
     "toml": ("scene.toml", "text/plain"),
@@ -48,76 +70,177 @@ FILES = {
 }  # What can be taken home: a file's name and its type
 
 
+Pose: TypeAlias = "tuple[list[float], list[float]]"  # Position, mm, and direction of the moment at t = 0
+
+
+@dataclass(frozen=True)
+class ModelAnswer:
+    """Where the floater levitates by one model of the rotor's field, if that is `known` and there is an equilibrium."""
+
+    name: str
+    known: bool
+    pose: Pose | None = None
+    polar_angle: float = 0.0  # °
+    stability: str = "no equilibrium"
+
+
 @dataclass(frozen=True)
 class Shown:
-    """The numbers of a scene by some models."""
+    """The numbers of a scene by the selected model, and beside them those of point dipole and finite elements."""
 
-    headline: str  # where the floater levitates and whether it remains there
+    headline: str  # where the floater levitates and whether it stays there, as the command line says it
+    conditions: str  # under which all models are compared
+    models: list[ModelAnswer]  # the selected one first
     rows: list[tuple[str, ...]]  # of the table of equilibria, the head first; as the command line prints them
     modes: list[tuple[str, ...]]  # of the eigenvalues of the first equilibrium, the head first
-    sign: str  # by which models
-    places: list[tuple[list[float], list[float]]]  # position mm and direction of the moment at t = 0 of each
+    places: list[Pose]  # of each equilibrium
     left_out: list[str]  # which solutions are no equilibria, or not known to be, in sentences
+    strength: bytes  # |B| in the plane `SLICE`, row by row from below: 0 at `WEAKEST` to 254 at 1 T, 255 in magnets
+    comparison: list[str] = field(default_factory=list)  # of point dipole and finite elements in a sentence
     lines: list[Array] = field(default_factory=list)  # of the field, m, where they were asked for
 
 
-def become(state: PageState, method: str, arguments: tuple[Any, ...]) -> tuple[PageState, Shown | str]:
-    """Another state, by a method of `PageState`, and its preview, or why there is none."""
+def become(
+    state: PageState, method: str, arguments: tuple[Any, ...], near: Sequence[Any]
+) -> tuple[PageState, Shown | str]:
+    """Another state, by a method of `PageState`, and its preview from places `near`, or why there is none."""
     made: PageState = getattr(state, method)(*arguments)
     made.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
     try:
-        return made, preview(made)
+        return made, preview(made, near)
     except SpinlevError as error:
         return made, str(error)
 
 
-def preview(state: PageState) -> Shown:
-    """All equilibria by what can be computed while a slider moves: the point dipole without the plate's currents."""
-    models = Models("map" if state.model == "map" else "dipole", "none")
-    levitation = Levitation(state.scene, models, state.spin)
-    # Not from the cache, which would get a file for every step of a slider.
-    levitation.adopt(survey(state.scene, levitation.interaction, state.spin, rates=levitation.rates))
-    return _shown(levitation)
+def compared(state: PageState) -> list[FieldModel]:
+    """The models that are told: the selected one, then point dipole and finite elements, or the map in their place."""
+    return list(dict.fromkeys((state.model, cast(FieldModel, "map" if state.scene.field_map else "fem"), "dipole")))
+
+
+def preview(state: PageState, near: Sequence[Any] = ()) -> Shown:
+    """Equilibria without the plate's currents, while a slider moves.
+
+    They are those that Newton's method finds from places `near` (as of `Shown.places`); where it loses one, all that a
+    search finds by the point dipole. Models whose tables are not in the cache are left out.
+    """
+    known: dict[str, Levitation] = {}
+    fresh: Sequence[Any] = ()  # places by the point dipole, the first of all
+    for model in sorted(compared(state), key=lambda name: name in PERMEABLE):
+        levitation = Levitation(state.scene, Models(model, "none"), state.spin)
+        try:
+            with kept_only():
+                found = _survey_near(levitation, near) or _survey_near(levitation, fresh)
+                # Not from the cache, which would get a file for every step of a slider.
+                found = found or survey(state.scene, levitation.interaction, state.spin, rates=levitation.rates)
+        except NotKeptError:
+            continue
+        levitation.adopt(found)
+        known[model] = levitation
+        fresh = fresh or [_pose(e) for e in found.equilibria]
+    return _shown(state, known)
+
+
+def _survey_near(levitation: Levitation, near: Sequence[Any]) -> Survey | None:
+    """What becomes of equilibria of a scene nearby; None where one of them is lost, or is no fixed point."""
+    scene, scales = levitation.scene, Scales.of(levitation.scene)
+    if not near or scene.floater.body is not None or np.any(scene.gravity[:2]):
+        return None
+    check_turning(scene)
+    balance = Balance(
+        levitation.rates, parameters(scene, scales, frozen_spin=True), levitation.spin * scales.spin_ratio
+    )
+    starts = np.array([place for place, _ in near]) * 1e-3 / scales.length
+    position, moment, size = solve(balance, starts, np.array([m for _, m in near]), EVERY, NEWTON_STEPS)
+    here, doubts = field_doubts(levitation.interaction, position * scales.length)
+    apart = np.linalg.norm(position - starts, axis=1)
+    if not here.all() or (size > CONVERGED_STEP).any() or (apart > 3 * NEAR).any():
+        return None
+    return survey_of(scene, balance, FixedPoints.at(balance, np.concatenate([position, moment], axis=1), doubts))
 
 
 def complete(state: PageState) -> Shown:
-    """All equilibria by the models asked for, as the command line finds them, and the field's lines."""
-    levitation = Levitation(state.scene, state.models, state.spin)
-    found = _shown(levitation)
-    known = drawn_field(state.scene, levitation.table)
-    lines = field_lines(state.scene, lambda points: np.nan_to_num(known(points)), *SIGHT)
+    """All equilibria by the models asked for, as the command line finds them, the others' beside, and the field."""
+    selected = Levitation(state.scene, state.models, state.spin)
+    selected.survey  # noqa: B018  # refused here, before the others
+    known = {state.model: selected}
+    for model in compared(state)[1:]:
+        other = selected.elsewhere(replace(state.models, model=model))
+        with suppress(SpinlevError):  # as of a magnet that no mesh can be made of
+            if other.table.model not in {one.table.model for one in known.values()}:
+                other.plate = selected.plate  # all have one network of its currents
+                other.survey  # noqa: B018
+                known[model] = other
+    found = _shown(state, known)
+    if (rough := known.get("dipole")) and (
+        fine := next((one for name, one in known.items() if name != "dipole"), None)
+    ):
+        true = rough.elsewhere(rotor=of_true_moment(state.scene.rotor, sources(fine.table)))
+        true.plate = selected.plate
+        told = compared_models(rough.survey, true.survey, fine.survey, fine.table.model)
+        found = replace(found, comparison=comparison_words(told, state.scene.plate is not None and not selected.plate))
+    drawn = drawn_field(state.scene, selected.table)
+    lines = field_lines(state.scene, lambda points: np.nan_to_num(drawn(points)), *SIGHT)
     return replace(found, lines=[line[::2] for line in lines])
 
 
-def _shown(levitation: Levitation) -> Shown:
-    found, left_out = levitation.equilibria, levitation.survey.left_out
+def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
+    """What a page shows of the models that are `known`."""
+    first = known.get(state.model) or next(iter(known.values()))
+    found, left_out = first.equilibria, first.survey.left_out
     useful = worth_a_row(found)
-    felt = levitation.plate.model if levitation.plate is not None else "none"
-    plate = f", {PLATE_WORDS[felt]}" if levitation.scene.plate is not None else ""
-    mutual = ", rotor and floater magnetise each other" if levitation.interaction_model == "mutual" else ""
+    answers = []
+    for model in compared(state):
+        if one := known.get(model):
+            near = worth_a_row(one.equilibria)
+            e = nearest_of(near, useful[0].position) if useful else next(iter(near), None)
+            name = MODEL_WORDS[one.table.model]
+            answers.append(ModelAnswer(name, True, *(_pose(e), e.polar_angle_deg, STABILITY[e.stability]) if e else ()))
+        elif not any(MODEL_WORDS.get(model) == answer.name for answer in answers):
+            answers.append(ModelAnswer(MODEL_WORDS.get(model, "model chosen by accuracy"), False))
+    felt = first.plate.model if first.plate is not None else "none"
+    conditions = [PLATE_WORDS[felt]] if state.scene.plate is not None else []
+    if any(one.interaction_model == "mutual" for one in known.values()):
+        conditions.append("finite elements with mutual magnetisation of rotor and floater")
     modes = (
         [(MODE_NAMES.get(m.name, m.name), f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in useful[0].modes]
         if useful
         else []
     )
+    z, x = np.meshgrid(*(np.arange(low, high + PIXEL / 2, PIXEL) for low, high in SLICE[::-1]), indexing="ij")
+    with np.errstate(divide="ignore"):
+        size = np.log10(
+            np.linalg.norm(
+                drawn_field(state.scene, first.table)(1e-3 * np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)), axis=1
+            )
+        )
+    levels = np.clip(np.nan_to_num((size - WEAKEST) / -WEAKEST * 254, neginf=0.0), 0, 254)
+    levels = np.where(np.isnan(size), 255, levels)
     return Shown(
-        headline=headline(levitation, found, left_out),
-        rows=equilibria_rows(levitation, found),
+        headline=headline(first, found, left_out),
+        conditions="; ".join(conditions),
+        models=answers,
+        rows=equilibria_rows(first, found),
         modes=[MODE_COLUMNS, *modes] if useful else [],
-        sign=f"{MODEL_WORDS.get(levitation.table.model, levitation.table.model)}{mutual}{plate}",
-        places=[((1e3 * e.start.position).tolist(), e.start.moment.tolist()) for e in useful],
-        left_out=left_out_words(levitation, left_out),
+        places=[_pose(e) for e in useful],
+        left_out=left_out_words(first, left_out),
+        strength=levels.astype(np.uint8).tobytes(),
     )
+
+
+def _pose(equilibrium: Equilibrium) -> Pose:
+    return (1e3 * equilibrium.start.position).tolist(), equilibrium.start.moment.tolist()
 
 
 @dataclass(frozen=True)
 class Regions:
-    """Where something levitates: 0 nothing, 1 only unstably, 2 stably, (n, m) over frequencies Hz and measures."""
+    """Where the floater levitates stably over frequency (Hz) and measure (mm or °) by a model.
+
+    `cells` are polygons that together are the region, `border` the pieces of its border that are none of the map's.
+    """
 
     model: str
-    frequencies: Array
-    measures: Array
-    kind: Array
+    cells: list[list[tuple[float, float]]]
+    border: list[tuple[tuple[float, float], ...]]
 
 
 def has_map(state: PageState) -> bool:
@@ -127,51 +250,122 @@ def has_map(state: PageState) -> bool:
 
 
 def map_key(state: PageState) -> str:
-    """All that a map depends on: neither its own axes, nor the plate, nor where a trajectory begins."""
+    """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
     whole = canonical_keys(state.scene)
     keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
     open_ones = ("displacement_mm", "angle_deg")
     keys["rotor"] = {key: value for key, value in keys["rotor"].items() if key not in open_ones}
-    return f"{keys} {state.spin} {state.model == 'cuboid'}"
+    return f"{keys} {state.spin}"
+
+
+def article_points(state: PageState) -> dict[str, Any]:
+    """Rotors of the article that were `tested` without frequency, those that `levitated`, and its trajectories."""
+    kind = state.keys["rotor"]["configuration"]
+    known = article.CONFIGURATIONS[kind]
+    return {"tested": known.tested, "levitated": known.levitated, "flights": ARTICLE_FLIGHTS.get(kind, ())}
 
 
 def regions(
     state: PageState, spans: tuple[tuple[float, float], tuple[float, float]], model: str, points: int
 ) -> Regions:
-    """A map of where something levitates.
+    """Where something levitates stably, without plate.
 
     Parameters
     ----------
     state : gives all but frequency and measure of the rotor
     spans : of the frequency, Hz, and of the measure, mm or degrees
-    model, points : of the field, and along each axis
+    model, points : of the field, and along each axis; magnets that move against each other have the closed form
+
+    Raises ComputationError: the scene has no such map.
     """
     configuration = state.keys["rotor"]["configuration"]
-    frequencies, measures = (np.linspace(*span, points) for span in spans)
+    axes = [np.linspace(*span, points) for span in spans]
     unit = np.radians(1.0) if configuration == "tilt" else 1e-3
     try:
-        family = rotor_family(state.scene, configuration, model)
-        every, stable = equilibrium_map(family, frequencies, measures * unit, state.spin).number
+        try:
+            family = rotor_family(state.scene, configuration, model)
+        except InputError:
+            model = "cuboid"
+            family = rotor_family(state.scene, configuration, model)
+        found = equilibrium_map(family, axes[0], axes[1] * unit, state.spin)
     except ValueError as error:
         raise ComputationError(str(error)) from None
-    return Regions(model, frequencies, measures, np.asarray((every > 0).astype(np.uint8) + (stable > 0)))
+    stable, ends = found.number[1] > 0, _ends(family, found, state.spin)
+    cells, border = [], []
+    for i, j in np.ndindex(points - 1, points - 1):
+        corners, outline, crossed = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)], [], []
+        for one, next_one in zip(corners, [*corners[1:], corners[0]], strict=True):
+            if stable[one]:
+                outline.append((axes[0][one[0]], axes[1][one[1]]))
+            if stable[one] != stable[next_one]:
+                inner, outer = (one, next_one) if stable[one] else (next_one, one)
+                place = np.array(inner) + ends[inner, outer] * np.subtract(outer, inner)
+                crossed.append(
+                    tuple(float(np.interp(p, np.arange(points), axis)) for p, axis in zip(place, axes, strict=True))
+                )
+                outline.append(crossed[-1])
+        cells += [outline] if outline else []
+        border += [tuple(crossed[k : k + 2]) for k in range(0, len(crossed), 2)]
+    return Regions(model, cells, border)
+
+
+Node: TypeAlias = tuple[int, int]
+
+
+def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple[Node, Node], float]:
+    """Where the stable equilibrium of a point of a map ends on the way (0 to 1) to a neighbour that has none."""
+    stable = found.number[1] > 0
+    pairs = [
+        (one, other)
+        for one in zip(*(index.tolist() for index in np.nonzero(stable)), strict=True)
+        for step in ((1, 0), (-1, 0), (0, 1), (0, -1))
+        if min(other := (one[0] + step[0], one[1] + step[1])) >= 0
+        and other[0] < stable.shape[0] and other[1] < stable.shape[1] and not stable[other]
+    ]  # fmt: skip
+    if not pairs:
+        return {}
+    which = {(int(found.row[k]), int(found.column[k])): k for k in np.flatnonzero(found.stable)[::-1]}
+    first = np.array([which[one] for one, _ in pairs])
+    position, moment = found.position[first] / family.scene.floater.radius, found.moment[first]
+    axes = found.frequencies, found.measures
+    begin, end = (
+        np.array([[axis[k] for axis, k in zip(axes, pair[side], strict=True)] for pair in pairs]) for side in (0, 1)
+    )
+    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        values = family.values(*(begin + middle[:, None] * (end - begin)).T)
+        balance = Balance(family.rates, values, np.full(len(pairs), spin))
+        places, turned, size = solve(balance, position, moment, EVERY, NEWTON_STEPS)
+        apart = np.linalg.norm(places - position, axis=1)
+        good = np.flatnonzero((size < CONVERGED_STEP) & (apart < 3 * NEAR))  # not a number is neither
+        there = balance.at(good)
+        eigenvalues, errors, _ = spectra(
+            there.states(places[good], turned[good]),
+            there.rates(there.states(places[good], turned[good]), there.values)[1],
+        )
+        good = good[is_stable(eigenvalues, errors)]
+        position[good], moment[good], low[good] = places[good], turned[good], middle[good]
+        high[np.setdiff1d(np.arange(len(pairs)), good)] = middle[np.setdiff1d(np.arange(len(pairs)), good)]
+    return dict(zip(pairs, ((low + high) / 2).tolist(), strict=True))
 
 
 Frame: TypeAlias = "dict[str, Any]"
-"""A moment of a trajectory: `samples` (3, n) since the last, time s, height mm, polar angle °; the floater's `pose`,
-its position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's
-`angle`, rad; how the trajectory has `ended`, in words; a `message` of what was wrong with a wish."""
+"""A moment of a flight: `samples` (3, n) since the last, time s, height mm and polar angle °; the floater's `pose`, its
+position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's `angle`,
+rad, and how far the `plate` is lowered, mm; how the flight has `ended`, in words; a `message` of what was wrong with
+a wish."""
 _flights: list[LiveFlight] = []  # The one of this process
 
 
 def begin_flight(state: PageState) -> Frame:
-    """The first frame of a trajectory."""
+    """The first frame of a flight."""
     _flights[:] = [Levitation(state.scene, state.models, state.spin).live_flight()]
     return _frame()
 
 
 def fly(seconds: float) -> Frame:
-    """The trajectory, so much later."""
+    """The flight, so much later."""
     try:
         return _frame(_flights[0].onward(seconds))
     except SpinlevError as error:
@@ -179,7 +373,7 @@ def fly(seconds: float) -> Frame:
 
 
 def wish(what: str, vector: list[float]) -> Frame:
-    """The trajectory after its floater got a "push", m/s, or was "put" elsewhere, m."""
+    """The flight after its floater got a "push", m/s, or was "put" elsewhere, m."""
     try:
         getattr(_flights[0], what)(np.array(vector))
     except SpinlevError as error:
@@ -189,12 +383,12 @@ def wish(what: str, vector: list[float]) -> Frame:
 
 def _frame(piece: Piece | None = None) -> Frame:
     flight = _flights[0]
-    if piece is None:  # nothing was simulated
+    if piece is None:  # nothing was flown
         lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
-        turned = float(flight.scene.angle(flight.time))
+        turned = flight.scene.angular_velocity * flight.time
         piece = Piece(np.array([flight.time]), lab, turned, flight.ended_by)
     places, moments = piece.lab.position, piece.lab.moment
-    seen = piece.lab.to_rotor(flight.scene.angle(piece.time)).position
+    seen = piece.lab.to_rotor(flight.scene.angular_velocity * piece.time).position
     words = ENDS.get(piece.ended_by, "")
     return {
         "samples": np.stack([piece.time, 1e3 * places[:, 2], polar_angle(moments)]),
@@ -203,6 +397,7 @@ def _frame(piece: Piece | None = None) -> Frame:
             "moment": moments[-1],
             "seen": 1e3 * seen[-1],
             "angle": float(np.fmod(piece.angle, 2 * np.pi)),
+            "plate": 1e3 * float(plate_depth(plate, piece.time[-1:])[0]) if (plate := flight.scene.plate) else 0.0,
         },
         "ended": f"After {flight.time:.3g} s {words}." if words else "",
         "message": "",

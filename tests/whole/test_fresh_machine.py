@@ -246,7 +246,7 @@ def test_a_pin_that_the_oldest_python_cannot_install_is_found(package, said):
 @pytest.mark.parametrize(
     ("extra", "hidden", "given"),
     [
-        ("explore", "plotly", ["explore", "SCENE"]),
+        ("explore", "tornado", ["explore", "SCENE"]),
         ("studies", "jinja2", ["report", "QUICK"]),
         ("cluster", "dask", ["study", "SCENE", "--vary", "frequency_hz=100:120:10", "--scheduler", "tcp://x:1"]),
     ],

@@ -73,7 +73,7 @@ def test_the_token_twice_is_not_the_token(page):
         *("/etc/passwd", "/../../../etc/passwd", "//etc/passwd", "/static/../../../../etc/passwd", "/%2e%2e/%2e%2e/x"),
         *("/static/js/../../server.py", "/static/js/..%2f..%2fserver.py", "/static/js/%2e%2e/server.py", "/static/"),
         *("/static/js/bokeh.min.js/../x", "/static/js/bokeh.min.js%00", "/page.css", "/page.html", "/page.js/"),
-        *("/autoload.js", "/metadata", "/static/extensions/x", "/favicon.ico", "/\\..\\x", "/plotly.js/../page.py"),
+        *("/autoload.js", "/metadata", "/static/extensions/x", "/favicon.ico", "/\\..\\x", "/page.js/../page.py"),
         *("/scene.toml", "/index.html", "/ws/", "/./", "/page.js?x=../../y/.."),
     ],
 )
@@ -212,9 +212,9 @@ def test_a_port_that_is_taken(page):
 
 
 def test_the_libraries_are_missing(monkeypatch):
-    for name in [name for name in sys.modules if name.startswith(("plotly", "spinlev.studies.page"))]:
+    for name in [name for name in sys.modules if name.startswith(("tornado", "spinlev.studies.page"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.delattr(sys.modules["spinlev.studies"], "explore", raising=False)
-    monkeypatch.setitem(sys.modules, "plotly", None)
-    with pytest.raises(ComputationError, match=r"plotly is needed.*pip install 'spinlev\[explore\]'"):
+    monkeypatch.setitem(sys.modules, "tornado", None)
+    with pytest.raises(ComputationError, match=r"tornado is needed.*pip install 'spinlev\[explore\]'"):
         sl.explore(OVER_PLATE)
