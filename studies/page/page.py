@@ -173,6 +173,10 @@ class Page:
 
     def _rest(self) -> None:
         self.tell(address=self.state.query())
+        if self.shown and not all(one.known for one in self.shown.models):  # the plate can take far longer
+            self.slow.ask(
+                "preview", lambda: (work.preview, self.state, self.near, True), partial(self._answered, False)
+            )
         self.slow.ask("", lambda: (work.complete, self.state), partial(self._answered, True))
         if not work.has_map(self.state):
             self._forget_map(NO_MAP)

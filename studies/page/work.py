@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
@@ -117,18 +117,18 @@ def compared(state: PageState) -> list[FieldModel]:
     return list(dict.fromkeys((state.model, cast(FieldModel, "map" if state.scene.field_map else "fem"), "dipole")))
 
 
-def preview(state: PageState, near: Sequence[Any] = ()) -> Shown:
+def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -> Shown:
     """Equilibria without the plate's currents, while a slider moves.
 
-    They are those that Newton's method finds from places `near` (as of `Shown.places`); where it loses one, all that a
-    search finds by the point dipole. Models whose tables are not in the cache are left out.
+    They are those that Newton's method finds from places `near` (as of `Shown.places`), else from the point dipole's,
+    else all that a search finds. Models whose tables are not in the cache are left out unless one is `patient`.
     """
     known: dict[str, Levitation] = {}
     fresh: Sequence[Any] = ()  # places by the point dipole, the first of all
     for model in sorted(compared(state), key=lambda name: name in PERMEABLE):
         levitation = Levitation(state.scene, Models(model, "none"), state.spin)
         try:
-            with kept_only():
+            with nullcontext() if patient else kept_only():
                 found = _survey_near(levitation, near) or _survey_near(levitation, fresh)
                 # Not from the cache, which would get a file for every step of a slider.
                 found = found or survey(state.scene, levitation.interaction, state.spin, rates=levitation.rates)
