@@ -1,4 +1,4 @@
-"""One page in the browser: what its reader does, what is computed for it, and what it is told to show; lengths mm."""
+"""One page in the browser: what its reader does, what is computed for it, and what it shows; lengths mm."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .worker import PATIENCE, Worker
 
 REST = 0.25  # Seconds after which a slider is taken to rest
 QUICK, LONG = 60.0, 600.0  # Seconds that a scene with its preview, and other work, may take
-SLOWEST = 0.25  # Most seconds of a flight between two pictures
+SLOWEST = 0.25  # Most seconds of a trajectory between two pictures
 POINTS = 25  # Of a map along each axis
-ROLLING = 4000  # Samples of a flight that are kept
+ROLLING = 4000  # Samples of a trajectory that are kept
 PLATES = {
     "none": "Plate: only an obstacle",
     "slab": "Plate: infinite slab",
@@ -57,7 +57,7 @@ class Page:
         self.flyer = Worker("The trajectory", LONG, self._lost)
         self.number = 0  # of answers
         self.shown: Shown | None = None
-        self.samples = np.zeros((3, 0))  # of the flight: time s, height mm and polar angle °
+        self.samples = np.zeros((3, 0))  # of the trajectory: time s, height mm and polar angle °
         self.resting: asyncio.TimerHandle | None = None
         self.mapped, self.begun = "", False
         self.flying, self.ended = False, False
@@ -156,9 +156,9 @@ class Page:
     def _answered(self, complete: bool, found: Shown) -> None:
         """Numbers at once, and later by the models asked for."""
         self.shown, self.number = found, self.number + 1
-        told = {key: value for key, value in vars(found).items() if key not in ("lines", "strength")}
-        told["models"] = [vars(one) for one in found.models]
-        self.tell(numbers={**told, "number": self.number, "complete": complete})
+        shown = {key: value for key, value in vars(found).items() if key not in ("lines", "strength")}
+        shown["models"] = [vars(one) for one in found.models]
+        self.tell(numbers={**shown, "number": self.number, "complete": complete})
         keys = self.state.keys
         rotor, whole = str(keys["rotor"]), str((keys["rotor"], keys["floater"], keys.get("plate")))
         if complete or self.drawn[0] != rotor:
@@ -224,10 +224,10 @@ class Page:
 
         self.porter.ask(kind, lambda: (work.content, kind, self.state), downloaded)
 
-    # The flight, which page.js asks for piece by piece
+    # The trajectory, which page.js asks for piece by piece
 
     def _land(self) -> None:
-        """Forget the flight."""
+        """Forget the trajectory."""
         self.flyer.stop()
         self.flying = self.ended = False
         self.tell(says="")
@@ -257,7 +257,7 @@ class Page:
         self.flyer.ask("fly", lambda: (work.fly, min(float(seconds), SLOWEST)), partial(self._flown, piece=True))
 
     def _wish(self, what: str, vector: Sequence[float]) -> None:
-        """A floater that is dragged flies on; where it cannot be the page waits, so that the reason can be read."""
+        """A floater that is dragged moves on; where it cannot be the page waits, so that the reason can be read."""
         self._take_off()
         call = work.wish, what, [1e-3 * float(part) for part in vector]
 

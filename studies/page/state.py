@@ -34,7 +34,7 @@ SIZES = {"edge_mm": "edge (mm)", "diameter_mm": "diameter (mm)", "height_mm": "h
 
 @dataclass(frozen=True, eq=False)
 class PageState:
-    """All that decides what a page shows, but for the flight."""
+    """All that decides what a page shows, but for the trajectory."""
 
     scene: Scene
     model: FieldModel = "fem"  # of the field

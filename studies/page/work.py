@@ -6,15 +6,24 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ...dynamics.continuation.map import EquilibriumMap, equilibrium_map
 from ...dynamics.continuation.rotor_family import RotorFamily, rotor_family
 from ...dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
-from ...dynamics.equilibria.equilibrium import MODE_NAMES, Equilibrium, Survey, is_stable, nearest_of, spectra
+from ...dynamics.equilibria.equilibrium import (
+    MODE_NAMES,
+    STABILITIES,
+    Equilibrium,
+    Survey,
+    is_stable,
+    nearest_of,
+    spectra,
+)
 from ...dynamics.equilibria.path import NEAR, NEWTON_STEPS
 from ...dynamics.equilibria.search import FixedPoints, check_turning, field_doubts, survey, survey_of
 from ...dynamics.flights.live import LiveFlight, Piece
@@ -29,12 +38,12 @@ from ...geometry.scene.files import canonical_keys, scene_text
 from ..catalogue import article
 from ..cli.console import to_json
 from ..cli.options import FieldModel, Models
+from ..compare import compared_models
 from ..figures.pictures import drawn_field
 from ..figures.view import field_lines
 from ..levitation import Levitation
 from ..plan import sources
 from ..result import Result, write_dataset
-from ..run import compared_models
 from ..words import comparison_words, equilibria_rows, headline, left_out_words, worth_a_row
 from .state import MEASURES, PageState
 
@@ -53,7 +62,6 @@ MODEL_WORDS = {
     "fem": "finite elements",
     "map": "map of the field",
 }
-STABILITY = {"stable": "stable", "marginal": "marginally unstable", "unstable": "unstable"}
 PLATE_WORDS = {"none": "without the plate's eddy currents", "slab": "over the plate as an infinite slab"}
 PLATE_WORDS |= dict.fromkeys(("reduced", "fem"), "over the finite plate")
 HALVINGS = 6  # of a step of the map, until where its region of stability ends is known
@@ -88,7 +96,7 @@ class ModelAnswer:
 class Shown:
     """The numbers of a scene by the selected model, and beside them those of point dipole and finite elements."""
 
-    headline: str  # where the floater levitates and whether it stays there, as the command line says it
+    headline: str  # where the floater levitates and whether it remains there, as the command line says it
     conditions: str  # under which all models are compared
     models: list[ModelAnswer]  # the selected one first
     rows: list[tuple[str, ...]]  # of the table of equilibria, the head first; as the command line prints them
@@ -113,22 +121,22 @@ def become(
 
 
 def compared(state: PageState) -> list[FieldModel]:
-    """The models that are told: the selected one, then point dipole and finite elements, or the map in their place."""
-    return list(dict.fromkeys((state.model, cast(FieldModel, "map" if state.scene.field_map else "fem"), "dipole")))
+    """The models that are shown: the selected one, then point dipole and finite elements, or the map in their place."""
+    return list(dict.fromkeys((state.model, "map" if state.scene.field_map else "fem", "dipole")))
 
 
 def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -> Shown:
     """Equilibria without the plate's currents, while a slider moves.
 
     They are those that Newton's method finds from places `near` (as of `Shown.places`), else from the point dipole's,
-    else all that a search finds. Models whose tables are not in the cache are left out unless one is `patient`.
+    else all that a search finds. Finite elements that are not in the cache are left out unless one is `patient`.
     """
     known: dict[str, Levitation] = {}
     fresh: Sequence[Any] = ()  # places by the point dipole, the first of all
     for model in sorted(compared(state), key=lambda name: name in PERMEABLE):
         levitation = Levitation(state.scene, Models(model, "none"), state.spin)
         try:
-            with nullcontext() if patient else kept_only():
+            with nullcontext() if patient or model not in PERMEABLE else kept_only():
                 found = _survey_near(levitation, near) or _survey_near(levitation, fresh)
                 # Not from the cache, which would get a file for every step of a slider.
                 found = found or survey(state.scene, levitation.interaction, state.spin, rates=levitation.rates)
@@ -162,7 +170,7 @@ def complete(state: PageState) -> Shown:
     """All equilibria by the models asked for, as the command line finds them, the others' beside, and the field."""
     selected = Levitation(state.scene, state.models, state.spin)
     selected.survey  # noqa: B018  # refused here, before the others
-    known = {state.model: selected}
+    known: dict[str, Levitation] = {state.model: selected}
     for model in compared(state)[1:]:
         other = selected.elsewhere(replace(state.models, model=model))
         with suppress(SpinlevError):  # as of a magnet that no mesh can be made of
@@ -176,8 +184,10 @@ def complete(state: PageState) -> Shown:
     ):
         true = rough.elsewhere(rotor=of_true_moment(state.scene.rotor, sources(fine.table)))
         true.plate = selected.plate
-        told = compared_models(rough.survey, true.survey, fine.survey, fine.table.model)
-        found = replace(found, comparison=comparison_words(told, state.scene.plate is not None and not selected.plate))
+        distances = compared_models(rough.survey, true.survey, fine.survey, fine.table.model)
+        found = replace(
+            found, comparison=comparison_words(distances, state.scene.plate is not None and not selected.plate)
+        )
     drawn = drawn_field(state.scene, selected.table)
     lines = field_lines(state.scene, lambda points: np.nan_to_num(drawn(points)), *SIGHT)
     return replace(found, lines=[line[::2] for line in lines])
@@ -194,7 +204,9 @@ def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
             near = worth_a_row(one.equilibria)
             e = nearest_of(near, useful[0].position) if useful else next(iter(near), None)
             name = MODEL_WORDS[one.table.model]
-            answers.append(ModelAnswer(name, True, *(_pose(e), e.polar_angle_deg, STABILITY[e.stability]) if e else ()))
+            answers.append(
+                ModelAnswer(name, True, *(_pose(e), e.polar_angle_deg, STABILITIES[e.stability]) if e else ())
+            )
         elif not any(MODEL_WORDS.get(model) == answer.name for answer in answers):
             answers.append(ModelAnswer(MODEL_WORDS.get(model, "model chosen by accuracy"), False))
     felt = first.plate.model if first.plate is not None else "none"
@@ -231,6 +243,9 @@ def _pose(equilibrium: Equilibrium) -> Pose:
     return (1e3 * equilibrium.start.position).tolist(), equilibrium.start.moment.tolist()
 
 
+Place: TypeAlias = tuple[float, float]  # Frequency, Hz, and measure of the rotor, mm or °
+
+
 @dataclass(frozen=True)
 class Regions:
     """Where the floater levitates stably over frequency (Hz) and measure (mm or °) by a model.
@@ -239,8 +254,8 @@ class Regions:
     """
 
     model: str
-    cells: list[list[tuple[float, float]]]
-    border: list[tuple[tuple[float, float], ...]]
+    cells: list[list[Place]]
+    border: list[tuple[Place, ...]]
 
 
 def has_map(state: PageState) -> bool:
@@ -250,7 +265,7 @@ def has_map(state: PageState) -> bool:
 
 
 def map_key(state: PageState) -> str:
-    """All that a map depends on: neither its own axes, nor the plate, nor where a flight begins."""
+    """All that a map depends on: neither its own axes, nor the plate, nor where a trajectory begins."""
     whole = canonical_keys(state.scene)
     keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
     open_ones = ("displacement_mm", "angle_deg")
@@ -291,18 +306,18 @@ def regions(
     except ValueError as error:
         raise ComputationError(str(error)) from None
     stable, ends = found.number[1] > 0, _ends(family, found, state.spin)
-    cells, border = [], []
+    cells, border = list[list[Place]](), list[tuple[Place, ...]]()
     for i, j in np.ndindex(points - 1, points - 1):
-        corners, outline, crossed = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)], [], []
-        for one, next_one in zip(corners, [*corners[1:], corners[0]], strict=True):
+        outline, crossed = list[Place](), list[Place]()
+        corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1), (i, j)]
+        for one, following in pairwise(corners):
+            places = [(float(axes[0][k]), float(axes[1][n])) for k, n in (one, following)]
             if stable[one]:
-                outline.append((axes[0][one[0]], axes[1][one[1]]))
-            if stable[one] != stable[next_one]:
-                inner, outer = (one, next_one) if stable[one] else (next_one, one)
-                place = np.array(inner) + ends[inner, outer] * np.subtract(outer, inner)
-                crossed.append(
-                    tuple(float(np.interp(p, np.arange(points), axis)) for p, axis in zip(place, axes, strict=True))
-                )
+                outline.append(places[0])
+            if stable[one] != stable[following]:
+                part = ends[one, following] if stable[one] else 1 - ends[following, one]
+                (x, y), (right, up) = places
+                crossed.append((x + part * (right - x), y + part * (up - y)))
                 outline.append(crossed[-1])
         cells += [outline] if outline else []
         border += [tuple(crossed[k : k + 2]) for k in range(0, len(crossed), 2)]
@@ -351,21 +366,21 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
 
 
 Frame: TypeAlias = "dict[str, Any]"
-"""A moment of a flight: `samples` (3, n) since the last, time s, height mm and polar angle °; the floater's `pose`, its
-position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's `angle`,
-rad, and how far the `plate` is lowered, mm; how the flight has `ended`, in words; a `message` of what was wrong with
-a wish."""
+"""A moment of a trajectory: `samples` (3, n) since the last, time s, height mm, polar angle °; the floater's `pose`,
+its position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's
+`angle`, rad, and how far the `plate` is lowered, mm; how the trajectory has `ended`, in words; a `message` of what was
+wrong with a wish."""
 _flights: list[LiveFlight] = []  # The one of this process
 
 
 def begin_flight(state: PageState) -> Frame:
-    """The first frame of a flight."""
+    """The first frame of a trajectory."""
     _flights[:] = [Levitation(state.scene, state.models, state.spin).live_flight()]
     return _frame()
 
 
 def fly(seconds: float) -> Frame:
-    """The flight, so much later."""
+    """The trajectory, so much later."""
     try:
         return _frame(_flights[0].onward(seconds))
     except SpinlevError as error:
@@ -373,7 +388,7 @@ def fly(seconds: float) -> Frame:
 
 
 def wish(what: str, vector: list[float]) -> Frame:
-    """The flight after its floater got a "push", m/s, or was "put" elsewhere, m."""
+    """The trajectory after its floater got a "push", m/s, or was "put" elsewhere, m."""
     try:
         getattr(_flights[0], what)(np.array(vector))
     except SpinlevError as error:
@@ -383,12 +398,12 @@ def wish(what: str, vector: list[float]) -> Frame:
 
 def _frame(piece: Piece | None = None) -> Frame:
     flight = _flights[0]
-    if piece is None:  # nothing was flown
+    if piece is None:  # nothing was simulated
         lab = type(flight.now)(*(vector[None] for vector in flight.now.vectors))
-        turned = flight.scene.angular_velocity * flight.time
+        turned = float(flight.scene.angle(flight.time))
         piece = Piece(np.array([flight.time]), lab, turned, flight.ended_by)
     places, moments = piece.lab.position, piece.lab.moment
-    seen = piece.lab.to_rotor(flight.scene.angular_velocity * piece.time).position
+    seen = piece.lab.to_rotor(flight.scene.angle(piece.time)).position
     words = ENDS.get(piece.ended_by, "")
     return {
         "samples": np.stack([piece.time, 1e3 * places[:, 2], polar_angle(moments)]),
