@@ -27,7 +27,7 @@ import xarray as xr
 from filelock import FileLock, Timeout
 from xarray.backends import H5NetCDFStore
 
-from ..geometry.common import InputError
+from ..geometry.common import ComputationError, InputError
 from ..geometry.files import regular_file
 from .codec import CodecError, from_dataset, to_dataset
 from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_whole
@@ -63,7 +63,7 @@ class TableFileError(InputError):
     """A table file that is damaged, or is not one."""
 
 
-class NotKeptError(InputError):
+class NotKeptError(ComputationError):
     """A table that is not in the cache, where none may be made."""
 
 
