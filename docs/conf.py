@@ -45,6 +45,7 @@ html_context = {"default_mode": "auto"}
 html_sidebars = {"index": []}
 html_static_path = ["static"]
 html_css_files = ["narrow.css"]
+html_js_files = ["enlarge.js"]
 
 
 def shown_docstring(app, what, name, obj, options, lines):

@@ -88,7 +88,7 @@ def draw_house() -> Figure:
         stacks = [list(column) for _, column in columns]
         height = max(map(len, stacks))
         axes.axhspan(bottom - 0.6, bottom + height - 0.4, color=COLORS[floor], zorder=0)
-        axes.text(-1.25, bottom + (height - 1) / 2, floor, fontsize=15, va="center", rotation=90)
+        axes.text(-1.25, bottom + (height - 1) / 2, floor, fontsize=12, ha="center", va="center", rotation=90)
         for k, stack in enumerate(stacks):
             for j, room in enumerate(stack):
                 places[room] = (1.9 * k, bottom + j + (height - len(stack)) / 2)
@@ -112,7 +112,8 @@ def _box(axes: Axes, place: tuple[float, float], name: str) -> FancyBboxPatch:
     x, y = place
     box = FancyBboxPatch((x - 0.75, y - 0.3), 1.5, 0.6, boxstyle="round,pad=0.02", fc="white", ec="0.4", zorder=3)
     axes.add_patch(box)
-    axes.text(x, y, name, ha="center", va="center", fontsize=10, zorder=4)
+    words = name.replace(" ", "\n") if len(name) > 12 and "\n" not in name else name
+    axes.text(x, y, words, ha="center", va="center", zorder=4)
     return box
 
 
@@ -157,7 +158,8 @@ def draw_data() -> Figure:
     """From a scene to its flight: an arrow goes from what is known to what is made of it."""
     graph = {("", name): {("", other) for other in others} for name, others in members().items()}
     level, arrows = levels(graph), essential(graph)
-    figure = Figure(figsize=(15, 2.4), layout="constrained")
+    height = max(len(list(column)) for _, column in groupby(sorted(level.values())))
+    figure = Figure(figsize=(15, 0.3 + 0.8 * height), layout="constrained")
     axes = figure.add_subplot()
     places: dict[Room, tuple[float, float]] = {}
     for k, column in groupby(sorted(graph, key=lambda room: (level[room], room)), key=level.__getitem__):
@@ -167,7 +169,7 @@ def draw_data() -> Figure:
     for room, others in arrows.items():
         for other in others:
             _arrow(axes, boxes[other], boxes[room], places[other], places[room])
-    axes.set(xlim=(-1, max(x for x, _ in places.values()) + 1), ylim=(-1.2, 1.2))
+    axes.set(xlim=(-1, max(x for x, _ in places.values()) + 1), ylim=(-height / 2, height / 2))
     axes.axis("off")
     return figure
 

@@ -3,9 +3,8 @@
 from pathlib import Path
 
 from growth import useful
-from matplotlib.ticker import NullFormatter
 
-from spinlev.studies.figures.style import legend_below, panels, save_figure, styled
+from spinlev.studies.figures.style import legend_below, panels, plain_log, save_figure, styled, titled
 
 PICTURES = Path("docs/pictures")
 MARKERS = "osD^vP*X"
@@ -32,13 +31,15 @@ def _figure(work, curves):
                 continue
             time, error = zip(*pairs, strict=True)
             colour = "black" if name == "spinlev" else f"C{k}"
-            panel.loglog(time, [max(e, LEAST) for e in error], MARKERS[k], color=colour, label=name)
+            panel.loglog(time, [max(e, LEAST) for e in error], MARKERS[k], color=colour, label=name, ms=4)
             time, error = zip(*useful(pairs), strict=True)
             panel.loglog(time, [max(e, LEAST) for e in error], "-", color=colour)
         low, high = panel.get_xlim()
-        if high > DECADE * low:  # else no other tick may have a number
-            panel.xaxis.set_minor_formatter(NullFormatter())
-        panel.set(title=case, xlabel="processor time (s)")
+        if high < DECADE * low:
+            plain_log(panel.xaxis, [digit * 10.0**k for k in range(-6, 4) for digit in (1, 2, 3, 5, 7)])
+        titled(panel, case)
+        panel.set_xlabel("processor time (s)")
     axes.flat[0].set_ylabel("relative error")
+    axes.flat[0].plot([], [], "-", color="0.3", label="joined: settings that no faster one beats")
     legend_below(figure)
     return figure

@@ -126,7 +126,7 @@ AXES = "frequency of the rotor (Hz)", "levitation distance (mm)"
 @drawn
 def models_figure(result: xr.Dataset) -> Figure:
     """The levitation distance of every rotor by finite elements and by the dipole."""
-    figure, rotors = rotor_panels(result, 4.0, *AXES)
+    figure, rotors = rotor_panels(result, 4.0, *AXES, sharex=True)
     for axes, rotor, color in rotors:
         frequency, distance, stable = _branch(rotor, "fem")
         plot_branch(axes, frequency, distance, stable, color=color, lw=1.8 if _levitated(rotor) else 0.8)
@@ -144,7 +144,7 @@ def models_figure(result: xr.Dataset) -> Figure:
 def formulas_figure(result: xr.Dataset) -> Figure:
     """The article's formulas and simulated trajectories beside the dipole's equilibrium, for rotors that levitated."""
     levitated = [k for k, one in enumerate(each_case(result)) if _levitated(one.expand_dims("case"))]
-    figure, rotors = rotor_panels(result.isel(case=levitated), 3.4, *AXES)
+    figure, rotors = rotor_panels(result.isel(case=levitated), 3.4, *AXES, sharex=True)
     for axes, rotor, color in rotors:
         plot_branch(axes, *_side(rotor, "dipole", "near"), lw=0.8, color=color)
         for model, style in (("semi-analytic", ":"), ("analytic", "-.")):

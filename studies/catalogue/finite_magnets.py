@@ -108,7 +108,7 @@ CAUSES = {
     "mutual magnetisation": ("fem", "mutual"),
 }  # What lies between two models
 TOTAL = ("article", "mutual")
-ENDS = {"contact": ("v", "ends at the rotor"), "border": ("^", "goes on beyond")}
+ENDS = {"contact": ("v", "contact with the rotor"), "border": ("^", "beyond this frequency")}
 """Upper ends that are no loss of stability."""
 
 
@@ -159,7 +159,7 @@ def causes_figure(result: xr.Dataset) -> Figure:
             style: Any = {"color": color, "label": cause, "error_kw": {"lw": 0.7, "capsize": 1.5}}
             axes.bar(places + (k - len(CAUSES) / 2) * width, mean, width, yerr=spread, **style)
         axes.axhline(0.0, color="0.3", lw=0.8)
-    showing.explain(rows[0][0], {"bar: range over the frequencies, with errors": "|"})
+    showing.explain(rows[0][0], {"range over the frequencies, with errors": "|"})
     return figure
 
 
@@ -381,13 +381,13 @@ def floater_figure(result: xr.Dataset) -> Figure:
         right.semilogy(distance, missed.clip(0), "o", ms=3, color=color)
         right.semilogy(distance, (-missed).clip(0), "o", ms=3, mfc="white", color=color)
     for axes in (left, right):
-        axes.set_xlabel("distance below the rotor (mm)")
+        axes.set_xlabel("levitation distance (mm)")
         if "rigid_position" in result:
             place = -1e3 * float(result["rigid_position"].sel(axis="z"))
             axes.axvline(place, color="0.3", lw=0.8, ls=":", label="stable equilibrium")
     right.plot([], [], "o", ms=3, mfc="white", color="0.3", label="open: downwards")
-    left.set_ylabel("missed share")
-    right.set_ylabel("missed axial force (% of the weight)")
+    left.set_ylabel("error of the rigid dipole, relative")
+    right.set_ylabel("axial force left out (% of the weight)")
     return figure
 
 

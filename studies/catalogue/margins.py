@@ -201,7 +201,7 @@ def band(part: xr.Dataset, quantity: str) -> Array:
 @showing.drawn
 def contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figure:
     """What one standard deviation of each parameter does to distance or lowest frequency; with errors."""
-    figure, rotors = showing.rotor_panels(result, 3.6, words, "")
+    figure, rotors = showing.rotor_panels(result, 3.6, words, "", sharex=True)
     chosen = [k for k, name in enumerate(PARAMETERS) if name != "gravity"]  # which is known
     for axes, rotor, color in rotors:
         value, error = contributions(rotor.isel(case=0), quantity)[:, chosen]

@@ -93,14 +93,14 @@ def configuration_panels(
 
 
 def rotor_panels(
-    result: xr.Dataset, height: float, xlabel: str, ylabel: str
+    result: xr.Dataset, height: float, xlabel: str, ylabel: str, **shared: Any
 ) -> tuple[Figure, list[tuple[Axes, xr.Dataset, Any]]]:
     """A panel for each configuration, and for each rotor its panel, its cases and its colour.
 
     Colours go from dark to bright along viridis with displacement or tilt; a bar below the panel tells them.
     Parameters are those of `small_multiples`.
     """
-    figure, rows = configuration_panels(result, height, xlabel, ylabel, sharex=True)
+    figure, rows = configuration_panels(result, height, xlabel, ylabel, **shared)
     found: list[tuple[Axes, xr.Dataset, Any]] = []
     for axes, configuration, part in rows:
         rotors = dict(by_rotor(part))

@@ -300,6 +300,7 @@ def question_figure(result: xr.Dataset) -> Figure:
             label = ", ".join(
                 NAMES[v] if isinstance(v, str) else _label(shown[k], f" = {v:g}") for k, v in chosen.items()
             ) or NAMES.get(str(result.attrs.get("model", "")), "")
+            color = COLORS[chosen["model"]] if others == ["model"] else color
             _curve(panel, shown.sel(chosen), name, along, color, label)
             if name == "depth" and "dipole_distance" in shown and shown[along].dtype.kind in "iuf":
                 for beside, style in BESIDE.items():

@@ -155,11 +155,13 @@ def plot_branch(axes: Axes, x: ArrayLike, y: ArrayLike, solid: NDArray[np.bool_]
 
 
 def plain_log(axis: Any, ticks: Sequence[float] = ()) -> None:
-    """A logarithmic x or y axis of few decades, its ticks (1, 2, 5, 10 … if not given) as plain numbers."""
+    """A logarithmic axis of few decades, its ticks (if not given 1, 3, 10 … of x, 1, 2, 5 … of y) as plain numbers."""
     from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 
     axis.axes.set(**{f"{axis.axis_name}scale": "log"})
-    locator = FixedLocator(ticks) if ticks else LogLocator(subs=(1.0, 2.0, 5.0))
+    locator = (
+        FixedLocator(ticks) if ticks else LogLocator(subs=(1.0, 3.0) if axis.axis_name == "x" else (1.0, 2.0, 5.0))
+    )
     axis.set(major_locator=locator, major_formatter="{x:g}", minor_locator=NullLocator())
 
 

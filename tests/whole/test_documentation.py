@@ -14,6 +14,7 @@ from places import ROOT
 from words import left_column
 
 import spinlev as sl
+from spinlev.studies.catalogue.entries import CATALOGUE
 from spinlev.studies.cli.console import PACKAGES
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -28,6 +29,22 @@ def test_files_that_are_named_exist():
         missing += [f"{page.name}: {name}" for name in NAMED.findall(text) if not (ROOT / name).exists()]
         missing += [f"{page.name}: {link}" for link in links if not (page.parent / link).exists()]
     assert missing == []
+
+
+def test_no_page_is_longer_than_its_readers_patience():
+    lengths = {page.name: len(page.read_text(encoding="utf-8").split()) for page in PAGES}
+    assert lengths["README.md"] <= 900
+    assert {name: length for name, length in lengths.items() if length > 2500} == {}
+
+
+def test_pictures_are_shown_and_the_code_knows_them():
+    """A figure that a study no longer draws, or draws by another name, does not stay on a page."""
+    shown = {name for page in PAGES for name in re.findall(r"pictures/([\w-]+)\.", page.read_text(encoding="utf-8"))}
+    files = {path.stem for path in (ROOT / "docs" / "pictures").iterdir()}
+    drawn = {figure for study in CATALOGUE.values() for figure in study.figures} | {"scene", "compare", "question"}
+    others = {"house", "data", "walk", "simulate", "explore"}  # docs/draw_architecture.py, docs/record_live_page.py
+    assert files <= shown
+    assert {name for name in files - drawn - others if not name.startswith("peers-")} == set()
 
 
 def test_modules_that_are_named_exist():
