@@ -171,7 +171,7 @@ def test_a_flight_from_an_unstable_equilibrium_is_never_called_stable():
     resting = np.tile(start.position, (400, 1))
     places = SimpleNamespace(position=resting)
     flight = SimpleNamespace(
-        time=time, lab=places, rotor=places, ended_by="duration", levitated_s=1.0, left_plate_table=False
+        time=time, lab=places, rotor=places, ended_by="duration", levitated_s=1.0, left_plate_table=False, given=None
     )
     assert kind_of_flight(unstable, flight) == "growing oscillation"
     assert (
