@@ -26,7 +26,7 @@ class Magnet:
 
     Raises
     ------
-    ValueError : two unlike permeabilities without a polarisation that tells the easy axis
+    ValueError : two unlike permeabilities without a polarisation that gives the easy axis
     """
 
     body: Solid

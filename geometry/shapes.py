@@ -89,7 +89,7 @@ class Body:
     @property
     @abstractmethod
     def shape_numbers(self) -> Array:
-        """Numbers (n,) m that distinguish it from others but for its pose; how many they are tells the shape.
+        """Numbers (n,) m that distinguish it from others but for its pose; how many they are gives the shape.
 
         A cuboid has three, its edges; a sphere one; a cylinder two; a ring four; a part eight, of its file's digest.
         """

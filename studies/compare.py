@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..dynamics.continuation.branch import BranchPoint
 from ..dynamics.continuation.frequencies import branch_through, levitates, on_branch, stable_ranges
-from ..dynamics.equilibria.equilibrium import MARGINAL, STABILITIES, Equilibrium, EquilibriumError, Survey, nearest_of
+from ..dynamics.equilibria.equilibrium import CRITERION, STABILITIES, Equilibrium, EquilibriumError, Survey, nearest_of
 from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.state import Scales
 from ..fem.files import write_whole
@@ -246,8 +246,8 @@ def compare_words(rows: Sequence[Compared]) -> list[str]:
     conditions = "without a plate" if scene.plate is None else "without eddy currents in the plate"
     if plate is not None:
         conditions = f"with eddy currents in the plate ({plate.model})"
-    ranges = f"Stable: growth rate below {MARGINAL:g} s⁻¹ (e-folding time above 250 s)"
-    return [*said, *lines, f"Equilibria: {conditions}. {ranges}; ranges are those without eddy currents in the plate."]
+    plates = "" if scene.plate is None else ", without eddy currents in the plate"
+    return [*said, *lines, f"Equilibria: {conditions}. Stable from, to: {CRITERION}{plates}."]
 
 
 def _cells(row: Compared) -> tuple[str, ...]:

@@ -62,7 +62,7 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
         )
     floating = None
     if scene.floater.shape == "cuboid":
-        note("The magnets alone: where a cuboid floats is not known.")
+        note("The magnets alone: the levitation of a cuboid is not computed.")
     else:
         with suppress(EquilibriumError):  # without one the magnets are alone
             floating = most_like_levitation(levitation.without_plate.equilibria)

@@ -139,7 +139,7 @@ def export_job(scene: Scene, requested: Models, path: Path) -> Answer:
 
 
 def _floater_state(levitation: Levitation) -> State | None:
-    """The floater at t = 0, (3,) along the rotor's axes; None where the scene tells no place for it."""
+    """The floater at t = 0, (3,) along the rotor's axes; None where the scene gives no place for it."""
     start = levitation.scene.start
     if isinstance(start, AbsoluteStart):
         return State(start.position, start.velocity, start.moment, start.spin)

@@ -16,7 +16,7 @@ from .result import Columns, columns
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Point = Mapping[str, Any]  # what tells one point of a study from the others, in types that JSON knows
+Point = Mapping[str, Any]  # what distinguishes one point of a study, in types that JSON knows
 Batch = Mapping[int, Point]  # numbered points that are computed together
 # How to compute each of several points that help each other.
 Prepared = Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]]

@@ -44,3 +44,14 @@ def left_column(text):
     """The words of a page in Markdown, each with its line, for which the field has others."""
     prose = CODE.sub(lambda found: "\n" * found[0].count("\n"), text)
     return [(prose.count("\n", 0, found.start()) + 1, found[0]) for found in PROSE.finditer(prose)]
+
+
+OF_CODE = re.compile(
+    r"\b(?:told|heard|hears?|felt|flew|flown|lanes?|at home|taken along|stays? up|still up|ledgers?|in step with|"
+    r"true fields?|(?:slowest|small) motions?|undoes|side by side|caught|hangs?|answers to|e-fold in|"
+    r"(?<![`\w./\"-])flights?(?![`\w/\"]|\.\w| :|, \w+ :))(?!\w)",
+    re.IGNORECASE,
+)
+"""Not in comments and docstrings of the program either; `flights` is a room, and flight a name in code and data."""
+NAMES = re.compile(r"_?(told|heard|hears|felt|flown|asked|shaken|aside|booked|carried|lanes?)", re.IGNORECASE)
+"""Names of variables, functions and classes that say how something came about instead of what it is."""

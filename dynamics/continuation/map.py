@@ -1,4 +1,4 @@
-"""Equilibria at the points of a map or a sweep, each with its stability: searched at some, carried to all others."""
+"""Equilibria at the points of a map or a sweep, each with its stability: searched at some, continued to all others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..equilibria.balance import DUPLICATE_DISTANCE, EVERY, Balance, Indices
 from ..equilibria.curves import SearchRange, newton_search
-from ..equilibria.equilibrium import EquilibriumError, Survey, is_stable, spectra
-from ..equilibria.path import carried
+from ..equilibria.equilibrium import MARGINAL, EquilibriumError, Survey, is_stable, spectra
+from ..equilibria.path import continued
 from ..equilibria.search import FixedPoints, check_turning, field_doubts, survey_of
 from ..motion.equations import parameters
 from ..motion.rates import Rates
@@ -110,7 +110,7 @@ class Grid:
 def filled(grid: Grid, nodes: Indices) -> tuple[Indices, Array, Array]:
     """Points (k,) in order, positions and moments (k, 3) of all equilibria in a grid's ranges, by searches at `nodes`.
 
-    An equilibrium that is carried from point to point is good to round-off like any other.
+    An equilibrium that is continued from point to point is good to round-off like any other.
     """
     random, seeds = np.random.default_rng(0), []
     for first in range(0, len(nodes), TOGETHER):
@@ -130,7 +130,7 @@ def filled(grid: Grid, nodes: Indices) -> tuple[Indices, Array, Array]:
         if not len(source):
             break
         before, after = grid.balance(point[source]), grid.balance(target)
-        which, arrived, position, moment = carried(before, after, places[source, :3], places[source, 3:], bound)
+        which, arrived, position, moment = continued(before, after, places[source, :3], places[source, 3:], bound)
         point, places = (
             np.where(arrived, target[which], point[source[which]]),
             np.concatenate([position, moment], axis=1),
@@ -175,10 +175,11 @@ class EquilibriumMap:
 
     @property
     def number(self) -> tuple[Indices, Indices]:
-        """Equilibria and stable equilibria at each point: two of (frequencies, measures)."""
+        """Equilibria, and those at which no mode grows faster than `MARGINAL`: two of (frequencies, measures)."""
         shape = len(self.frequencies), len(self.measures)
         place, size = self.row * shape[1] + self.column, shape[0] * shape[1]
-        every, stable = np.bincount(place, minlength=size), np.bincount(place[self.stable], minlength=size)
+        lasting = self.growth_per_s <= np.maximum(MARGINAL, self.errors)
+        every, stable = np.bincount(place, minlength=size), np.bincount(place[lasting], minlength=size)
         return every.reshape(shape), stable.reshape(shape)
 
 

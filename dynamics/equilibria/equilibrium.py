@@ -24,6 +24,7 @@ FOLD, NOT_CONVERGED, PAST_TABLE = "fold", "not converged", "past the plate's tab
 
 # Growth rate (1/s) up to which an unstable equilibrium is marginal: e-folding in 250 s, the article's criterion.
 MARGINAL = 0.004
+CRITERION = f"growth rate at most {MARGINAL:g} s⁻¹, e-folding time {1 / MARGINAL:g} s or more"
 # What is said of each kind.
 STABILITIES = {"stable": "stable", "marginal": "marginally unstable", "unstable": "unstable"}
 

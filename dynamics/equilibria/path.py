@@ -259,7 +259,7 @@ class _Ways(BalanceCurve):
         return replace(start, values=values, spin=spin + parameter * (np.asarray(end.spin) - spin))
 
 
-def carried(
+def continued(
     start: Balance, end: Balance, position: Array, moment: Array, bound: float
 ) -> tuple[Indices, Truth, Array, Array]:
     """Equilibria to which others lead while the parameters of their problem change steadily to those of another one.

@@ -62,7 +62,7 @@ def cached_points(
 ) -> tuple[FixedPoints, bool]:
     """Result of a search `make`, from the cache if it is there, and whether it was.
 
-    Of a `scene`, whose plate decides nothing, with body `spin`; `equations` tells the rotor's table and the equations
+    Of a `scene`, whose plate decides nothing, with body `spin`; `equations` gives the rotor's table and the equations
     of motion from all others, and `report` is called with faults of the cache.
     """
     inputs = equations, spin, _own_spin(scene), parameters(scene, Scales.of(scene), frozen_spin=True)

@@ -433,7 +433,7 @@ def integrate(
         the trajectory is safe.
 
     Accuracy: without a plate's currents a step errs by round-off, so that energy and |m̂| drift by about 1e-14 in a
-    thousand turns; over a plate see `PLATE_TOLERANCE`. `Trajectory.energy_error` tells.
+    thousand turns; over a plate see `PLATE_TOLERANCE`. see `Trajectory.energy_error`.
     """
     began, known = perf_counter(), flight.compile_seconds
     course = flight.begin(start, duration, currents, flight.interval(duration))
@@ -442,7 +442,7 @@ def integrate(
         course.restore(kept)
     began_at = course.seconds
     if kept is None and not in_plate_range(flight.memory, start):
-        course.ended_by = BEYOND  # no event tells of a range in which it never was
+        course.ended_by = BEYOND  # no event reports a range in which it never was
         return course.trajectory(0.0)
     try:
         course.fly(progress, checkpoint)

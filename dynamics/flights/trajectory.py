@@ -143,7 +143,7 @@ class Checkpoint:
 
 
 STABLE, LINEAR_FALL, OSCILLATING_LOSS = "stable", "linear fall", "oscillating loss"
-DRIFTING, GROWING, NOT_HELD = "drifting", "growing oscillation", "not held"
+DRIFTING, GROWING, LOST_AT_ONCE = "drifting", "growing oscillation", "lost at once"
 NOT_FOLLOWED = "not followed"  # To its end: it left the range of the plate's table
 # Parts into which a trajectory is divided; the last one, in which the floater may already fall freely, is left out.
 WINDOWS = 20
@@ -157,7 +157,7 @@ def flight_kind(flight: Trajectory) -> str:
     """How a trajectory went.
 
     By the mean distance, and from the size of the oscillation in the rotor's frame about its trend, in twenty
-    parts of the time.  Lost or in contact: "not held" from the beginning; an "oscillating loss" if the oscillation
+    parts of the time.  Lost or in contact: "lost at once", with no levitation; an "oscillating loss" if the oscillation
     grew more than the mean distance changed, in all of the time or in its last part; else a "linear fall".  Levitating
     at the end: "growing oscillation" if it became more than twice as large, or "drifting" if the distance goes on
     changing steadily in the second half, both by 0.02 mm at least; else "stable".
@@ -167,7 +167,7 @@ def flight_kind(flight: Trajectory) -> str:
     lasted = flight.ended_by in (DURATION, STOPPED)
     distance = np.linalg.norm(flight.lab.position, axis=1)
     if len(distance) < FEWEST * WINDOWS or flight.levitated_s <= SHORTEST:
-        return STABLE if lasted else NOT_HELD
+        return STABLE if lasted else LOST_AT_ONCE
     whole = np.arange(len(distance))
     if not lasted:
         end = np.array_split(whole, WINDOWS)[-1]

@@ -34,7 +34,7 @@ from .spaces import surface_points
 SEPARATORS = 34.0  # numbers in the factor over the square of the unknowns on a plane; 17 to 36 were measured
 PEAK = 1.2  # the largest amount while the factor is made, over what is kept
 HEAP = 300_000_000  # address space that NGSolve reserves while it assembles, bytes; most of it is never touched
-GROUP = Path("/sys/fs/cgroup")  # where Linux tells the limits of a container or a batch job
+GROUP = Path("/sys/fs/cgroup")  # where Linux gives the limits of a container or a batch job
 
 
 class TooLargeError(ComputationError):

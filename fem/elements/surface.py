@@ -127,7 +127,7 @@ class Surface:
     """Nodes on a body's surface: `places` (n, 3) m, outward `normals` (n, 3) and `areas` (n,) m², body's axes.
 
     Nearer than `reach` (m) to it `rows_nearby` does what the nodes' own rule does not; 0: the rule has to do, and the
-    step to more nodes tells how well it does.
+    step to more nodes shows how well it does.
     """
 
     places: Array

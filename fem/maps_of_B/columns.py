@@ -208,7 +208,7 @@ def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = Fa
 
 
 def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) -> dict[int, Column]:
-    """The columns of a map among `titles` by number: each quantity once, of several those that `reading.columns` tells.
+    """The columns of a map among `titles` by number: each quantity once, of several those that `reading.columns` gives.
 
     `vectors`: as of `known_columns`.
 

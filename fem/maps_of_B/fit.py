@@ -113,7 +113,7 @@ def fit_harmonics(
     The unknowns are fields on the sources' spheres, of which none is expected to be much larger than the dipole's own:
     that expectation (a ridge) decides where the data do not, and keeps the normal equations regular. The degree is the
     one that predicts held-out observations best (cross-validation); the fit is then made with all of them. How the fits
-    without one group differ tells the error (jackknife; B. Efron, The Jackknife, SIAM 1982, ch. 3), whatever the
+    without one group differ gives the error (jackknife; B. Efron, The Jackknife, SIAM 1982, ch. 3), whatever the
     distribution of the noise; what the expectation alone decides is added to it.
 
     Parameters

@@ -172,7 +172,7 @@ def _nearest_titles(lines: list[str], separators: Sequence[str | None], reading:
 
 
 def _maxwell(lines: list[str]) -> _Table | None:
-    """Maxwell's export of a field, `.fld`; its grid tells whether the coordinates are in m."""
+    """Maxwell's export of a field, `.fld`; its grid shows whether the coordinates are in m."""
     for number, line in enumerate(lines[:HEADER_LINES], 1):
         if not (found := VECTOR_DATA.fullmatch(line)):
             continue

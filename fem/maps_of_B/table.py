@@ -198,7 +198,7 @@ class GriddedTable:
 
     Parameters
     ----------
-    expansions : table without closed forms; its provenance tells how the fit was made
+    expansions : table without closed forms; its provenance gives how the fit was made
     deviations : c_lm (T) of equally likely fields minus the table's, complex (members, expansions, L+1, L+1)
     region : (2, 3) m, opposite corners of the box where the map determines the field; may be infinite
     """
@@ -278,7 +278,7 @@ class GriddedTable:
 
     @keeps_shape
     def in_range(self, points: Array) -> NDArray[np.bool_]:
-        """Which of the points (..., 3) m lie outside the sources' spheres and where the map tells the field."""
+        """Which of the points (..., 3) m lie outside the sources' spheres and where the map gives the field."""
         known: NDArray[np.bool_] = np.all((self.region[0] <= points) & (points <= self.region[1]), axis=1)
         for expansion in self.expansions.expansions:
             known &= np.linalg.norm(points - expansion.center, axis=1) > expansion.radius
@@ -304,7 +304,7 @@ def fit_field_map(
     Parameters
     ----------
     field_map : what is known of B; without errors they are taken as a common fraction of B at each distance, and the
-        misfit tells which
+        misfit gives which
     centers : (3,) or (k, 3) m, one for each body of sources, best at its middle
     radius : of the spheres about the centres that hold all sources, m; the table begins there (None: the distance
         of the nearest map point)

@@ -157,7 +157,7 @@ def near_field(
     ----------
     magnets : in the rotor's frame
     points : (n, 3) m
-    rtol : error of B asked for, relative to the largest remanence; the last step of the elements' order tells it
+    rtol : error of B asked for, relative to the largest remanence; the last step of the elements' order gives it
     highest : order of the elements that is not exceeded, even if `error` is larger then
     elements : of these magnets, if some are solved already
 

@@ -122,9 +122,13 @@ def _keys(text: str, source: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         for number, line in enumerate(text.splitlines(), 1):
             if DECIMAL_COMMA.match(line) and f"at line {number}," in str(error):
-                rule = "have a decimal point, not a comma (lists have square brackets)"
-                said = f"Input line {number} must {rule}; instead received {shown(line.strip())}."
-                raise SceneError(source, [said]) from None
+                raise SceneError(
+                    source,
+                    [
+                        f"Input line {number} must have a decimal point, not a comma (lists have square brackets); "
+                        f"instead received {shown(line.strip())}."
+                    ],
+                ) from None
         why = str(error)[:200].replace("Cannot overwrite a value", "A key stands twice")
         raise SceneError(source, [f"Input scene must be TOML; instead: {why}."]) from None
     except RecursionError:

@@ -137,7 +137,7 @@ def seed_of(configuration: str, measure: float, part: float, batch: int) -> list
 
 CAPTURED, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)
 """Up at the end; touched the plate; touched the rotor; far away; never simulated, as no frequency is stable."""
-WORDS = ("held", "touched the plate", "touched the rotor", "lost to the side", "no stable frequency")
+WORDS = ("captured", "touched the plate", "touched the rotor", "lost to the side", "no stable frequency")
 PARTS = (1 / 6, 1 / 2, 5 / 6)  # Places in the range of stable frequencies
 TOGETHER, BATCHES = 2000, 5  # Trajectories of a point, and points for each rotor and frequency: 10 000 in all
 CHECKED = 8  # Launches of each rotor and frequency that are simulated on while the plate goes down
@@ -342,12 +342,16 @@ def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
             "levitated_in_article": _levitated(one),
             "frequency_hz": None if np.isnan(frequency) else frequency,
             "flights": one.sizes["trial"],
-            "held": value,
-            "held_error": (high - low) / 2,
+            "captured": value,
+            "captured_error": (high - low) / 2,
             "left_plate_table": float((one["left_plate_table"] == 1).mean()),
             **{word.replace(" ", "_"): part for word, part in _others(one).items()},
         })  # fmt: skip
-    return {"shares": rows, "flown_on": int(result["settled"].sum()), "stayed_up": int(result["stayed"].sum())}
+    return {
+        "shares": rows,
+        "simulated_on": int(result["settled"].sum()),
+        "still_levitating": int(result["stayed"].sum()),
+    }
 
 
 STUDY = Study(

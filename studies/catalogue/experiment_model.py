@@ -382,7 +382,7 @@ def log_likelihoods(models: Models, values: Values, facts: Mapping[str, Fact]) -
 
 
 def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[Flight, Course]:
-    """Flights of all rotors, for unknowns (n,) by name; those of one kind are simulated in one call."""
+    """Trajectories of all rotors, for unknowns (n,) by name; those of one kind are simulated in one call."""
     found: dict[Flight, Course] = {}
     for kind, surrogate in models.surrogates.items():
         own = [flight for flight in flights if flight[0] == kind]
@@ -463,7 +463,7 @@ FACTS = {
     "falls at 115 Hz": Fact("δx = 1 mm falls linearly at 115 Hz, after more than 3 s", (LOW,), _falls),
     "stays at 140 Hz": Fact("δx = 1 mm stays at 140 Hz for 250 s", (MIDDLE,), ended(MIDDLE, "stays")),
     "oscillates at 150 Hz": Fact("δx = 1 mm is lost in oscillations at 150 Hz", (HIGH,), ended(HIGH, "oscillates")),
-    "24 h at 60 Hz": Fact("δz = 14 mm flew for 24 hours at 60 Hz", (ENDLESS,), ended(ENDLESS, "stays")),
+    "24 h at 60 Hz": Fact("δz = 14 mm levitated for 24 hours at 60 Hz", (ENDLESS,), ended(ENDLESS, "stays")),
     "below 50 Hz": Fact(
         "levitation below 50 Hz (δz = 10 mm)",
         (LOWEST,),

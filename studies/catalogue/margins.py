@@ -364,7 +364,7 @@ CHECKED: Columns = {
     "true_measure": ((), "mm or °", "measure corrected for the field of the finite magnets"),
     "true_distance": ((), "m", "distance that a forward search in that field gives"),
     "true_distance_error": ((), "m", "its estimated error"),
-    "true_stable": ((), "1", "whether it is stable"),
+    "true_stable": ((), "1", "whether it is stable, or marginal"),
     "true_growth": ((), "1/s", "largest growth rate in that field"),
     "wanted_distance": ((), "m", "wanted distance"),
     "wanted_frequency": ((), "Hz", "wanted frequency"),
@@ -400,7 +400,9 @@ def _checked_by_elements(
             raise EquilibriumError("The field of the finite magnets has no equilibrium there.")
         best = min(found, key=lambda e: abs(e.distance - distance))
         if abs(best.distance - distance) < close:
-            return np.array([measure, best.distance, best.position_error, float(best.stable), best.growth_per_s])
+            return np.array(
+                [measure, best.distance, best.position_error, float(best.stability != "unstable"), best.growth_per_s]
+            )
         measure -= (best.distance - distance) / slope
     raise EquilibriumError("The correction of the measure for the field of the finite magnets did not converge.")
 

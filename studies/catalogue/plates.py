@@ -286,7 +286,7 @@ def sentence(result: xr.Dataset) -> str:
         part = part_of(result, sweep)
         worst = part["growth"].max("mode")
         kept, gone, span = (
-            int((worst < 0).sum()),
+            int(article.stable_in_flight(worst).sum()),
             int(worst.isnull().sum()),
             showing.range_text(worst, abs(worst) * part["error"]),
         )

@@ -158,7 +158,8 @@ def map_figure(result: xr.Dataset) -> Figure:
         true = cases_with(rotors, model="fem")
         growth, frequency = true["plate_growth"].values, true["plate_frequency"].values
         measure = np.broadcast_to(true["measure"].values[:, None], growth.shape)
-        found = (growth < 0, growth >= 0, np.isnan(growth) & np.isfinite(frequency))
+        stable = article.stable_in_flight(growth)
+        found = (stable, np.isfinite(growth) & ~stable, np.isnan(growth) & np.isfinite(frequency))
         for here, (marker, color, words) in zip(found, VERDICTS, strict=True):
             if here.any():
                 label = f"{words}, face {-1e3 * FACE:g} mm below"

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from ...dynamics.equilibria.equilibrium import CRITERION
 from ...dynamics.motion.state import State
 from ...fem.cache import owned, read_checked
 from ...fem.files import write_whole
@@ -140,6 +141,8 @@ def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) 
         forget(study, points, out)
         figures = save_figures(figures_of(result), out)
     lines = [*study.report(result), *failure_lines(result)]
+    if "stable" in (text := "\n".join(lines)) and CRITERION not in text:  # one definition for all of them
+        lines.append(f"Stable: {CRITERION}.")
     values = {
         "study": name,
         "report": lines,

@@ -97,7 +97,7 @@ def rotor_panels(
 ) -> tuple[Figure, list[tuple[Axes, xr.Dataset, Any]]]:
     """A panel for each configuration, and for each rotor its panel, its cases and its colour.
 
-    Colours go from dark to bright along viridis with displacement or tilt; a bar below the panel tells them.
+    Colours go from dark to bright along viridis with displacement or tilt; a bar below the panel gives them.
     Parameters are those of `small_multiples`.
     """
     figure, rows = configuration_panels(result, height, xlabel, ylabel, **shared)

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import ConvexHull
 
-from ...dynamics.equilibria.equilibrium import MARGINAL, STABILITIES
+from ...dynamics.equilibria.equilibrium import CRITERION, MARGINAL, STABILITIES
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ...geometry.solids import Solid
@@ -27,15 +27,14 @@ if TYPE_CHECKING:
 DISTANCE = "levitation distance (mm)"
 PLATE_MARKS = ((False, "o", "no plate"), (True, "D", "with the plate"))  # whether the plate's currents act
 FILLS = {"stable": "full", "marginal": "left", "unstable": "none"}  # of the marker of an equilibrium
-PARTS = 120  # Intervals of an envelope: more than a printed figure tells apart
+PARTS = 120  # Intervals of an envelope: more than a printed figure resolves
 SHOWN = 200  # Samples of a trajectory that are drawn one by one
 COARSE = 0.05
 """Interval of samples (s) longer than an axial oscillation: a line through them would show false slow motions."""
 HOURS = 7200.0  # Trajectories that take longer are drawn over hours, s
 MODE_MARKERS = "osD^v"
-FAMILY = 6  # curves that a panel tells apart, at most
+FAMILY = 6  # curves in a panel, at most
 APART = 0.3  # of the distance: farther from the last point of a branch the next is of another one
-CRITERION = f"growth rate at most {MARGINAL:g} s⁻¹, e-folding time {1 / MARGINAL:g} s or more"
 UNITS = {"1": "", "deg": "°", "1/s": "s⁻¹"}  # as text has them
 ANSWERED = {"equilibria": "Equilibria", "flight": "Trajectories", "field": "Field"}
 BESIDE = {"dipole": "-.", "true_moment": ":"}  # lines of the dipoles beside a sweep's model

@@ -90,7 +90,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Sample:
-    """A sphere on 64 × 64 pixels: tells whether anything can be drawn at all."""
+    """A sphere on 64 × 64 pixels: shows whether anything can be drawn at all."""
 
     def draw(self) -> Iterator[bytes]:
         """A PNG."""

@@ -51,7 +51,7 @@ class Page:
     ) -> None:
         self.tell, self.state = tell, state
         self.quick = Worker("Reading this scene", QUICK, self._failed)
-        self.slow = Worker("The answer by the chosen models", LONG, self._failed, PATIENCE)
+        self.slow = Worker("The result of the chosen models", LONG, self._failed, PATIENCE)
         self.mapper = Worker("The map", LONG, self._no_map, PATIENCE)
         self.porter = Worker("The file", LONG, self._failed, PATIENCE)
         self.flyer = Worker("The trajectory", LONG, self._lost)
@@ -246,7 +246,7 @@ class Page:
     def _take_off(self) -> None:
         if not self.flying:
             self.flying = True
-            self.tell(says="Preparing the flight ...")
+            self.tell(says="Preparing the simulation ...")
             self._sample(np.zeros((3, 0)), fresh=True)
             self.flyer.ask("begin", lambda: (work.begin_flight, self.state), self._flown)
 

@@ -6,11 +6,13 @@ What happened, as a sentence.  Way out.
 
 import ast
 import builtins
+import io
 import re
+import tokenize
 from importlib import import_module
 
 from places import ROOT
-from words import PROGRAM
+from words import NAMES, OF_CODE, PROGRAM
 
 from spinlev.geometry.common import ComputationError
 
@@ -137,13 +139,10 @@ def test_every_sentence_about_input_follows_the_grammar():
     assert found > 100
 
 
-ELSEWHERE = ("catalogue", "page")
-
-
 def test_the_words_are_those_of_the_field():
-    """All strings with a space, and of docstrings those that are help; not yet those of the studies and the page."""
+    """All strings with a space, and of docstrings those that are help."""
     wrong = []
-    for path, tree in ((path, tree) for path, tree in TREES.items() if path.parent.name not in ELSEWHERE):
+    for path, tree in TREES.items():
         owners = (ast.FunctionDef, ast.ClassDef, ast.Module)
         docstrings = {id(node.body[0].value) for node in ast.walk(tree)
                       if isinstance(node, owners) and node.body and isinstance(node.body[0], ast.Expr)}  # fmt: skip
@@ -152,3 +151,38 @@ def test_the_words_are_those_of_the_field():
             if " " in text and PROGRAM.search(text) and (id(node) not in docstrings or path.name == "commands.py"):
                 wrong.append(f"{path}:{node.lineno}: {text}")
     assert wrong == []
+
+
+def test_comments_and_docstrings_are_in_the_words_of_the_field():
+    """Not yet those of the page."""
+    wrong = []
+    for path in (path for path in FILES if path.parent.name != "page"):
+        text, tree = path.read_text(), TREES[path]
+        inner = [child for node in ast.walk(tree) for child in ast.iter_child_nodes(node)]
+        strings = {(n.value.lineno, n.value.col_offset) for n in inner
+                   if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)}  # fmt: skip
+        for token in tokenize.generate_tokens(io.StringIO(text).readline):
+            prose = token.type == tokenize.COMMENT or (token.type == tokenize.STRING and token.start in strings)
+            found = OF_CODE.search(token.string) if prose else None
+            if found and ">>> " not in token.string:
+                wrong.append(f"{path}:{token.start[0]}: {found[0]}")
+    assert wrong == []
+
+
+def test_names_say_what_a_thing_is():
+    """Not yet those of the page."""
+    wrong = []
+    for path, tree in TREES.items():
+        for node in ast.walk(tree) if path.parent.name != "page" else ():
+            name = next((getattr(node, key) for key in ("id", "arg", "name") if getattr(node, key, None)), "")
+            if isinstance(name, str) and NAMES.fullmatch(name):
+                wrong.append(f"{path}:{node.lineno}: {name}")
+    assert wrong == []
+
+
+def test_words_and_names_of_another_field_are_found():
+    assert OF_CODE.search("watch : is told the progress")
+    assert OF_CODE.search("how long a flight lasts")
+    assert not OF_CODE.search("in `dynamics/flights/batch.py`, see `flight`")
+    assert NAMES.fullmatch("_told")
+    assert not NAMES.fullmatch("carried_on")

@@ -12,7 +12,7 @@ from spinlev.dynamics.flights.trajectory import (
     DRIFTING,
     GROWING,
     LINEAR_FALL,
-    NOT_HELD,
+    LOST_AT_ONCE,
     OSCILLATING_LOSS,
     STABLE,
     Trajectory,
@@ -60,7 +60,7 @@ def test_plain_cases(distance, ended_by, kind):
 
 def test_a_fall_from_the_hand_is_no_flight():
     time = np.linspace(0, 0.1, 1000)
-    assert flight_kind(flown(0.04 + 4.9 * time**2, "lost", time)) == NOT_HELD
+    assert flight_kind(flown(0.04 + 4.9 * time**2, "lost", time)) == LOST_AT_ONCE
 
 
 @pytest.mark.parametrize(

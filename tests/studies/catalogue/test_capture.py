@@ -101,8 +101,8 @@ def test_a_small_point_is_computed_drawn_and_told():
     result = CAPTURE.gather([row, other, *([shorter] if shorter is not None else [])])
     numbers = CAPTURE.numbers(result)["shares"]
     assert numbers[0]["flights"] == 24
-    assert numbers[0]["held"] == pytest.approx(held.mean())
-    assert numbers[0]["held"] + sum(numbers[0][word.replace(" ", "_")] for word in WORDS[1:]) == pytest.approx(1)
+    assert numbers[0]["captured"] == pytest.approx(held.mean())
+    assert numbers[0]["captured"] + sum(numbers[0][word.replace(" ", "_")] for word in WORDS[1:]) == pytest.approx(1)
     assert f"{row['rotor_frequency'].item():.1f} Hz" in CAPTURE.report(result)[1]
     beyond = int(sum(result["left_plate_table"].values.ravel() == 1))
     assert any(line.startswith(f"{beyond} of ") and "plate's table" in line for line in CAPTURE.report(result))
