@@ -202,7 +202,8 @@ def band(part: xr.Dataset, quantity: str) -> Array:
 def contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figure:
     """What one standard deviation of each parameter does to distance or lowest frequency; with errors."""
     figure, rotors = showing.rotor_panels(result, 3.6, words, "", sharex=True)
-    chosen = [k for k, name in enumerate(PARAMETERS) if name != "gravity"]  # which is known
+    without = {"gravity", "frequency"} if quantity == "lowest" else {"gravity"}  # known, or of no influence
+    chosen = [k for k, name in enumerate(PARAMETERS) if name not in without]
     for axes, rotor, color in rotors:
         value, error = contributions(rotor.isel(case=0), quantity)[:, chosen]
         axes.errorbar(value, range(len(chosen)), xerr=error, fmt="o", ms=4, color=color)
