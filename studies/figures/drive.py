@@ -47,7 +47,7 @@ def drive_figure(result: xr.Dataset) -> Figure:
     span = max(float(np.ptp(frequency)), 1.0)
     along.set(xlabel="frequency of the rotor (Hz)", ylabel=DISTANCE, ylim=(known.min() - room, known.max() + room))
     along.set_xlim(frequency.min() - 0.1 * span, frequency.max() + 0.1 * span)
-    work.plot(time, 1e3 * result["motor_work"], color=PALETTE[2], label="work of the motor")
+    work.plot(time, 1e3 * result["motor_work"], color=PALETTE[2], lw=0.6, label="work of the motor")
     work.set(xlabel="time (s)", ylabel="work of the motor (mJ)")
     legend_below(figure)
     return figure

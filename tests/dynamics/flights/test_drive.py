@@ -11,8 +11,11 @@ from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.batch import simulate_together
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
 from spinlev.dynamics.flights.live import LiveFlight
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.rotor_effects import RotorCurrents
 from spinlev.dynamics.motion.state import turned_about_z
 from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor_metal import ball_losses, pieces_of
 from spinlev.geometry.common import MAGNET_CONDUCTIVITY
 from spinlev.geometry.scene.contents import Drag, DriveStep, OffsetStart, Scene
 
@@ -92,6 +95,19 @@ def test_the_motor_gives_the_floater_its_angular_momentum():
     assert energy[1] - energy[0] == pytest.approx(flown.given[-1, 1], rel=1e-9)
     mean = np.average(flown.motor[1:], axis=0, weights=np.diff(flown.time))
     np.testing.assert_allclose(mean * flown.time[-1], flown.given[-1], rtol=1e-12)
+
+
+def test_currents_in_rotor_and_floater_take_it_from_the_motor():
+    """What turns with the rotor acts on the floater through the motor: angular momentum to round-off."""
+    conducting = tuple(replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in MAGNETS)
+    whole = Interaction(TABLE, (RotorCurrents(ball_losses(pieces_of(conducting, ()), degree=2)),))
+    floater = replace(FLOATER, conductivity=MAGNET_CONDUCTIVITY)
+    scene = replace(STEADY, drag=NO_DRAG, floater=floater, drive=STEPS)
+    flown = integrate(Flight(scene, whole, 0.2), START, 0.2)
+    orbit = FLOATER.mass * np.cross(flown.lab.position, flown.lab.velocity)[:, 2]
+    momentum = orbit + FLOATER.inertia * flown.lab.spin[:, 2]
+    assert np.abs(momentum - momentum[0] - flown.given[:, 0]).max() < 1e-12 * np.abs(momentum).max()
+    assert flown.energy_error < 1e-12
 
 
 @pytest.mark.parametrize("tilted", [False, True])
