@@ -440,9 +440,9 @@ class Levitation:
         FlightStopped : the user stopped it; the error holds what was simulated
         """
         positive("duration", duration)
+        check_drive(self.scene, duration)
         if duration in self.simulated:
             return self.simulated[duration]
-        check_drive(self.scene, duration)
         self._check_drive()
         self._ahead = duration
         kept = checkpoint.read() if checkpoint else None

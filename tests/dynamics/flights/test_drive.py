@@ -11,6 +11,7 @@ from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.batch import simulate_together
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
 from spinlev.dynamics.flights.live import LiveFlight
+from spinlev.dynamics.flights.trajectory import Checkpoint, FlightStopped
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.rotor_effects import RotorCurrents
 from spinlev.dynamics.motion.state import turned_about_z
@@ -165,3 +166,22 @@ def test_begins_at_the_equilibrium_of_the_first_frequency():
     flown = simulate(scene, TABLE, 0.01)
     steady = simulate(replace(scene, drive=()), TABLE, 0.01)
     np.testing.assert_allclose(flown.lab.position[0], steady.lab.position[0], rtol=1e-12)
+
+
+def test_an_interrupted_motion_goes_on_to_the_last_bit(tmp_path):
+    """In the middle of a ramp: the checkpoint has the leg, and what the motor gave."""
+    scene = replace(STEADY, drive=(DriveStep(105.0, 4.0),), start=OffsetStart(np.zeros(3)))
+    whole, kept = simulate(scene, TABLE, 5.0), Checkpoint(tmp_path / "kept.npz", "this one", every=0.0)
+    begun = list[float]()
+
+    def stop(part):
+        begun.append(part)
+        if part > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(FlightStopped):
+        simulate(scene, TABLE, 5.0, progress=stop, checkpoint=kept)
+    assert 0.5 < begun[-1] < 0.8
+    resumed = simulate(scene, TABLE, 5.0, checkpoint=kept)
+    assert np.array_equal(resumed.lab.position[-1], whole.lab.position[-1])
+    assert np.array_equal(resumed.given[-1], whole.given[-1])
