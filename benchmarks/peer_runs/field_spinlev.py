@@ -1,6 +1,8 @@
-"""spinlev: the rotor's table by finite elements to a relative accuracy, from nothing, then the field at the points.
+"""spinlev: the rotor's table to a relative accuracy, from nothing, then the field at the points.
 
-The tilted cube may also be computed as one that lies straight, and turned: a reference without a tilted mesh."""
+By finite elements, or by charges on surfaces ("surface"). Or by so many nodes of such charges along an edge alone
+("charges"), which as the peers do not say how wrong they are. The tilted cube may also be computed as one that lies
+straight, and turned: a reference without a tilted mesh."""
 
 import sys
 from importlib.metadata import version
@@ -9,10 +11,13 @@ import numpy as np
 from problems import CUBES, EDGE, RECOIL, REMANENCE, points_below, turned
 from said import measure, say
 
+from spinlev.fem.closed_forms.moments import carrier
+from spinlev.fem.closed_forms.uniform import remanent_field
+from spinlev.fem.elements.surface import SurfaceCharges
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import Box, Magnet, tilt
 
-case, rtol = sys.argv[1], float(sys.argv[2])
+case, resolution = sys.argv[1], float(sys.argv[2])
 points = points_below()
 rotor = tuple(
     Magnet(Box((EDGE,) * 3, np.array(center)), REMANENCE * np.array(axis), RECOIL) for center, axis in CUBES[case]
@@ -26,10 +31,17 @@ elif case == "tilted":
 
 
 def field():
-    """The table, and B at the points."""
-    table = rotor_table(rotor, "fem", rtol, nearest=0.007)
-    return table, table.evaluate(points @ way)[0] @ way.T
+    """B at the points."""
+    if "charges" in sys.argv:
+        carriers, charges = tuple(carrier(magnet) for magnet in rotor), SurfaceCharges(rotor, int(resolution))
+        away = points[:, None] - charges.places
+        amounts = charges.areas * charges.beyond(carriers) / (4 * np.pi)
+        return remanent_field(carriers, points) + np.einsum(
+            "k,nka->na", amounts, away / np.linalg.norm(away, axis=2)[..., None] ** 3
+        )
+    table = rotor_table(rotor, "surface" if "surface" in sys.argv else "fem", resolution, nearest=0.007)
+    return table.evaluate(points @ way)[0] @ way.T
 
 
-(table, values), seconds = measure(field)
+values, seconds = measure(field)
 say(values, seconds, 0, {"spinlev": version("spinlev")})

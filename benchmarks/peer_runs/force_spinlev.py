@@ -10,7 +10,7 @@ import numpy as np
 from problems import EDGE, RECOIL, REMANENCE, SPHERE, SPHERE_AXIS, SPHERE_CENTER
 from said import measure, say
 
-from spinlev.fem.mutual.response import rotor_ladder, two_body
+from spinlev.fem.mutual.response import element_ladder, two_body
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import Box, Floater, Magnet
 
@@ -30,7 +30,7 @@ def rigid():
 
 def permeable():
     """The same of two bodies that magnetise each other, by finite elements."""
-    (rotor,) = rotor_ladder((cube,), (order,))
+    (rotor,) = element_ladder((cube,), (order,))
     total = two_body(rotor, floater, SPHERE_CENTER, SPHERE_AXIS).total
     return total.force, total.torque
 

@@ -68,6 +68,9 @@ FIELD = Work(
     ),
     (
         _ours("field_spinlev.py", "1e-3", "1e-4", "1e-5"),
+        Peer("spinlev, surface", "spinlev", "field_spinlev.py", ("1e-2 surface", "1e-4 surface", "1e-6 surface")),
+        Peer("spinlev, charges alone", "spinlev", "field_spinlev.py",
+             ("4 charges", "6 charges", "8 charges", "12 charges", "16 charges", "24 charges")),
         Peer("MagTense", "magtense", "field_magtense.py", ("4", "6", "8"), True),
         Peer("MagTense", "magtense", "field_magtense.py", ("12",), only=("cube",)),
         Peer("magpylib, volume averages", "magpylib", "field_magpylib.py", ("4 newell", "8 newell", "16 newell"), True),

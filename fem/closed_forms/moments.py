@@ -21,7 +21,7 @@ from ..harmonics.expansion import (
     round_rule,
     uniform_moments,
 )
-from ..harmonics.solid import Coefficients
+from ..harmonics.solid import Coefficients, gauss_legendre
 from .uniform import demagnetizing_tensor, remanent_field, remanent_potential
 
 PART_ORDER = 20  # of the rule over a part
@@ -53,7 +53,7 @@ def graded_rule(breaks: Array, nodes: int) -> tuple[Array, Array]:
 
     t log t at the ends of a panel is integrated to about nodes⁻¹².
     """
-    t, weights = np.polynomial.legendre.leggauss(nodes)
+    t, weights = gauss_legendre(nodes)
     place, weight = (15 * t - 10 * t**3 + 3 * t**5) / 8, 1.875 * weights * (1 - t * t) ** 2
     middle, half = (breaks[1:] + breaks[:-1]) / 2, np.diff(breaks) / 2
     return (middle[:, None] + half[:, None] * place).ravel(), (half[:, None] * weight).ravel()

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ...geometry.common import MU_0, Array, frozen_array
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box
+from ..harmonics.solid import gauss_legendre
 from .uniform import attraction, newton_potential
 
 
@@ -146,8 +147,8 @@ class Racetrack:
 
     def _ring_elements(self) -> Iterator[tuple[Array, float, Array]]:
         """Axis, weight ρ dρ dφ and tangent of the quadrature elements of the corners."""
-        radial, radial_weight = np.polynomial.legendre.leggauss(RADIAL)
-        angular, angular_weight = np.polynomial.legendre.leggauss(ANGULAR)
+        radial, radial_weight = gauss_legendre(RADIAL)
+        angular, angular_weight = gauss_legendre(ANGULAR)
         middle = np.array([*self.outer]) / 2 - self.outer_radius
         for sign_x, sign_y, start in QUARTERS:
             for s, ws in zip(angular, angular_weight, strict=True):

@@ -25,7 +25,7 @@ import numpy as np
 from ...geometry.common import Array
 from ...geometry.shapes import Cylinder, Sphere
 from ..harmonics.expressions import differentiated, whole_gradient
-from ..harmonics.solid import FOUR_PI, entries
+from ..harmonics.solid import FOUR_PI, entries, gauss_legendre
 
 # Nodes of the rule for distances from the mantle of at least so many radii: round-off
 RULES = ((1e-2, 56), (1e-5, 100), (0.0, 220))
@@ -133,7 +133,7 @@ def _sums(
 
     xx, yy, xz, zz of the tensor, and xxx, xyy, xxz, yyz, xzz of its slope.
     """
-    u, weights = _rule(nodes)
+    u, weights = gauss_legendre(nodes)
     end = np.arcsinh(np.pi / width)[:, None]
     u = (u + 1) / 2 * end
     angle = width[:, None] * np.sinh(u)
@@ -148,11 +148,6 @@ def _sums(
         charge += [wc * (p + dx * dx * steep), wc * (p + dy * dy * steep)]
         charge += [wc * dx * u_slope, ws * dy * u_slope, wc * v_slope]
     return tuple(part.sum(axis=1) for part in charge)
-
-
-@cache
-def _rule(nodes: int) -> tuple[Array, Array]:
-    return np.polynomial.legendre.leggauss(nodes)
 
 
 def _segment(half: float, rho: Array, z: Array, radius: float, sine: Array, slopes: bool) -> tuple[Array, ...]:

@@ -9,6 +9,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MagnetMesh, to_meshio
 from ..closed_forms.moments import volume_rule
 from ..closed_forms.uniform import remanent_field
+from ..harmonics.solid import gauss_legendre
 from .magnetostatics import Formulation
 
 NODES = 60  # a side of the Gauss rule on a face; farther than 1.2 half edges from the faces its error is below 1e-40
@@ -16,7 +17,7 @@ NODES = 60  # a side of the Gauss rule on a face; farther than 1.2 half edges fr
 
 def coulomb_field(magnet: Magnet, points: Array) -> Array:
     """B (n, 3) T of a uniformly polarised box at points (n, 3) m outside: the charges J·n of its faces."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = gauss_legendre(NODES)
     v, w = np.meshgrid(nodes, nodes, indexing="ij")
     weight = np.longdouble(weights[:, None] * weights) / (4 * np.longdouble(np.pi))
     half = magnet.box.half_edges

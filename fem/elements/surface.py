@@ -32,9 +32,10 @@ from ...geometry.solids import Solid, moved
 from ..closed_forms.moments import parallel
 from ..closed_forms.uniform import remanent_field
 from ..harmonics.interior import sphere
-from ..harmonics.solid import FOUR_PI, members, orthonormal
+from ..harmonics.solid import FOUR_PI, gauss_legendre, members, orthonormal
 
 INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
+DENSE = 4000  # nodes up to which their equations are factorised: 250 MB
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
 # Distance from a face, in edges by the nodes along them, from which on the nodes' own rule does: nodes are at most
 # h = 1.2 of that apart, so that it errs by exp(-2π 4/1.2) = 1e-9
@@ -43,6 +44,7 @@ MORE = 2  # times as many nodes along an edge for moments as for charges
 KINKS = 0.2  # gap, in edges, from which on a neighbour's edges make no kink in the charges
 FINE = 10  # nodes of the rule for a product beyond those along an edge
 ROWS = 1 << 20  # numbers at once in such a rule
+TOGETHER = 1e-14  # square of a distance, by those from the axes' origin, below which two nodes are one
 ROUND_OFF = 1e-13  # of a line's half: no place is nearer to a node than that
 WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near the axis, too
 # Distance of two bodies' centres, in the sum of their circumradii, from which on few places on each stand for all:
@@ -53,7 +55,7 @@ FAR, COARSE = 1.5, 4
 @cache
 def graded(count: int) -> tuple[Array, Array]:
     """Places x (n,) = sin(π/2 sin(π/2 u)), -1 to 1, at Gauss's u, and weights (n,) of an integral over x."""
-    u, weights = np.polynomial.legendre.leggauss(count)
+    u, weights = gauss_legendre(count)
     inner = np.pi / 2 * np.sin(np.pi / 2 * u)
     return np.sin(inner), weights * (np.pi / 2) ** 2 * np.cos(inner) * np.cos(np.pi / 2 * u)
 
@@ -61,7 +63,7 @@ def graded(count: int) -> tuple[Array, Array]:
 @cache
 def _to_nodes(count: int) -> Array:
     """(n, n): Lagrange's polynomials at Gauss's nodes by Legendre's."""
-    u, weights = np.polynomial.legendre.leggauss(count)
+    u, weights = gauss_legendre(count)
     return np.asarray((np.arange(count) + 0.5)[:, None] * np.polynomial.legendre.legvander(u, count - 1).T * weights)
 
 
@@ -108,9 +110,10 @@ def face_rows(places: Array, normals: Array, halves: Array, counts: tuple[int, i
 
 def far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Array:
     """As `face_rows`, by the rule of the nodes alone: `sources` (n, 3) with `areas` (n,)."""
-    inverse = 1 / np.maximum(
-        np.sum(places**2, axis=1)[:, None] + np.sum(sources**2, axis=1) - 2 * places @ sources.T, np.finfo(float).tiny
-    )
+    sizes = np.sum(places**2, axis=1)[:, None] + np.sum(sources**2, axis=1)
+    square = sizes - 2 * places @ sources.T
+    # a place on a node, of a body that touches, sees nothing of it: both are in one plane
+    inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > TOGETHER * sizes)
     inverse *= np.sqrt(inverse)
     inverse *= np.sum(places * normals, axis=1)[:, None] - normals @ sources.T
     return np.asarray(inverse * (areas / FOUR_PI))
@@ -118,9 +121,17 @@ def far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Arr
 
 def _from_gauss(places: Array) -> Array:
     """(n, COARSE): Lagrange's polynomials at Gauss's COARSE nodes, at places x (n,)."""
-    x, weights = np.polynomial.legendre.leggauss(COARSE)
+    x, weights = gauss_legendre(COARSE)
     shares = (np.arange(COARSE) + 0.5)[:, None] * np.polynomial.legendre.legvander(x, COARSE - 1).T * weights
     return np.asarray(np.polynomial.legendre.legvander(places, COARSE - 1) @ shares)
+
+
+def _around(angles: Array, count: int) -> Array:
+    """(n, 2 count): trigonometric interpolation between 2 count angles that begin at 0, at `angles` (n,)."""
+    orders, turns = np.arange(count + 1), 2 * count
+    values = np.cos(orders[:, None, None] * (angles[:, None] - 2 * np.pi * np.arange(turns) / turns))
+    values[1:-1] *= 2
+    return np.asarray(values.sum(axis=0) / turns)
 
 
 class Surface:
@@ -222,7 +233,7 @@ class BoxSurface(Surface):
 
     @cached_property
     def coarse(self) -> tuple[Array, Array, Array]:
-        x, _ = np.polynomial.legendre.leggauss(COARSE)
+        x, _ = gauss_legendre(COARSE)
         places, normals, shares = [], [], []
         for axis, side in self.numbers:
             places.append(self._grid(axis, side, x, x))
@@ -289,16 +300,28 @@ class RoundSurface(Surface):
         )
         self.section_normals = across
         self.areas = np.repeat(widths * self.section[:, 0] * 2 * np.pi / turns, turns)
+        self.reach = INSET * body.circumradius  # of bodies that touch
 
     @cached_property
     def coarse(self) -> tuple[Array, Array, Array]:
-        few = RoundSurface(self.body, COARSE, np.polynomial.legendre.leggauss(COARSE))
-        orders, turns = np.arange(COARSE + 1), 2 * COARSE
-        apart = np.pi * np.arange(2 * self.count)[:, None] / self.count - 2 * np.pi * np.arange(turns) / turns
-        around = np.cos(orders[:, None, None] * apart)
-        around[1:-1] *= 2  # trigonometric interpolation
+        few = RoundSurface(self.body, COARSE, gauss_legendre(COARSE))
         along = scipy.linalg.block_diag(*[_from_gauss(graded(self.count)[0])] * len(self.lines))
-        return few.places, few.normals, np.kron(along, around.sum(axis=0) / turns)
+        return few.places, few.normals, np.kron(along, _around(np.pi * np.arange(2 * self.count) / self.count, COARSE))
+
+    def rows_nearby(self, places: Array, normals: Array) -> Array:
+        """As of `Surface`: the nodes' own rule, and the charges' own jump on flat faces that touch."""
+        result = far_rows(places, normals, self.places, self.areas)
+        radius = np.hypot(places[:, 0], places[:, 1])
+        around, size = _around(np.arctan2(places[:, 1], places[:, 0]), self.count), 2 * self.count**2
+        for number, (middle, way, normal) in enumerate(self.lines):
+            if normal[1]:
+                x = (radius - middle[0]) / way[0]
+                on = (np.abs(places[:, 2] - middle[1]) <= self.reach) & (np.abs(x) <= 1)
+                jump = 0.5 * normal[1] * normals[on, 2, None] * _lagrange(x[on], self.count)
+                result[on, number * size : (number + 1) * size] += (jump[:, :, None] * around[on, None]).reshape(
+                    -1, size
+                )
+        return result
 
     @cached_property
     def kernel(self) -> Array:
@@ -327,7 +350,7 @@ class RoundSurface(Surface):
             sources = middle + s[:, None] * unit
             gap = np.maximum(np.linalg.norm(place - sources, axis=1), ROUND_OFF * half)
             scale = np.minimum(gap / np.sqrt(place[0] * np.maximum(sources[:, 0], ROUND_OFF * half)), WIDEST)
-            u, v = np.polynomial.legendre.leggauss(count + 2 * FINE)
+            u, v = gauss_legendre(count + 2 * FINE)
             top = np.arcsinh(np.pi / scale)[:, None] / 2
             angle, step = scale[:, None] * np.sinh(top * (1 + u)), top * v * scale[:, None] * np.cosh(top * (1 + u))
             r, square = sources[:, :1], gap[:, None] ** 2 + 4 * place[0] * sources[:, :1] * np.sin(angle / 2) ** 2
@@ -408,6 +431,7 @@ class SurfaceCharges:
     magnets : those that are permeable, on whose surfaces the nodes are
     places, normals, areas : of the nodes, (n, 3) m, outward (n, 3) and (n,) m²; rotor's frame, magnet by magnet
     owner : (n,) which of `magnets` a node is of
+    contrast : (n,) χ of the magnet that a node is of
     """
 
     def __init__(self, magnets: Sequence[Magnet], count: int) -> None:
@@ -426,7 +450,7 @@ class SurfaceCharges:
             areas.append(alike[key].areas)
         self.places, self.normals, self.areas = (np.concatenate(part) for part in (places, normals, areas))
         self.owner = np.repeat(np.arange(len(areas)), [len(one) for one in areas])
-        self._contrast = np.array([magnet.recoil_permeability - 1 for magnet in self.magnets])[self.owner]
+        self.contrast = np.array([magnet.recoil_permeability - 1 for magnet in self.magnets])[self.owner]
         centers = np.array([magnet.body.center for magnet in self.magnets])
         radii = np.array([magnet.body.circumradius for magnet in self.magnets])
         distances = np.linalg.norm(centers[:, None] - centers, axis=2)
@@ -464,14 +488,14 @@ class SurfaceCharges:
         return result
 
     def normal_field(self, charges: Array) -> Array:
-        """K σ (n,) T of charges (n,) T."""
+        """K σ (n, ...) T of charges (n, ...) T."""
         found = np.zeros_like(charges)
         of = [np.flatnonzero(self.owner == k) for k in range(len(self.magnets))]
         for surface, mine, (at, rows) in zip(self._surfaces, of, self._near, strict=True):
             found[mine] += surface.kernel @ charges[mine]
             found[at] += rows @ charges[mine]
         if self._far.any():
-            amounts = self.areas * charges
+            amounts = (self.areas * charges.T).T
             seen = self._from_afar @ np.concatenate(
                 [surface.coarse[2].T @ amounts[mine] for surface, mine in zip(self._surfaces, of, strict=True)]
             )
@@ -487,20 +511,33 @@ class SurfaceCharges:
         return body.center + places @ body.rotation.T, amounts
 
     def response(self, field: Array) -> Array:
-        """Charges σ (n,) T that a field b (n, 3) T of sources elsewhere makes. Raises ComputationError as `solved`."""
-        return self.solved(self._contrast * np.sum(field * self.normals, axis=1))
+        """Charges σ (n, k) T that k fields with n·b (n, k) T of sources elsewhere make; raises as `solved`."""
+        right = self.contrast[:, None] * field
+        if len(right) <= DENSE:
+            return np.asarray(scipy.linalg.lu_solve(self._factors, right))
+        return np.stack([self.solved(column) for column in right.T], axis=1)
 
     def solved(self, right: Array) -> Array:
         """σ (n,) T of (1 + χ/2) σ - χ K σ = `right` (n,) T. Raises ComputationError where they do not converge."""
-        share = 1 / (1 + self._contrast / 2)
+        share = 1 / (1 + self.contrast / 2)
         whole = scipy.sparse.linalg.LinearOperator(
-            (len(right),) * 2, lambda v: v - share * self._contrast * self.normal_field(v), dtype=float
+            (len(right),) * 2, lambda v: v - share * self.contrast * self.normal_field(v), dtype=float
         )
-        rtol = SOLVED * (1 + float(self._contrast.max()))
+        rtol = SOLVED * (1 + float(self.contrast.max()))
         found, failed = scipy.sparse.linalg.gmres(whole, share * right, rtol=rtol, restart=60, maxiter=5)
-        if failed:
+        if not failed:
+            return np.asarray(found)
+        if len(right) > DENSE:
             raise ComputationError("The charges on the magnets' surfaces did not converge. Choose --model fem.")
-        return np.asarray(found)
+        return np.asarray(scipy.linalg.lu_solve(self._factors, right))
+
+    @cached_property
+    def _factors(self) -> tuple[Array, NDArray[np.int32]]:
+        """Of (1 + χ/2) - χ K, for many right-hand sides, or where the iteration of `solved` does not converge."""
+        whole = -self.contrast[:, None] * self.normal_field(np.eye(len(self.places)))
+        whole[np.diag_indices_from(whole)] += 1 + self.contrast / 2
+        factors, pivots = scipy.linalg.lu_factor(whole, overwrite_a=True)
+        return factors, pivots
 
     def beyond(self, carriers: Sequence[Magnet]) -> Array:
         """σ (n,) T beyond n·J' of uniform `carriers`, one for each of all magnets."""
@@ -510,4 +547,4 @@ class SurfaceCharges:
         rest = np.array(
             [m.polarization_in_rotor - c.polarization_in_rotor for m, c in zip(self.magnets, kept, strict=True)]
         )
-        return self.solved(np.sum((rest[self.owner] + self._contrast[:, None] * closed) * self.normals, axis=1))
+        return self.solved(np.sum((rest[self.owner] + self.contrast[:, None] * closed) * self.normals, axis=1))

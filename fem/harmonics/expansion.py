@@ -23,6 +23,7 @@ from .solid import (
     entries,
     field_sizes,
     field_spectrum,
+    gauss_legendre,
     irregular_gradient,
     irregular_values,
     outer_totals,
@@ -55,7 +56,7 @@ def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
 
 def gauss(first: float, last: float, count: int) -> tuple[Array, Array]:
     """Places and weights (`count`,) of Gauss's rule from `first` to `last`."""
-    t, weights = np.polynomial.legendre.leggauss(count)
+    t, weights = gauss_legendre(count)
     return (first + last) / 2 + (last - first) / 2 * t, (last - first) / 2 * weights
 
 

@@ -21,7 +21,18 @@ import numpy as np
 
 from ...geometry.common import MU_0, Array
 from .expressions import UPPER, FieldExpressions, regular_harmonics, whole_gradient
-from .solid import CHUNK, FOUR_PI, Coefficients, entries, entry, factorials, members, regular_values, weighted_sums
+from .solid import (
+    CHUNK,
+    FOUR_PI,
+    Coefficients,
+    entries,
+    entry,
+    factorials,
+    gauss_legendre,
+    members,
+    regular_values,
+    weighted_sums,
+)
 
 # Nodes of the rule for balls beyond their degree. What it cannot tell apart is 1e-3 of the error: a ball's radius is a
 # seventh of the distance from the sources, so that four degrees beyond those that are left out little is left.
@@ -40,7 +51,7 @@ class Ball:
 def sphere(degree: int, more: int = 6) -> tuple[Array, Array]:
     """Points (n, 3) on the unit sphere and their areas (n,), exact for harmonics up to 2 (`degree` + `more`) - 1."""
     nodes = degree + more
-    height, weights = np.polynomial.legendre.leggauss(nodes)
+    height, weights = gauss_legendre(nodes)
     angle = np.pi * np.arange(2 * nodes) / nodes
     across = np.sqrt(1 - height**2)[:, None]
     grid = np.broadcast_arrays(across * np.cos(angle), across * np.sin(angle), height[:, None])
@@ -104,6 +115,23 @@ def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -
     total = np.tril(x + y + z)
     total[0] = 0.0  # a constant potential
     return np.asarray(total / (FOUR_PI * ball.radius**3))
+
+
+def from_charges(points: Array, charges: Array, ball: Ball, degree: int) -> Coefficients:
+    """Coefficients a_lm (T) of magnetic charges outside a ball: (4π radius²)⁻¹ Σ q Θ_lm, exact for these charges.
+
+    Parameters
+    ----------
+    points, charges : (n, 3) m and q (n,) T m²
+    ball : about whose centre the field is expanded
+    degree : highest l
+    """
+    away = (points - ball.center) / ball.radius
+    square = np.sum(away**2, axis=1)[:, None]
+    (sums,) = weighted_sums(degree, away / square, charges[:, None] / np.sqrt(square))
+    sums *= factorials(degree) / (FOUR_PI * ball.radius**2)  # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r
+    sums[0] = 0.0  # a constant potential
+    return np.asarray(sums)
 
 
 def field_at_center(incident: Coefficients) -> Array:

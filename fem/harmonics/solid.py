@@ -31,6 +31,13 @@ FACTORIALS = np.array([float(math.factorial(n)) for n in range(171)])  # all tha
 
 
 @cache
+def gauss_legendre(count: int) -> tuple[Array, Array]:
+    """Nodes and weights (`count`,) of Gauss's rule from -1 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return frozen_array(nodes, (count,)), frozen_array(weights, (count,))
+
+
+@cache
 def factorials(degree: int) -> Array:
     """(l-m)! (l+m)! as [l, m], 1 for m > l: Θ_lm over Υ_lm on the unit sphere. For degrees up to 85."""
     l, m = np.indices((degree + 1, degree + 1))

@@ -1,4 +1,4 @@
-"""Making of a `MutualTable`: fits to finite elements, and its error by the gap of the bodies."""
+"""Making of a `MutualTable`: fits to what charges on surfaces give, and its error by the gap of the bodies."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
-from .response import RotorResponse, enough_degree, rotor_ladder, two_body
+from .response import COARSE, FINE, OF_MANY, ChargeResponse, enough_degree, two_body
 from .samples import (
     NEAR_GAPS,
     ROTOR_GAPS,
@@ -52,21 +52,23 @@ SMALL, FREE = 1e-3, 1e-6
 GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
 DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end
 SAFETY = 4.0  # for the poses that were not looked at
-ELEMENTS = 0.2  # error of finite elements by what those of one degree less differ from them; 0.1 to 0.13 were measured
+MEANS = 0.2  # of what is added, by the difference of two permeabilities whose mean the charges have: 0.09 measured
+CHARGED = 1.0  # error of the finer charges by what the coarser ones differ from them
 
 
 def mutual_errors(
-    table: MutualTable, coarse: RotorResponse, rotor: RotorResponse, floater: Floater, watch: Watch
+    table: MutualTable, coarse: ChargeResponse, rotor: ChargeResponse, floater: Floater, watch: Watch
 ) -> tuple[Array, Array]:
     """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque found at poses with these gaps.
 
     Parameters
     ----------
     table, floater : that are compared with both bodies
-    coarse, rotor : finite elements of two degrees, which tell the table's error and their own
+    coarse, rotor : with two numbers of nodes, which tell the table's error and their own
     watch : called with the progress
     """
     generator = np.random.default_rng(4)
+    apart = max(float(np.ptp(np.linalg.eigvalsh(m.permeability_in_rotor))) for m in rotor.magnets)
     errors = []
     for gap in watched(GAPS, watch, "error estimate"):
         worst = np.zeros(2)
@@ -82,7 +84,7 @@ def mutual_errors(
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
             _, force, torque = table.added(place[None], floater.moment * direction[None], field[None], gradient[None])
             missed = [
-                np.linalg.norm(estimated - true) + ELEMENTS * np.linalg.norm(step)
+                np.linalg.norm(estimated - true) + CHARGED * np.linalg.norm(step)
                 for estimated, true, step in zip(
                     (force[0], torque[0]), (added.force, added.torque), (unsure.force, unsure.torque), strict=True
                 )
@@ -90,7 +92,7 @@ def mutual_errors(
             arm = floater.radius * np.linalg.norm(added.force)
             sizes = np.linalg.norm(added.force), max(float(np.linalg.norm(added.torque)), 0.1 * float(arm))
             worst = np.maximum(worst, np.array(missed) / np.maximum(np.array(sizes), np.finfo(float).tiny))
-        errors.append(SAFETY * worst)
+        errors.append(SAFETY * worst + MEANS * apart)
     return np.array(GAPS) * floater.radius, np.array(errors)
 
 
@@ -116,20 +118,17 @@ OBLIQUE = (
 EACH, EACH_OF_MANY = 16, 6  # places of dipoles for each gap and magnet; of rotors of `MANY` magnets
 # Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
 # many places the rotor's response to the sphere's is
-EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE = 8000, 5.0, 12, 6
+EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE = 8000, 5.0, 6, 6
 INNER = 2  # points along each axis at which magnets beside each other respond beyond their direct response
 
 
-def mutual_table(
-    magnets: tuple[Magnet, ...], floater: Floater, order: int = 2, watch: Watch = unwatched
-) -> MutualTable:
+def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = unwatched) -> MutualTable:
     """Mutual magnetisation of a rotor and a spherical floater.
 
     Parameters
     ----------
     magnets : of the rotor
     floater : whose radius, remanence and recoil permeability count
-    order : of the finite elements; errors are estimated with the next
     watch : called with the progress
 
     Raises
@@ -137,7 +136,7 @@ def mutual_table(
     InputError : a magnet's permeability has other axes than its body, or it is a part from a file
     """
     started = time.perf_counter()
-    rotor, fine = rotor_ladder(magnets, (order, order + 1))
+    coarse, rotor = (ChargeResponse(magnets, n) for n in ((COARSE, FINE) if len(magnets) < MANY else OF_MANY))
     grids = []
     for magnet in magnets:
         if reason := without_response(magnet):
@@ -155,23 +154,22 @@ def mutual_table(
     inner = [grid.inner(INNER if 1 < len(grids) < MANY else 1) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
     pairs = mixed = np.zeros((len(grids), len(grids)))
-    if rotor.regions is not None:
+    if rotor.permeable:
         places = places_around(magnets, floater.radius, ROTOR_GAPS, EACH if len(grids) < MANY else EACH_OF_MANY, 1)
-        grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, fine, places, watch), places)
+        grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, places), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
-        places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, 60, 2)])
+        places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, 30, 2)])
         near = places_around(magnets, floater.radius, NEAR_GAPS, 90, 3) if len(magnets) > 1 else places[:0]
         both = np.concatenate([places, near])
         grids, pairs = sphere_fit(grids, images, both, sphere_samples(rotor, floater, both, watch))
-        if rotor.regions is not None:
+        if rotor.permeable:
             fewer = np.concatenate([facing, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
             returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
             grids, mixed = returned_fit(grids, inner, images, fewer, returned)
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, floater.polarizability)
-    gaps, errors = mutual_errors(table, rotor, fine, floater, watch)
-    made: dict[str, str | float] = {"order": order, "seconds": time.perf_counter() - started}
-    return replace(table, gaps=gaps, errors=errors, provenance=made)
+    gaps, errors = mutual_errors(table, coarse, rotor, floater, watch)
+    return replace(table, gaps=gaps, errors=errors, provenance={"seconds": time.perf_counter() - started})
 
 
 def _counts(magnet: Magnet, radius: float) -> tuple[int, int, int]:

@@ -1,4 +1,4 @@
-"""Responses of rotor and floater at sampled places: by finite elements, and exactly for the sphere."""
+"""Responses of rotor and floater at sampled places: by charges on the magnets' surfaces, and exactly for the sphere."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -11,17 +11,15 @@ from ...geometry.scene.contents import Floater
 from ...geometry.solids import places_off
 from ..harmonics.interior import Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
 from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums
-from .response import RotorResponse, direct_rule, enough_degree
+from .response import ChargeResponse, enough_degree
 from .table import ResponseGrid, induced_sources, reflection
 
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
 # Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets
 NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
-# Part of the largest energy of a field in the magnets below which one counts as none: 6e-5 of a response in contact
-ALIKE = 1e-4
 CHUNK = 512  # points in the magnets at once, so that the fields of all dipoles there take some megabytes
-# Part of the sphere's response that the degrees left out may hold, and the most degrees of the small parts
-TAIL, MOST_ADDED, MOST_RETURNED = 1e-4, 16, 24
+# Part of the sphere's response that the degrees left out may hold, and the most degrees of the rotor's response to it
+TAIL, MOST_RETURNED = 1e-4, 24
 
 
 def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float], number: int, seed: int) -> Array:
@@ -72,54 +70,39 @@ def unit_dipole_fields(points: Array, places: Array) -> Array:
     return np.asarray(MU_0 / FOUR_PI * np.stack(fields, axis=1).reshape(-1, len(points), 3))
 
 
-def response_products(rotor: RotorResponse, fine: RotorResponse, places: Array, watch: Watch) -> tuple[Array, Array]:
+def unit_dipole_potentials(points: Array, places: Array) -> Array:
+    """Potentials ψ (n, 3 p) T m, b = -∇ψ, of the fields of `unit_dipole_fields` at points (n, 3) m."""
+    d = points[:, None] - places
+    return np.asarray((MU_0 / FOUR_PI * d / np.sum(d * d, axis=2)[..., None] ** 1.5).reshape(len(points), -1))
+
+
+def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Array]:
     """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric.
 
     Parameters
     ----------
-    rotor, fine : with elements of a degree, whose points tell which fields are alike, and of one more
+    rotor : that responds
     places : no nearer to the magnets than the floater's centre can be
-    watch : called with the progress
 
     Returns
     -------
-    The direct part, exact but for round-off, and what the magnets' own field adds, by the fine elements: those of
-    degree 2 err by a twentieth of it, those of degree 3 by a hundredth.
+    The part of `ChargeResponse.direct`, and that of the charges beyond it.
     """
     nearest = min(float(np.min(magnet.body.distance(places))) for magnet in rotor.magnets)
-    points, tensors = direct_rule(rotor.magnets, nearest)
+    points, tensors = rotor.direct(nearest)
     direct = np.zeros((3 * len(places), 3 * len(places)))
     for start in range(0, len(points), CHUNK):
         some = slice(start, start + CHUNK)
         fields = unit_dipole_fields(points[some], places)
         direct += np.einsum("pni,qnj,nij->pq", fields, fields, tensors[some], optimize=True)
-    direct /= MU_0
-    size = np.sqrt(np.diag(direct))
-    # Fields of all dipoles in the magnets are, but for ALIKE, sums of far fewer: the main components of what they are
-    # at the coarse elements' points. Only for these are the fine elements solved.
-    points, weights = rotor.places, rotor.weights
-    alike = np.zeros((len(size), len(size)))
-    for start in range(0, len(points), CHUNK):
-        some = slice(start, start + CHUNK)
-        fields = unit_dipole_fields(points[some], places) * (np.sqrt(weights[some])[:, None] / size[:, None, None])
-        rows = fields.reshape(len(size), -1)
-        alike += rows @ rows.T
-    values, vectors = np.linalg.eigh(alike)
-    kept = values > ALIKE * values[-1]
-    shares = vectors[:, kept] * np.sqrt(values[kept])
-    points, weights = fine.places, fine.weights
-    parts = np.zeros((shares.shape[1], *points.shape))
-    for k, place in enumerate(places):
-        own = np.arange(3 * k, 3 * k + 3)
-        given = unit_dipole_fields(points, place[None]) / size[own, None, None]
-        parts += np.einsum("ak,ani->kni", vectors[own][:, kept] / np.sqrt(values[kept]), given)
-    induced = np.array([fine.beyond(part) for part in watched(parts, watch, "induced magnetisation of the rotor")])
-    parts *= weights[:, None]
-    found = parts.reshape(len(parts), -1) @ induced.reshape(len(parts), -1).T / MU_0
-    return direct, size * size[:, None] * (shares @ ((found + found.T) / 2) @ shares.T)
+    charges = rotor.charges
+    normal = np.einsum("pni,ni->np", unit_dipole_fields(charges.places, places), charges.normals)
+    # ∫ M·b dV = -∮ σ ψ dS
+    found = -unit_dipole_potentials(charges.places, places).T @ (charges.areas[:, None] * rotor.beyond(normal))
+    return direct / MU_0, (found + found.T) / (2 * MU_0)
 
 
-def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch: Watch) -> list[Array]:
+def sphere_samples(rotor: ChargeResponse, floater: Floater, places: Array, watch: Watch) -> list[Array]:
     """The sphere's response, degree by degree, to the rotor's own field.
 
     Parameters
@@ -132,10 +115,10 @@ def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch:
     -------
     Energy (n,) J and force (n, 3) N of the response of degree 2 and more, and the sizes (n,) of those of the whole
     """
-    dipoles, rows = rotor.own_dipoles(), []
+    rows = []
     for place in watched(places, watch, "induced magnetisation of the floater"):
         ball = Ball(place, floater.radius)
-        own = _own_field(rotor, dipoles, ball, enough_degree(rotor.magnets, ball, TAIL))
+        own = rotor.own_field(ball, enough_degree(rotor.magnets, ball, TAIL))
         degree, sources = len(own) - 1, induced_sources(own, floater.recoil_permeability)
         first = sources.copy()
         first[2:] = 0.0
@@ -150,7 +133,7 @@ def sphere_samples(rotor: RotorResponse, floater: Floater, places: Array, watch:
 
 
 def returned_samples(
-    rotor: RotorResponse,
+    rotor: ChargeResponse,
     floater: Floater,
     grids: Sequence[ResponseGrid],
     inner: Array,
@@ -160,7 +143,7 @@ def returned_samples(
 ) -> tuple[Array, Array]:
     """The rotor's response to the sphere's response of degree 2 and more to the rotor's field.
 
-    By the points that respond for the rotor: to 2e-3 what its finite elements give from 1 mm off contact.
+    By the points that respond for the rotor: to 2e-3 what it gives itself from 1 mm off contact.
 
     The energy is -M·V of the moment M. A unit moment and the sphere's response to B0 are sources, the rotor responds to
     both, and the sphere to its response to the moment: the forces of the three are the derivatives of V.
@@ -176,7 +159,7 @@ def returned_samples(
     -------
     (n, 3) T at the sphere's centre, and (n, 3, 3) T/m: its change as the sphere moves along x, y, z
     """
-    dipoles, fields, slopes = rotor.own_dipoles(), [], []
+    fields, slopes = [], []
 
     def high(incident: Coefficients) -> Coefficients:
         sources = induced_sources(incident, floater.recoil_permeability)
@@ -186,7 +169,7 @@ def returned_samples(
     for place in watched(places, watch, "rotor's response to it"):
         ball = Ball(place, floater.radius)
         degree = min(enough_degree(rotor.magnets, ball, TAIL), MOST_RETURNED)
-        own = _own_field(rotor, dipoles, ball, degree)
+        own = rotor.own_field(ball, degree)
         back, slope = point_response(grids, inner, coupling, high(own), ball), []
         for unit in np.eye(3):
             moment = dipole_sources(unit, ball, degree)
@@ -216,11 +199,3 @@ def point_response(
     moments = [(b @ r * grid.strengths) @ r.T for grid, r, b in zip(grids, frames, seen, strict=True)]
     moments.append((coupling @ whole.ravel()).reshape(-1, 3))
     return from_magnetization(places, MU_0 * np.concatenate(moments), ball, len(sources) - 1)
-
-
-def _own_field(rotor: RotorResponse, dipoles: tuple[Array, Array], ball: Ball, degree: int) -> Coefficients:
-    """Of the rotor; what its permeability adds to its remanence, by the dipoles, up to a degree of its own."""
-    own = rotor.closed_field(ball, degree)
-    size = min(degree, MOST_ADDED) + 1
-    own[:size, :size] += from_magnetization(*dipoles, ball, size - 1)
-    return own

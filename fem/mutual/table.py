@@ -27,7 +27,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Solid
 from ..compiled_code import compiled
-from ..harmonics.solid import FOUR_PI, Coefficients, factorials
+from ..harmonics.solid import FOUR_PI, Coefficients, factorials, gauss_legendre
 
 # β of the images, and the degree up to which their weights are fitted from 2 on: to 7e-4 of t_l
 IMAGES, FITTED = (0.95, 0.73, 0.3), 14
@@ -256,7 +256,7 @@ class ResponseGrid:
     @cached_property
     def points(self) -> Array:
         """(n, 3) m along the body's axes, from its centre: Gauss's in the box."""
-        nodes = [np.polynomial.legendre.leggauss(n)[0] for n in self.counts]
+        nodes = [gauss_legendre(n)[0] for n in self.counts]
         return np.asarray(self.box.half_edges * np.array(list(product(*nodes))))
 
     @property
@@ -266,7 +266,7 @@ class ResponseGrid:
 
     def inner(self, number: int) -> Array:
         """(number³, 3) m in the rotor's frame: Gauss's points for what the magnet is as a whole."""
-        nodes = np.polynomial.legendre.leggauss(number)[0]
+        nodes = gauss_legendre(number)[0]
         return self.box.center + np.array(list(product(nodes, repeat=3))) * self.box.half_edges @ self.box.rotation.T
 
     def charges(self, number: int) -> tuple[Array, Array]:
@@ -274,7 +274,7 @@ class ResponseGrid:
 
         At Gauss's points, `number` along an edge, in units of the charge of a face that the remanence leaves upright.
         """
-        nodes, weights = np.polynomial.legendre.leggauss(number)
+        nodes, weights = gauss_legendre(number)
         along, places, amounts = list(zip(nodes, weights / 2, strict=True)), [np.zeros((0, 3))], []
         for k in np.flatnonzero(np.abs(self.axis) > PARALLEL):
             for side, (u, first), (v, second) in product((-1.0, 1.0), along, along):

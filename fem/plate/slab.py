@@ -32,6 +32,7 @@ from ...geometry.shapes import rotation_matrix
 from ..cache import TableKind
 from ..closed_forms.eddy_sphere import ComplexArray
 from ..closed_forms.potentials import unit_dipoles
+from ..harmonics.solid import gauss_legendre
 from ..rotor.table import RotorTable
 from .eddy import EddySpace, solve_shifted
 from .rotor_share import DOWN
@@ -249,7 +250,7 @@ def edge_error(plate: Plate, place: Array) -> float:
     body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
     depth = abs(float(body[normal])) + plate.box.half_edges[normal]
     centre, half = np.delete(body, normal), np.delete(plate.box.half_edges, normal)
-    nodes, weights = np.polynomial.legendre.leggauss(60)
+    nodes, weights = gauss_legendre(60)
     lower, upper = np.arcsinh((-half - centre) / depth), np.arcsinh((half - centre) / depth)
     u = (lower + upper)[:, None] / 2 + (upper - lower)[:, None] / 2 * nodes
     (x, y), (wx, wy) = np.sinh(u), np.cosh(u) * weights * (upper - lower)[:, None] / 2

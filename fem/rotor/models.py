@@ -74,7 +74,8 @@ def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, 
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
     points = [points_around(magnets, clearance + f * size, FARTHER if f else NEAR) for f in OFFSETS]
     shares = [min(CANCELLED + CANCELLED_FARTHER * f, CANCELLED_MOST) for f in OFFSETS]
-    scales = [typical_field(magnets, shell, share) for shell, share in zip(points, shares, strict=True)]
+    carriers = _carriers(magnets)  # which are their own: they are computed once
+    scales = [typical_field(carriers, shell, share) for shell, share in zip(points, shares, strict=True)]
     return np.concatenate(points), np.concatenate(scales)
 
 
@@ -94,11 +95,15 @@ def typical_field(magnets: tuple[Magnet, ...], points: Array, share: float = CAN
 
     `share` is the least, of the field of all magnets without their signs.
     """
-    carriers = [magnet if isinstance(magnet.body, Part) else carrier(magnet) for magnet in magnets]
-    fields = [uniform_moments(magnet, 1).evaluate(points)[0] for magnet in carriers]
+    fields = [uniform_moments(magnet, 1).evaluate(points)[0] for magnet in _carriers(magnets)]
     field = np.linalg.norm(sum(fields), axis=1)
     least = np.maximum(np.median(field) / 3, share * sum(np.linalg.norm(one, axis=1) for one in fields))
     return np.maximum(field, least) if field.any() else np.ones(len(field))
+
+
+def _carriers(magnets: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
+    """See `carrier`; parts as they are."""
+    return tuple(magnet if isinstance(magnet.body, Part) else carrier(magnet) for magnet in magnets)
 
 
 DEGREE = 25  # degree up to which the part that a model leaves out is computed
@@ -252,7 +257,7 @@ def fem_table(
     }
     polarized = tuple(one for one in carriers if one.polarization.any())
     table = RotorTable("fem", magnets, polarized, tuple(whole), {k: parts for k, parts in doubts.items() if parts})
-    table = _trimmed(table, accuracy, BETWEEN / 20, 1.0)
+    table = _trimmed(table, accuracy, (points, scale), BETWEEN / 20, 1.0)
     reached = _warn_beyond(table, accuracy, points, scale)
     mesh = solution.mesh
     made: dict[str, str | float] = {
@@ -372,7 +377,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     known = {cause: nonzero(parts) for cause, parts in (("discretisation", steps), ("tail", tail)) if nonzero(parts)}
     polarized = tuple(one for one in carriers if one.polarization.any())
     table = RotorTable("surface", magnets, polarized, tuple(whole), known)
-    table = _trimmed(table, accuracy, BETWEEN / 20, 1.0, FITTED)
+    table = _trimmed(table, accuracy, (points, scale), BETWEEN / 20, 1.0, FITTED)
     _warn_beyond(table, accuracy, points, scale)
     return replace(table, provenance={"nodes": count, "seconds": time.perf_counter() - start})
 
@@ -403,14 +408,20 @@ def _guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array
     return points, typical_field(magnets, points)
 
 
-def _trimmed(table: RotorTable, accuracy: Accuracy, least: float, beside: float, most: int = MOST) -> RotorTable:
+def _trimmed(
+    table: RotorTable,
+    accuracy: Accuracy,
+    looked_at: tuple[Array, Array],
+    least: float,
+    beside: float,
+    most: int = MOST,
+) -> RotorTable:
     """The table without what its other doubts leave room for; that is known, and a doubt of its own.
 
-    `least` is the share of the tolerance that may be left out even if the table itself does not meet it, `beside` that
-    of `BESIDE` next to edges; `most` is that of `trimmed_expansions`.
+    It is `looked_at` at `error_points`. `least` is the share of the tolerance that may be left out even if the table
+    itself does not meet it, `beside` that of `BESIDE` next to edges; `most` is that of `trimmed_expansions`.
     """
-    clearance = accuracy.clearance(table.magnets)
-    points, scale = error_points(table.magnets, clearance)
+    clearance, (points, scale) = accuracy.clearance(table.magnets), looked_at
     rest = table.absolute_error(points)[0]
     allowed = np.maximum(BETWEEN * (scale * accuracy.rtol - rest), least * scale * accuracy.rtol)
     # without points beside edges the fit, which need only hold at the others, would run wild there
@@ -483,4 +494,6 @@ def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
     What is left out is known and a doubt of the new table, which still says how wrong it is, nearer too.  A table
     without expansions stays as it is.
     """
-    return _trimmed(table, accuracy, AT_LEAST, AT_LEAST) if table.expansions else table
+    if not table.expansions:
+        return table
+    return _trimmed(table, accuracy, error_points(table.magnets, accuracy.clearance(table.magnets)), AT_LEAST, AT_LEAST)

@@ -17,7 +17,7 @@ from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.state import Scales
-from ...fem.mutual.response import RotorResponse, rotor_ladder, two_body, two_body_ladder
+from ...fem.mutual.response import RotorResponse, element_ladder, two_body, two_body_ladder
 from ...geometry.common import Array
 from ...geometry.scene.contents import Floater, Scene
 from ...geometry.scene.files import load_scene
@@ -261,7 +261,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the
     stable equilibrium (along -x if there is none), fixed where no balance is near.
     """
-    rotors = rotor_ladder(scene.rotor, (2, 3) if quick else (3, 4))
+    rotors = element_ladder(scene.rotor, (2, 3) if quick else (3, 4))
     alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))
     if distances is None:  # from contact on the axis, evenly in their logarithm
         step = 1e-5

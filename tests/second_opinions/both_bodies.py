@@ -56,7 +56,9 @@ def solve_both_bodies(
     incident = interior_coefficients(lambda points: remanent_field(mesh.magnets, points), ball, degree)
     rest = weights[:, None] * (induced - regions.direct(from_rotor))
     incident += from_magnetization(places[rotor], rest[rotor], ball, degree)
-    incident += from_magnetization(*closed_dipoles(mesh.magnets), ball, degree)
+    incident += from_magnetization(
+        *closed_dipoles(mesh.magnets, [m.permeability_in_rotor - np.eye(3) for m in mesh.magnets]), ball, degree
+    )
     sources = moments_of_magnetization(
         places[inside], weights[inside], induced[inside], ball.center, ball.radius, degree
     )

@@ -16,7 +16,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import rotor_ladder, two_body
+from spinlev.fem.mutual.response import element_ladder, two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.studies.catalogue.article import FLOATER, rotor_scene
 from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem
@@ -113,7 +113,7 @@ def test_a_design_holds_the_floater_where_it_was_wanted():
 def test_mutual_magnetisation_moves_the_floater_as_the_perturbed_balance_says(tilted):
     """The table's energy in the equations, against Broyden's method with the magnetostatics of both bodies."""
     scene, _, found = tilted
-    (rotor,) = rotor_ladder(scene.rotor, (2,))
+    (rotor,) = element_ladder(scene.rotor, (2,))
     there = replace(scene, frequency=120.0)
     table = cached_rotor_table(scene.rotor, "fem", 3e-6, print, FLOATER.radius)[0]  # both bodies' field is the true one
     rates = Rates(table)

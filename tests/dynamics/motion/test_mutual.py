@@ -18,7 +18,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import rotor_ladder, two_body
+from spinlev.fem.mutual.response import element_ladder, two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.rotor import horizontal, tilt, vertical
@@ -195,7 +195,7 @@ def test_equilibria_of_other_rotors_against_both_bodies(rotor, frequency, part):
     scene = replace(SCENE, frequency=frequency, rotor=rotor)
     whole = interaction(scene)
     found = find_equilibria(scene, whole)[0]
-    (fine,) = rotor_ladder(rotor, (3,))
+    (fine,) = element_ladder(rotor, (3,))
     both = two_body(fine, PERMEABLE, found.position, found.state.moment, None, 1e-8)
     added, (field, gradient) = both.total - both.rigid, whole.evaluate(found.position[None])
     force, _ = whole.effects[0].wrench(found.position[None], found.state.moment[None], field, gradient)

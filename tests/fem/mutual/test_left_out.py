@@ -6,7 +6,7 @@ from article import PERMEABLE, PERMEABLE_MAGNETS as MAGNETS
 
 from spinlev.fem.harmonics.interior import dipole_sources, field_at_center, multipole_force, multipole_torque
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import rotor_ladder, two_body
+from spinlev.fem.mutual.response import element_ladder, two_body
 from spinlev.fem.mutual.samples import places_around
 from spinlev.fem.mutual.table import induced_sources
 
@@ -26,7 +26,7 @@ def test_the_rotors_answer_to_the_spheres_higher_degrees_is_needed_and_enough(ga
 
     It is -M·V: the table's V is the field that the finite elements send back, to a part that leaves 1e-3 of the whole.
     """
-    (rotor,) = rotor_ladder(MAGNETS, (2,))
+    (rotor,) = element_ladder(MAGNETS, (2,))
     answers = cached_mutual_table(MAGNETS, PERMEABLE, print)[0]
     generator = np.random.default_rng(4)
     for place in places_around(MAGNETS, PERMEABLE.radius, (gap / PERMEABLE.radius,), 4, 3):

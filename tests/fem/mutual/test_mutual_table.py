@@ -10,7 +10,7 @@ from numpy.polynomial import legendre
 
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center
 from spinlev.fem.mutual.making import MUTUAL, cached_mutual_table, mutual_table
-from spinlev.fem.mutual.response import enough_degree, rotor_response, two_body
+from spinlev.fem.mutual.response import element_response, enough_degree, two_body
 from spinlev.fem.mutual.samples import places_around
 from spinlev.fem.mutual.table import image_weights, reflection, response_to_charge
 from spinlev.geometry.common import InputError
@@ -30,7 +30,7 @@ def table():
 @pytest.fixture(scope="module")
 def fine():
     """Finite elements on a finer mesh than the table's."""
-    return rotor_response(mesh_magnets(MAGNETS, FINER), 3)
+    return element_response(mesh_magnets(MAGNETS, FINER), 3)
 
 
 def poses(gap, number, seed, magnets=MAGNETS):
@@ -84,7 +84,7 @@ def test_nearer_to_contact_the_stated_error_holds(table, fine):
 )
 def test_from_a_millimetre_off_contact_on_cubes_are_met_to_a_thousandth(rotor):
     """At thirty poses of each rotor."""
-    fine, table = rotor_response(mesh_magnets(rotor, FINER), 3), cached_mutual_table(rotor, PERMEABLE, print)[0]
+    fine, table = element_response(mesh_magnets(rotor, FINER), 3), cached_mutual_table(rotor, PERMEABLE, print)[0]
     for gap in (1e-3, 2e-3, 4e-3):
         each = zip(*poses(gap / PERMEABLE.radius, 10, 31, rotor), strict=True)
         worst = np.max([missed(table, fine, place, direction) for place, direction in each], axis=0)

@@ -9,7 +9,7 @@ from second_opinions.two_bodies import mesh_two_bodies
 
 from spinlev.fem.harmonics.interior import field_at_center, gradient_at_center
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import Wrench, rotor_ladder, two_body
+from spinlev.fem.mutual.response import Wrench, element_ladder, two_body
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.shapes import ring
 
@@ -38,7 +38,7 @@ def by_segments(places, *counts):
 
 
 def by_elements(places, order):
-    (rotor,) = rotor_ladder(RING, (order,))
+    (rotor,) = element_ladder(RING, (order,))
     found = [
         two_body(rotor, PERMEABLE, p, d, 16, 1e-4).rotor_answer
         for p, d in zip(places, DIRECTIONS[: len(places)], strict=True)
@@ -78,7 +78,7 @@ def test_a_rings_answer_is_that_of_both_bodies_in_one_mesh():
     Points in a box stand for the round body: they miss up to 4 % at its rim, 1.1 % below it.
     """
     table = cached_mutual_table(RING, PERMEABLE, print)[0]
-    (rotor,) = rotor_ladder(RING, (3,))
+    (rotor,) = element_ladder(RING, (3,))
     for place, direction in zip(PLACES, DIRECTIONS, strict=True):
         both = two_body(rotor, PERMEABLE, place, direction, None, 1e-8)
         whole = solve_both_bodies(mesh_two_bodies(RING, place, PERMEABLE.radius, 0.2), PERMEABLE, place, direction)

@@ -19,7 +19,7 @@ from spinlev.fem.harmonics.interior import (
     multipole_torque,
 )
 from spinlev.fem.harmonics.solid import derivative, outer_sums
-from spinlev.fem.mutual.response import TwoBodyError, enough_degree, rotor_ladder, two_body, two_body_ladder
+from spinlev.fem.mutual.response import TwoBodyError, element_ladder, enough_degree, two_body, two_body_ladder
 from spinlev.fem.mutual.table import induced_sources
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
@@ -159,7 +159,7 @@ def test_force_and_torque_against_maxwell_stress():
 
 @pytest.fixture(scope="module")
 def rotors():
-    return rotor_ladder(horizontal(0.002, 0.01, 1.305, 1.05), (2, 3))
+    return element_ladder(horizontal(0.002, 0.01, 1.305, 1.05), (2, 3))
 
 
 def test_rigid_dipole_is_the_table_of_the_rotor(rotors):
@@ -189,7 +189,7 @@ def test_both_bodies_solved_at_once_agree(rotors):
 def test_high_permeability_settles_as_well():
     """μr = 3 in both bodies: more terms, and the direct solution still agrees."""
     body = floater(3.0)
-    rotor = rotor_ladder(horizontal(0.002, 0.01, 1.305, 3.0), (3,))[0]
+    rotor = element_ladder(horizontal(0.002, 0.01, 1.305, 3.0), (3,))[0]
     both = two_body(rotor, body, PLACE, DIRECTION)
     whole = solve_both_bodies(mesh_two_bodies(rotor.magnets, PLACE, RADIUS, 0.25), body, PLACE, DIRECTION)
     assert both.terms > 5
@@ -219,7 +219,7 @@ def test_action_is_reaction(rotors):
 
 def test_rigid_floater_and_rotor_of_unit_permeability():
     """μr = 1: each answer vanishes exactly, and the rigid dipole in the closed form is the whole."""
-    rotor = rotor_ladder(vertical(0.014, 0.01, 1.305, 1.0), (2,))[0]
+    rotor = element_ladder(vertical(0.014, 0.01, 1.305, 1.0), (2,))[0]
     both = two_body(rotor, floater(1.0), PLACE, DIRECTION)
     assert np.array_equal(both.total.force, both.rigid.force)
     assert both.terms == 1
@@ -229,7 +229,7 @@ def test_rigid_floater_and_rotor_of_unit_permeability():
 
 def test_answers_are_first_order_in_the_susceptibility():
     """Limit μr → 1: what the floater's answer adds is in proportion to (μr - 1)/(μr + 2) but for higher degrees."""
-    rotor = rotor_ladder(horizontal(0.002, 0.01, 1.305, 1.0), (2,))[0]
+    rotor = element_ladder(horizontal(0.002, 0.01, 1.305, 1.0), (2,))[0]
     added = [two_body(rotor, floater(1 + chi), PLACE, DIRECTION).floater_answer.force / chi for chi in (1e-3, 1e-6)]
     np.testing.assert_allclose(added[0], added[1], rtol=0, atol=1e-3 * np.linalg.norm(added[1]))
 
