@@ -47,7 +47,7 @@ SMALL = 1e-9  # relative size of a singular value that is none
 # From so many magnets on, points of a class have one weight and magnets respond to each other by their centres
 MANY = 4
 # What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
-SMALL, FREE = 1e-3, 1e-6
+PENALTY, FREE = 1e-3, 1e-6
 # Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole
 GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
 DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end
@@ -291,7 +291,7 @@ def sphere_fit(
     pairs = list(combinations(range(len(grids)), 2))
     sums = [pair_sum(grids[a], grids[b], images) for a, b in pairs]
     right = scaled(energy[None], -force[None], force)[0]
-    found, weights = _fitted(grids, OF_SPHERE, sums, places, scaled, right, SMALL)
+    found, weights = _fitted(grids, OF_SPHERE, sums, places, scaled, right, PENALTY)
     coupled = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         coupled[a, b] = coupled[b, a] = weight
@@ -321,7 +321,7 @@ def returned_fit(
     sums = [mixed_sum(grids[a], inner[b], images) for a, b in pairs]
     # the energy is -M·V
     right = -np.concatenate([(field / sizes[0]).ravel(), (change / sizes[1]).ravel()])
-    found, weights = _fitted(grids, OF_RETURN, sums, places, scaled, right, 10 * SMALL)
+    found, weights = _fitted(grids, OF_RETURN, sums, places, scaled, right, 10 * PENALTY)
     mixed = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         mixed[a, b] = weight
@@ -371,7 +371,7 @@ def classes(grid: ResponseGrid, mirrored: bool) -> Array:
     return np.asarray(np.eye(number.max() + 1)[number])
 
 
-def least_squares(columns: Array, values: Array, small: Array, cost: float = SMALL) -> Array:
+def least_squares(columns: Array, values: Array, small: Array, cost: float = PENALTY) -> Array:
     """Weights (k,) of columns (n, k) of any sizes that give values (n,).
 
     Parameters
