@@ -180,7 +180,7 @@ def test_beside_a_known_scene_no_file_is_opened(folder, tmp_path):
     assert twice.frequency == 80.0
     assert (twice.rotor[0].body.step, twice.field_map) == (first.rotor[0].body.step, first.field_map)
     assert parse_scene(text.replace("100.0", "90.0", 1), "x.toml", known=first).frequency == 90.0
-    for key, name in (("rotor.magnets[0].file", "parts/part.step"), ("rotor.field_map", "map.csv")):
+    for key, name, line in (("rotor.magnets[0].file", "parts/part.step", 3), ("rotor.field_map", "map.csv", 2)):
         said = set()
         for other in (str(beside / "other.step"), str(beside / "none.step"), "/dev/zero", "../x"):
             with pytest.raises(SceneError) as error:
@@ -188,7 +188,7 @@ def test_beside_a_known_scene_no_file_is_opened(folder, tmp_path):
             said.add(str(error.value).replace(shown(other), ""))
         assert said == {
             f"x.toml: Input {key} must be a file of the scene that was opened first; instead received . Give the "
-            "scene to the command line."
+            f"scene to the command line (line {line})."
         }
 
 
