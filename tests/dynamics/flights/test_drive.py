@@ -13,11 +13,12 @@ from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, si
 from spinlev.dynamics.flights.live import LiveFlight
 from spinlev.dynamics.flights.trajectory import Checkpoint, FlightStopped
 from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.floater_effects import slow_error
 from spinlev.dynamics.motion.rotor_effects import RotorCurrents
 from spinlev.dynamics.motion.state import turned_about_z
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
-from spinlev.geometry.common import MAGNET_CONDUCTIVITY
+from spinlev.geometry.common import MAGNET_CONDUCTIVITY, MU_0
 from spinlev.geometry.scene.contents import Drag, DriveStep, OffsetStart, Scene
 
 TABLE = rotor_table(MAGNETS, "dipole")
@@ -109,6 +110,15 @@ def test_currents_in_rotor_and_floater_take_it_from_the_motor():
     momentum = orbit + FLOATER.inertia * flown.lab.spin[:, 2]
     assert np.abs(momentum - momentum[0] - flown.given[:, 0]).max() < 1e-12 * np.abs(momentum).max()
     assert flown.energy_error < 1e-12
+
+
+def test_currents_in_the_floater_follow_a_ramp():
+    """A mode of delay τ = μ0σR²/π² behind a ramp of 1 Hz/s errs by ω̇τ²: 7.4e-11 for the article's floater."""
+    scene = replace(STEADY, floater=replace(FLOATER, conductivity=MAGNET_CONDUCTIVITY))
+    ramp = replace(scene, drive=(DriveStep(scene.frequency - 1.0, 1.0),))
+    delay = MU_0 * MAGNET_CONDUCTIVITY * FLOATER.radius**2 / np.pi**2
+    assert slow_error(ramp) - slow_error(scene) == pytest.approx(2 * np.pi * delay**2, rel=1e-4)
+    assert 2 * np.pi * delay**2 == pytest.approx(7.4e-11, rel=0.02)
 
 
 @pytest.mark.parametrize("tilted", [False, True])

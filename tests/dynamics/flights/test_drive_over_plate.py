@@ -76,6 +76,7 @@ def test_motion_and_motor_are_those_of_the_laboratory(memory):
 def test_a_drive_that_holds_is_none(memory):
     """Other states, of which none is subtracted, give the same motion over a plate that goes down."""
     one, two = (flown(replace(SCENE, drive=drive), memory, 0.1)[1] for drive in ((), (DriveStep(None, 0.05),)))
+    print(f"\nsteps: {one.steps} with the rotor's currents subtracted, {two.steps} with them integrated")
     assert np.abs(one.lab.position - two.lab.position).max() < 1e-11
 
 
