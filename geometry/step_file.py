@@ -94,6 +94,24 @@ def measured(text: str) -> tuple[str, Array, Array, Array, float, float, Array]:
     )  # fmt: skip
 
 
+@lru_cache(maxsize=16)
+def second_moments_of_part(part: Part) -> Array:
+    """(3, 3) ∫ x xᵀ dV, m⁵, of a part about the centre of its volume along its own axes."""
+    inertia = call_apart(LONGEST + len(part.brep) / PACE, inertia_of, part.brep)
+    return np.asarray(np.trace(inertia) / 2 * np.eye(3) - inertia)
+
+
+def inertia_of(brep: str) -> Array:
+    """(3, 3) tensor of inertia, m⁵, of the solid of a BREP text about the centre of its volume."""
+    import netgen.occ as occ
+
+    with tempfile.NamedTemporaryFile("w", suffix=".brep", encoding="utf-8") as copy:
+        copy.write(brep)
+        copy.flush()
+        shape = occ.OCCGeometry(copy.name).shape
+    return MILLI**5 * np.array([[shape.inertia[i, j] for j in range(3)] for i in range(3)])
+
+
 def _solids(text: str) -> tuple[list[Any], int]:
     """The solids of all roots of a STEP file, and the number of faces that belong to none."""
     import netgen.occ as occ

@@ -101,6 +101,9 @@ def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compare
     ------
     EquilibriumError : the rotor is at rest
     """
+    if not scene.floater.round:
+        note("All models have the mean of the floater over turns about its moment.")
+        scene = replace(scene, floater=scene.floater.averaged)
     best: FieldModel = "map" if scene.field_map else "fem"
     alone = replace(requested, model=best, interaction="rigid")
     finest = Levitation(scene, alone, spin)

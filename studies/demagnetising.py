@@ -61,14 +61,16 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
             "Input rotor must have a magnet with a polarisation, whose working point is asked for; instead none has."
         )
     floating = None
-    if scene.floater.shape == "cuboid":
-        note("The magnets alone: the levitation of a cuboid is not computed.")
+    if len(scene.floater.magnets) != 1:
+        note("The magnets alone: of a floater of several magnets they are not computed.")
     else:
         with suppress(EquilibriumError):  # without one the magnets are alone
             floating = most_like_levitation(levitation.without_plate.equilibria)
     note("Field in the magnets ...")
     start = None if floating is None else floating.start
-    field = EasyField(scene.rotor, None if start is None else scene.floater.magnet(start.position, start.moment))
+    field = EasyField(
+        scene.rotor, None if start is None else scene.floater.magnets_at(start.position, start.orientation)[0]
+    )
     known = working_points(field)
     found = [(k, point) for k in numbers if (point := known[k]) is not None]
     sections = [field.section(k, point.place, STEPS) for k, point in found]

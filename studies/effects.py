@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.equilibria.equilibrium import Equilibrium
+from ..dynamics.equilibria.equilibrium import LOCKED, Equilibrium
 from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_mutual
+from ..dynamics.motion.body_shape import HIGHEST
 from ..dynamics.motion.effects import NOTHING_PERMEABLE
 from ..dynamics.motion.floater_effects import (
     FLOATER_CURRENTS,
+    FLOATER_SHAPE,
     REAL_AIR,
     SLOW_ENOUGH,
     reynolds,
@@ -19,6 +21,7 @@ from ..dynamics.motion.floater_effects import (
     swinging,
 )
 from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS
+from ..fem.rotor.floater import floater_sources, shares
 from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
 from ..geometry.common import MAGNET_CONDUCTIVITY
 from .levitation import Levitation
@@ -58,6 +61,8 @@ def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) ->
     """All effects that are known, with what they do to the first of the equilibria."""
     first = next(iter(equilibria), None)
     found = [part(levitation, first) for part in (_mutual, _rotor_currents, _floater_currents, _air)]
+    if not levitation.scene.floater.is_sphere:
+        found.append(_shape(levitation))
     others = {effect.name for effect in scene_effects(levitation.scene)} - {effect.name for effect in found}
     return [*found, *(ListedEffect(name, True, None, None, "given in the scene") for name in sorted(others))]
 
@@ -74,15 +79,15 @@ def effects_summary(levitation: Levitation, effects: Sequence[ListedEffect]) -> 
 
 def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     (answers, why), shift = levitation.answers, None
-    if first is not None and why != NOTHING_PERMEABLE and levitation.scene.floater.body is None:
-        shift = 1e3 * shift_by_mutual(levitation.scene, levitation.table, first, answers)
+    if first is not None and why != NOTHING_PERMEABLE and first.kind != LOCKED:
+        shift = 1e3 * shift_by_mutual(levitation.mean.scene, levitation.table, first, answers)
     return ListedEffect(MUTUAL, answers is not None, shift, None, why)
 
 
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Eddy currents of the scene's floater, or what those of a sintered magnet would be."""
     scene, floater, growth = levitation.scene, levitation.scene.floater, None
-    if floater.body is not None:
+    if not floater.is_sphere:
         return ListedEffect(FLOATER_CURRENTS, False, None, None, OF_SPHERES)
     there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
     doubt = slow_error(there)
@@ -94,9 +99,7 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Eddy currents of the scene's rotor, or what those of sintered magnets, taken as balls, would be."""
-    scene, growth, included = levitation.scene, None, levitation.losses is not None
-    if scene.floater.body is not None:
-        return ListedEffect(ROTOR_CURRENTS, False, None, None, OF_SPHERES)
+    scene, growth, included = levitation.mean.scene, None, levitation.losses is not None
     pieces = pieces_of([replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor], ())
     losses = levitation.losses or (ball_losses(pieces) if pieces else None)
     doubt = 0.0 if included else metal_error(pieces, scene.fastest)
@@ -105,11 +108,22 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
         # Within the sphere about a magnet, as in the hole of a ring, no ball is like that magnet.
         place = (first.without or first).position
         near = any(np.linalg.norm(place - m.body.center) < m.body.circumradius for m in scene.rotor)
-    if first and losses and scene.frequency and doubt <= SLOW_ENOUGH and not near:
+    if first and first.kind != LOCKED and losses and scene.frequency and doubt <= SLOW_ENOUGH and not near:
         growth = growth_by_rotor(scene, first, losses, included)
     why = _why("rotor.conductivity_S_m", included, growth, doubt)
     why += "; the floater is so near to the magnets that their size is not known" if near else ""
     return ListedEffect(ROTOR_CURRENTS, included, 0.0, growth, why)
+
+
+def _shape(levitation: Levitation) -> ListedEffect:
+    """The shape of a floater that is no sphere, and where it is left out."""
+    floater = levitation.scene.floater
+    left_out = shares(floater, floater_sources(floater), HIGHEST)
+    why = (
+        f"its multipoles in the rotor's field; plate, induced magnetisation and currents have its dipole and a sphere "
+        f"of its volume, whose error is up to {left_out.sum():.1%} of what they do"
+    )
+    return ListedEffect(FLOATER_SHAPE, True, None, None, why)
 
 
 def _why(key: str, included: bool, growth: float | None, doubt: float) -> str:
@@ -125,8 +139,15 @@ def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     scene = levitation.scene
     if scene.drag.air:
         return ListedEffect(REAL_AIR, True, 0.0, None, 'drag.model is "air"')
-    if scene.floater.body is not None:
-        return ListedEffect(REAL_AIR, False, None, None, f"{OF_SPHERES}; the drag is Stokes' on a sphere of its volume")
+    if not scene.floater.is_sphere:
+        floater = scene.floater
+        ends = np.array([floater.inner_radius, floater.radius]) / np.cbrt(floater.volume * 0.75 / np.pi)
+        # A body has no less drag than one that it holds, and no more than one that holds it: R. Hill and G. Power,
+        # Q. J. Mech. Appl. Math. 9 (1956) 313; of forces, and for torques alike.
+        (low, high), (less, more) = ends.tolist(), (ends**3).tolist()
+        why = f"{OF_SPHERES}; the drag is Stokes' on a sphere of its volume: a slow motion of its own shape meets "
+        why += f"{low:.2f} to {high:.2f} times that force and {less:.2f} to {more:.2f} times that torque"
+        return ListedEffect(REAL_AIR, False, None, None, why)
     h = float(swinging(reynolds(scene.floater.radius, scene.angular_velocity)))
     why = f'drag.model is not "air"; the torque on an oscillating floater would be {h:.2g} times that of Stokes'
     return ListedEffect(REAL_AIR, False, 0.0, None, why)

@@ -170,10 +170,10 @@ def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[
     h[known] = table.evaluate(points[known])[0] / MU_0
     if state is not None:
         moment, radius = scene.floater.moment * state.moment, scene.floater.radius
-        if scene.floater.body is None:
+        if scene.floater.is_sphere:
             own, inside = fields_of_sphere(moment, state.position, radius, points)
         else:
-            own, inside = fields_of_magnets([scene.floater.magnet(state.position, state.moment)], points)
+            own, inside = fields_of_magnets(scene.floater.magnets_at(state.position, state.orientation), points)
         h, magnetization = h + own, magnetization + inside
         body[inside.any(axis=1)] = FLOATER
     return {"B": MU_0 * (h + magnetization), "H": h, "M": magnetization, "J": np.zeros_like(points), "body": body}

@@ -1,4 +1,4 @@
-"""Force and torque of the rotor's field on a fixed floater: a sphere, a cuboid or a cylinder in any pose."""
+"""Force and torque of the rotor's field on a fixed floater of any shape, in any pose."""
 
 import numpy as np
 import xarray as xr
@@ -10,7 +10,6 @@ from ..geometry.common import Array, InputError
 from ..geometry.overlap import body_overlap
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
-from ..geometry.solids import moved
 from .cli.console import note
 from .cli.options import FieldModel, Models, documented
 from .levitation import Levitation
@@ -30,7 +29,7 @@ def floater_force(
     rtol: float = Models.rtol,
     progress: bool | None = None,
 ) -> xr.Dataset:
-    """Force and torque of the rotor's field on the floater fixed in any pose: a sphere, a cuboid or a cylinder.
+    """Force and torque of the rotor's field on the floater fixed in any pose.
 
     The floater's own multipoles in the rotor's field, those of its permeability as well; what rotor and floater induce
     in each other is left out. Gravity, plate and motion do not enter.
@@ -40,9 +39,10 @@ def floater_force(
     position_mm : array_like
         (n, 3) or (3,) of the floater's centre, mm, rotor's frame.
     moment : array_like
-        (n, 3) or (3,) directions of its moment, the body's z.
+        (n, 3) or (3,) directions of its moment.
     body_x : array_like, optional
-        (n, 3) or (3,) directions near which the body's x lies; left out, near the rotor's x. It matters to a cuboid.
+        (n, 3) or (3,) directions near which the body's x lies; left out, near the rotor's x. It matters to a body that
+        is not round.
 
     Returns
     -------
@@ -70,9 +70,8 @@ def floater_force(
     floater, table = levitation.scene.floater, levitation.table
     centres = 1e-3 * _vectors("position_mm", position_mm)
     places, pointing = np.broadcast_arrays(centres, _directions("moment", moment))
-    axes = np.array([floater.axes(m) for m in pointing])
-    if body_x is not None:
-        axes = _turned(axes, np.broadcast_to(_directions("body_x", body_x), places.shape))
+    near = [None] * len(places) if body_x is None else np.broadcast_to(_directions("body_x", body_x), places.shape)
+    axes = np.array([floater.axes(m, x) for m, x in zip(pointing, near, strict=True)])
     _check_free(levitation.scene, places, axes)
     fine, coarse = floater_sources(floater, note), floater_sources(floater, note, COARSE)
     force, torque = _acting(fine, table, places, axes)
@@ -114,20 +113,10 @@ def _directions(name: str, value: ArrayLike) -> Array:
     return np.asarray(found / length)
 
 
-def _turned(axes: Array, near: Array) -> Array:
-    """Body axes (n, 3, 3) turned about their z so that x is as near as can be to unit vectors (n, 3)."""
-    z = axes[:, :, 2]
-    x = near - np.sum(near * z, axis=1, keepdims=True) * z
-    length = np.linalg.norm(x, axis=1, keepdims=True)
-    if not (length > 1e-9).all():
-        raise InputError("Input body_x must not be along the moment; instead it is.")
-    return np.stack([x / length, np.cross(z, x / length), z], axis=2)
-
-
 def _check_free(scene: Scene, places: Array, axes: Array) -> None:
     for place, turn in zip(places, axes, strict=True):
-        body = moved(scene.floater.solid, place, turn)
-        depth = max((body_overlap(other, body) for other in scene.turning_bodies), default=-1.0)
+        parts = scene.floater.placed(place, turn)
+        depth = max((body_overlap(other, part) for other in scene.turning_bodies for part in parts), default=-1.0)
         if depth > 0:
             where = ", ".join(f"{1e3 * c:.6g}" for c in place)
             raise InputError(

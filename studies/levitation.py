@@ -11,14 +11,13 @@ import numpy as np
 
 from ..dynamics.continuation.branch import BranchPoint
 from ..dynamics.continuation.frequencies import branch_through, on_branch
-from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey
+from ..dynamics.equilibria.equilibrium import AVERAGED, Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
 from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
 from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
 from ..dynamics.motion.effect import Interaction, interaction_of
-from ..dynamics.motion.effects import BESIDE_METAL, WITHOUT_METAL, mutual_choice, with_effects
-from ..dynamics.motion.equations import FORCE_ALONE
+from ..dynamics.motion.effects import mutual_choice, with_effects
 from ..dynamics.motion.events import plate_depth
 from ..dynamics.motion.plate import PlateMemory
 from ..dynamics.motion.rates import Rates
@@ -110,6 +109,12 @@ class Levitation:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
         self.without_plate, self.searched = known, searched
 
+    @cached_property
+    def mean(self) -> Levitation:
+        """That of the floater's mean over turns about its moment; this one where it is round about that."""
+        floater = self.scene.floater
+        return self if floater.round else self.elsewhere(floater=floater.averaged)
+
     # What a result says of its models
 
     @property
@@ -162,7 +167,7 @@ class Levitation:
         known, why = mutual_choice(scene, self.table, self.models.interaction, self.models.rtol)
         if not known:
             return None, why
-        bodies = scene.rotor, scene.floater
+        bodies = scene.rotor, scene.floater.ball
         make = partial(cached_mutual_table, *bodies, note)
         return self._tables.table(mutual_key(*bodies), "mutual", "Mutual magnetisation of rotor and floater", make), why
 
@@ -170,7 +175,6 @@ class Levitation:
         """Whether metal turns with the rotor, once it and the floater are found fit for a table of losses."""
         scene, pieces = self.scene, pieces_of(self.scene.rotor, self.scene.conductors)
         if pieces:
-            scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
             check_metal(pieces, scene.fastest, scene.floater.radius)
         return bool(pieces)
 
@@ -180,7 +184,7 @@ class Levitation:
 
         Raises
         ------
-        InputError : the rotor turns too fast for its metal, or the floater is no sphere
+        InputError : the rotor turns too fast for its metal
         """
         if not self._has_metal():
             return None
@@ -193,9 +197,8 @@ class Levitation:
 
         Raises
         ------
-        InputError : mutual magnetisation is asked for where it cannot be known, or the floater is a cuboid
+        InputError : mutual magnetisation is asked for where it cannot be known
         """
-        self.scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
         self._has_metal()  # refused before the field's table is made, which takes minutes
         return self._with_effects(self.table)
 
@@ -247,10 +250,10 @@ class Levitation:
     def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
         """All equilibria in a table, from the cache if they were searched for before."""
 
-        def remembered(search: Callable[[], FixedPoints]) -> FixedPoints:
+        def remembered(search: Callable[[], FixedPoints], kind: str) -> FixedPoints:
             if self.scene.field_map:  # no number in a key stands for how a map is fitted
                 return search()
-            found, known = cached_points(self.still, equations, self.spin, search, note)
+            found, known = cached_points(self.still, f"{equations} {kind}".strip(), self.spin, search, note)
             if known:
                 detail("  from the cache.")
             return found
@@ -293,9 +296,13 @@ class Levitation:
         chosen = None if self.absolute or self.scene.gravity[:2].any() else _first(self.without_plate.equilibria)
         if chosen is None:
             return ()
-        start, scene = Scales.of(self.still).pack(chosen.start), self.still
+        mean = self.mean
+        if not mean.scene.floater.mean or chosen.kind == AVERAGED:
+            start, scene = Scales.of(mean.still).pack(chosen.start), mean.still
+        else:
+            return ()  # of frequency-locked equilibria no branch is followed
         try:
-            return tuple(branch_through(scene, self.rates, start, scene.frequency, self.spin))
+            return tuple(branch_through(scene, mean.rates, start, scene.frequency, self.spin))
         except EquilibriumError as error:
             note(f"Equilibria at other frequencies are not known: {error}")
             return ()
@@ -306,7 +313,7 @@ class Levitation:
             return
         times, rates, _ = self.scene.knots
         for time, frequency in zip(times[1:], rates[1:] / (2 * np.pi), strict=True):
-            there = on_branch(self.still, self.rates, self.branch, np.array([frequency]))[0]
+            there = on_branch(self.mean.still, self.mean.rates, self.branch, np.array([frequency]))[0]
             if there is not None:
                 down = self.scene.plate.body.center - plate_depth(self.scene.plate, np.array([time])) * np.eye(3)[2]
                 plate = replace(self.scene.plate, body=moved(self.scene.plate.body, down))
@@ -330,7 +337,6 @@ class Levitation:
         plan = plate_plan(scene, self.models, place if self._nearest is None else self._nearest)
         if plan.model == "none" or scene.plate is None or place is None:
             return None
-        scene.floater.must_be("sphere", where="over a plate with eddy currents", instead="Choose --plate-model none.")
         far = self._foreseen() if plan.model == "reduced" else None
         if far is not None:
             plan = far_plan(plan, self.models, far)

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..dynamics.motion.floater_effects import scene_effects
 from ..dynamics.motion.plate import PlateMemory
+from ..fem.cache import key_of
 from ..fem.maps_of_B.table import GriddedTable, map_table
 from ..fem.mutual.making import mutual_key
 from ..fem.plate.choice import resolve_plate_model
@@ -25,8 +26,9 @@ from ..fem.rotor.table import ROTOR, RotorTable
 from ..fem.rotor_metal import losses_key, pieces_of
 from ..geometry.common import Array, InputError, Watch, millimetre_size, shown
 from ..geometry.overlap import TOUCHING, sphere_overlap
-from ..geometry.scene.contents import Floater, Scene
+from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import check_files, load_scene, map_digest
+from ..geometry.scene.floater import Floater
 from .cli.console import detail, note, stages
 from .cli.options import Models
 
@@ -161,13 +163,13 @@ def field_key(scene: Scene, model: str, rtol: float) -> str:
 
 def equations_key(scene: Scene, models: Models) -> str:
     """All that decides a scene's tables and equations of motion without plate; what it leaves out are parameters."""
-    floater, body = scene.floater, scene.floater.body
-    shape = "" if body is None else f"{floater.shape} {body.shape_numbers.tolist()} {floater.recoil_permeability!r}"
+    floater = scene.floater
+    shape = "" if floater.is_sphere else key_of("equilibria", floater.magnets, floater.round)
     return " ".join(
         (
             field_key(scene, models.model, models.rtol),
             f"{scene_effects(scene)} {models.interaction}",
-            "" if models.interaction == "rigid" else mutual_key(scene.rotor, floater),
+            "" if models.interaction == "rigid" else mutual_key(scene.rotor, floater.ball),
             losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
             shape,
         )

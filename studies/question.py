@@ -84,7 +84,7 @@ def _simulate_together(levitations: Sequence[Levitation], duration: float) -> No
     for one in levitations:
         with suppress(SpinlevError):
             still = one.scene.plate is None or one.models.plate_model == "none"
-            if still and one.scene.floater.body is None and is_long(one.interaction):
+            if still and one.scene.floater.is_sphere and is_long(one.interaction):
                 key = (
                     one.equations_key,
                     one.interaction_model,
@@ -181,7 +181,7 @@ class Question:
                 )
                 for each in (one, *dipoles):
                     each.share(first.setdefault(each.equations_key, each))
-                    if requested and each.scene.frequency and each.scene.floater.body is None:
+                    if requested and each.scene.frequency and each.scene.floater.is_sphere:
                         key, *family = _family(each)
                         place = tuple(axis.index(point[name]) for name, axis in axes.items())
                         families.setdefault(key, []).append((each, *family, place))

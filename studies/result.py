@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..dynamics.equilibria.equilibrium import SIDE, TILT, Equilibrium, ForceCurve, LeftOut, Survey
+from ..dynamics.equilibria.equilibrium import LIBRATION, SIDE, TILT, Equilibrium, ForceCurve, LeftOut, Survey
 from ..dynamics.flights.trajectory import Trajectory
 from ..dynamics.motion.plate import PlateMemory
 from ..dynamics.motion.state import State
@@ -188,6 +188,8 @@ def equilibrium_summary(equilibrium: Equilibrium) -> dict[str, Any]:
             numbers[name + end] = value if scale == 1 else value / scale
     return {
         **numbers,
+        **({"kind": equilibrium.kind} if equilibrium.kind else {}),
+        **({"body_axes": equilibrium.state.axes} if equilibrium.state.axes is not None else {}),
         "stability": equilibrium.stability,
         "efolding_s": equilibrium.efolding_s,
         "spin_about_moment_hz": equilibrium.spin_rate / (2 * math.pi),
@@ -344,24 +346,32 @@ def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
         data[name] = variable(("equilibrium", *dims), values.reshape(shape), unit, label)
     kinds = np.array([e.stability for e in rows], dtype=str)
     data["stability"] = xr.Variable(("equilibrium",), kinds, {"long_name": "stable, marginal or unstable"})
+    if any(e.kind for e in rows):
+        data["kind"] = xr.Variable(("equilibrium",), np.array([e.kind for e in rows], dtype=str), {"long_name": "kind"})
     growing = [e.efolding_s or np.inf for e in rows]
     data["efolding"] = variable(("equilibrium",), growing, "s", "e-folding time of the least stable mode")
     modes = [{mode.name: (mode.growth_per_s, mode.frequency_hz) for mode in e.modes} for e in rows]
-    known = np.array([[each.get(name, (np.nan, np.nan)) for name in MODES] for each in modes], float)
-    known = known.reshape(len(rows), len(MODES), 2)
+    names = (*MODES, LIBRATION) if any(LIBRATION in each for each in modes) else MODES
+    known = np.array([[each.get(name, (np.nan, np.nan)) for name in names] for each in modes], float)
+    known = known.reshape(len(rows), len(names), 2)
     dims = ("equilibrium", "mode")
     data["mode_growth"] = variable(dims, known[:, :, 0], "1/s", "growth rate of a mode")
     data["mode_frequency"] = variable(dims, known[:, :, 1], "Hz", "its frequency")
     data["number"] = variable((), len(rows), "1", "number of equilibria")
-    return xr.Dataset(data, {"equilibrium": np.arange(len(rows)), **{dim: list(names) for dim, names in SIZES.items()}})
+    sizes = {dim: list(labels) for dim, labels in SIZES.items()}
+    return xr.Dataset(data, {"equilibrium": np.arange(len(rows)), **sizes, "mode": list(names)})
 
 
 def state_columns(state: State, over: str, when: str = "", prefix: str = "") -> dict[str, xr.Variable]:
     """A `state` (n, 3) along the laboratory's axes `over` a dimension; `when` ends labels, `prefix` begins names."""
-    return {
+    found = {
         f"{prefix}{name}": variable((over, "axis"), values, unit, f"{label}, laboratory frame{when}")
         for (name, unit, label), values in zip(OF_A_STATE, state.vectors, strict=True)
     }
+    if state.axes is not None:
+        label = f"axes of the body as columns, laboratory frame{when}"
+        found[f"{prefix}body_axes"] = variable((over, "axis", "body_axis"), state.axes, "1", label)
+    return found
 
 
 def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) -> xr.Dataset:

@@ -85,19 +85,20 @@ def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out
             why = "no solution is an equilibrium"
         return f"No levitation at {levitation.scene.frequency:g} Hz: {why}."
     first = useful[0]
+    of_kind = first.kind and f" ({first.kind})"
     mode, alone = _least_stable(first), first.without if first.currents is not None else None
     if not first.stable:
         kind = "Marginally unstable" if first.stability == "marginal" else "Unstable"
         blame = "; without the plate it would be stable" if alone is not None and alone.stable else ""
         time = spoken_time(first.efolding_s or math.inf)
-        return f"{kind} {_place(first)}: the {mode} mode grows with an e-folding time of {time}{blame}."
+        return f"{kind} {_place(first)}{of_kind}: the {mode} mode grows with an e-folding time of {time}{blame}."
     decay = "is undamped"
     if first.growth_per_s < -first.growth_error_per_s:
         change = 0.0 if alone is None else abs(first.growth_per_s - alone.growth_per_s)
         by_plate = change > CLEAR * abs(first.growth_per_s)
         cause = "eddy currents in the plate" if by_plate else "air drag"
         decay = f"decays at {-first.growth_per_s:.2g} s⁻¹ by {cause}"
-    return f"Stable levitation {_place(first)}. Least stable mode: {mode}, {decay}."
+    return f"Stable levitation {_place(first)}{of_kind}. Least stable mode: {mode}, {decay}."
 
 
 def _place(equilibrium: Equilibrium) -> str:
@@ -147,7 +148,7 @@ def equilibria_rows(levitation: Levitation, equilibria: Sequence[Equilibrium]) -
                 f"{e.lag_deg + 0.0:.2f}".replace("-0.00", "0.00"),
                 _least_stable(e),
                 f"{e.growth_per_s:.2g}",
-                STABILITIES[e.stability] + (" (plate not included)" if without else ""),
+                STABILITIES[e.stability] + (" (plate not included)" if without else "") + (e.kind and f", {e.kind}"),
             )
         )
     return [COLUMNS, *rows] if rows else []

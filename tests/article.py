@@ -3,8 +3,9 @@
 from places import HORIZONTAL
 
 from spinlev.geometry.rotor import horizontal
-from spinlev.geometry.scene.contents import Drag, Floater, Scene
+from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.files import load_scene
+from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.scene.making import sphere
 
 RADIUS = 6.35e-3

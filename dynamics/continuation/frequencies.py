@@ -21,7 +21,7 @@ from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..equilibria.equilibrium import FOLD, MARGINAL, Equilibrium, EquilibriumError
 from ..equilibria.path import Steps
 from ..equilibria.search import find_equilibria
-from ..motion.effects import with_effects
+from ..motion.effects import mean_over_turns, with_effects
 from ..motion.equations import parameters
 from ..motion.events import rotor_gap
 from ..motion.floater_effects import too_slow
@@ -77,7 +77,9 @@ def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: fl
     family = by_frequency(scene, rates)
     start = _hanging(replace(scene, frequency=highest), table, family)
     steps = Steps(longest=0.1)
-    points = follow_branch(family, start, highest, SLOWEST, steps, lambda p: rotor_gap(scene, p.position) < 0)
+    points = follow_branch(
+        family, start, highest, SLOWEST, steps, lambda p: rotor_gap(scene, p.position, p.state[6:9]) < 0
+    )
     folds = [k for k, point in enumerate(points) if point.kind == FOLD]
     if not folds:
         raise EquilibriumError(f"The levitating branch has no fold between {SLOWEST:g} and {highest:g} Hz.")
@@ -277,7 +279,7 @@ def stability_end(
 
 def is_over(scene: Scene, point: BranchPoint) -> bool:
     """Whether a branch ends at a point: in a fold, or as the floater touches the rotor."""
-    return point.kind == FOLD or rotor_gap(scene, point.position) < 0
+    return point.kind == FOLD or rotor_gap(scene, point.position, point.state[6:9]) < 0
 
 
 def levitates(point: BranchPoint) -> bool:
@@ -293,14 +295,16 @@ def _side(
     for k, point in enumerate(points):
         if point.kind == FOLD:
             return points[: k + 1]
-        if k and rotor_gap(scene, point.position) < 0:
+        if k and rotor_gap(scene, point.position, point.state[6:9]) < 0:
             before = points[k - 1]
 
             def there(f: float, before: BranchPoint = before) -> BranchPoint:
                 return follow_branch(family, before.state, before.parameter, f, STEPS, tolerated=MARGINAL)[-1]
 
             ends = before.parameter + 1e-9 * (point.parameter - before.parameter), point.parameter
-            touching = scipy.optimize.brentq(lambda f: rotor_gap(scene, there(f).position), *ends, xtol=1e-6)
+            touching = scipy.optimize.brentq(
+                lambda f: rotor_gap(scene, (p := there(f)).position, p.state[6:9]), *ends, xtol=1e-6
+            )
             return [*points[:k], replace(there(float(touching)), kind=CONTACT)]
     return [*points[:-1], replace(points[-1], kind=points[-1].kind or BORDER)]
 
@@ -315,6 +319,8 @@ def way_out(
     """
     kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (e-folding time {1 / e.growth_per_s:.2g} s)" for e in equilibria)
     found = f"only unstable ones: {', '.join(kinds)}" if kinds else "nor an unstable one below the rotor"
+    if not scene.floater.round:
+        scene, _, table = mean_over_turns(scene, table)
     own, other = scene.frequency, _levitating_frequency(scene, table, memory)
     advice = f"None was found from {own / WIDEST:.4g} to {own * WIDEST:.4g} Hz either."
     if other is not None:

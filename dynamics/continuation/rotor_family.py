@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike
 from ...fem.harmonics.solid import turned_entries
 from ...fem.mutual.making import cached_mutual_table
 from ...fem.rotor.choice import PERMEABLE, cached_rotor_table, rotor_table
-from ...fem.rotor.table import FieldFormula, RotorTable
+from ...fem.rotor.table import DerivedField, FieldFormula, RotorTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import Array, InputError
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import rotation_matrix
 from ...geometry.solids import moved
-from ..motion.effect import Added, DerivedField, Effect, Interaction, Motion, Placeable
+from ..motion.effect import Added, Effect, Interaction, Motion, Placeable
 from ..motion.effects import mutual_choice, with_effects
 from ..motion.equations import parameters
 from ..motion.floater_effects import check_floater_metal
@@ -132,7 +132,15 @@ class MovedEffect:
     def count(self) -> int:
         return self.effect.count
 
-    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+    def numbers(
+        self,
+        field: DerivedField,
+        flux: Array,
+        position: Array,
+        moment: Array,
+        values: Array,
+        quaternion: Array | None = None,
+    ) -> Array:
         """See `Placeable`; for `flux`, `position` and `moment` as seen from the part."""
         measure, length = values[:, Parameter.MEASURE], values[:, [Parameter.LENGTH]]
         place = np.transpose(self.move.place(list((position * length).T), measure)) / length

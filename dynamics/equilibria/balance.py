@@ -33,6 +33,7 @@ class Balance:
     values: Array
     spin: float | Array  # body spin s = Ω·m̂/ω, of all points or (n,)
     top: float = 0.0  # beside a rotor at rest, where s means nothing, the spin about the moment itself
+    still: bool = False  # whether the body stands still in the rotor's frame: then s is `spin` times cos θ
 
     def at(self, rows: NDArray[Any]) -> Self:
         """The balance of some of the points only."""
@@ -45,7 +46,8 @@ class Balance:
         """States (n, 12) at rest in the rotor's frame at positions and moments (n, 3)."""
         rate = np.asarray(self.values[..., [Parameter.RATE]])
         velocity = rate * np.stack([-position[:, 1], position[:, 0], 0 * position[:, 0]], axis=1)
-        spin = rate * ((np.asarray(self.spin)[..., None] - moment[:, 2:]) * moment + np.array([0.0, 0.0, 1.0]))
+        own = np.asarray(self.spin)[..., None] * (moment[:, 2:] if self.still else 1.0)
+        spin = rate * ((own - moment[:, 2:]) * moment + np.array([0.0, 0.0, 1.0]))
         spin = spin + self.top * moment
         return np.concatenate([position, velocity, moment, spin], axis=1)
 
@@ -54,7 +56,8 @@ class Balance:
 
         The derivatives are by x, y, z and by tilts of the moment along the same two tangents.
         """
-        return self.rates.balance(position, moment, tangent_basis(moment), np.asarray(self.spin), self.values)
+        tangents = tangent_basis(moment)
+        return self.rates.balance(position, moment, tangents, np.asarray(self.spin), self.values, self.still)
 
 
 def tangent_basis(moment: Array) -> Array:

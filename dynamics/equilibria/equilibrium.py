@@ -29,8 +29,11 @@ CRITERION = f"growth rate at most {MARGINAL:g} s⁻¹, e-folding time {1 / MARGI
 STABILITIES = {"stable": "stable", "marginal": "marginally unstable", "unstable": "unstable"}
 
 
+# Kinds of equilibria of a body that is not round about its moment.
+LOCKED, AVERAGED = "frequency-locked", "averaged over its own turn"
 # Names of the modes in data: along the axis; the slower and the faster of the others, in the rotor's frame.
 AXIAL, SIDE, TILT = "bounce", ("side, backward", "side, forward"), ("precession", "nutation")
+LIBRATION = "libration"
 # Names on the console of modes whose names in data are older.
 MODE_NAMES = {AXIAL: "axial", SIDE[0]: "backward whirl", SIDE[1]: "forward whirl"}
 
@@ -68,6 +71,14 @@ class Modes:
             "frequencies_hz": self.angular_frequencies / (2 * np.pi * time),
             "modes": named_modes(self, time),
         }
+
+
+def eigenmodes(matrix: Array, tangents: Array) -> Modes:
+    """Those of a matrix (k, k) of rates on `tangents` (n, k), directions of the state; errors as of `modes`."""
+    values, right = np.linalg.eig(matrix)
+    condition = np.linalg.norm(left_eigenvectors(right), axis=1) * np.linalg.norm(right, axis=0)
+    errors = np.minimum(100 * np.finfo(float).eps * np.linalg.norm(matrix) * condition, 1e-6)
+    return Modes(values.astype(complex), errors, tangents @ right)
 
 
 def is_stable(eigenvalues: NDArray[Any], errors: Array) -> NDArray[np.bool_]:
@@ -137,19 +148,22 @@ class Mode:
 def named_modes(modes: Modes, time: float) -> tuple[Mode, ...]:
     """The floater's five modes, the axial one first; `time` is the unit of time of the eigenvalues, s.
 
-    Of a pair that does not oscillate it is the one that grows more.
+    Of a pair that does not oscillate it is the one that grows more. A body that is not round has a sixth, its libration
+    about the moment, which is the slowest of its turns.
     """
     values, shapes = modes.eigenvalues, np.abs(modes.shapes)
+    turning = len(values) > 10
     chosen = [int(k) for k in np.argsort(-values.real) if values[k].imag >= 0]
-    while len(chosen) > 5:  # drop what decays most of those that do not oscillate
+    while len(chosen) > len(values) // 2:  # drop what decays most of those that do not oscillate
         still = [k for k in chosen if abs(values[k].imag) <= modes.errors[k]]
         chosen.remove((still or chosen)[-1])
-    size = np.linalg.norm(shapes[[0, 1, 2, 6, 7, 8]], axis=0)  # of place and moment alone
+    size = np.linalg.norm(shapes[[0, 1, 2, *range(6, len(shapes) - 3)]], axis=0)  # of place and turn alone
     axial, moving = shapes[2] / size, np.linalg.norm(shapes[:2], axis=0) / size
     bounce = max(chosen, key=lambda k: axial[k])
     others = sorted((k for k in chosen if k != bounce), key=lambda k: -moving[k])
     side, tilt = (sorted(part, key=lambda k: values[k].imag) for part in (others[:2], others[2:]))
-    pairs = [("bounce", bounce), *zip(SIDE, side, strict=False), *zip(TILT, tilt, strict=False)]
+    names = (LIBRATION, *TILT) if turning else TILT
+    pairs = [("bounce", bounce), *zip(SIDE, side, strict=False), *zip(names, tilt, strict=False)]
     return tuple(
         Mode(name, float(values[k].real) / time, float(values[k].imag) / (2 * np.pi * time)) for name, k in pairs
     )
@@ -185,6 +199,8 @@ class Equilibrium:
     slope: Array = field(default_factory=lambda: np.full((5, 5), np.nan))
     #: (12, 12) derivatives of the scaled state's rates by the state; NaN for a periodic motion
     jacobian: Array = field(default_factory=lambda: np.full((12, 12), np.nan))
+    #: "" of a round body, else `LOCKED`, at rest in the rotor's frame, or `AVERAGED` over turns about the moment
+    kind: str = ""
     steady_frame: bool = False  #: whether the rotor is at rest, so that its frame is the laboratory's
 
     @property

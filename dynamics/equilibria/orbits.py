@@ -417,9 +417,13 @@ def _moved(before: Array, after: Array) -> float:
 
 def overlap(scene: Scene, known: Equilibrium) -> str:
     """Where in a turn the floater of an equilibrium would overlap the plate or the rotor, which; else nothing."""
-    turn = known.turn or State(*(np.tile(vector, (INSTANTS, 1)) for vector in known.state.vectors))
+    turn = known.turn
+    if turn is None:
+        axes = known.state.axes
+        vectors = (np.tile(vector, (INSTANTS, 1)) for vector in known.state.vectors)
+        turn = replace(State(*vectors), axes=None if axes is None else np.tile(axes, (INSTANTS, 1, 1)))
     times = np.arange(len(turn.position)) / (len(turn.position) * (scene.frequency or np.inf))
-    if clearance(scene, times, turn.position, turn.moment).min() >= 0:
+    if clearance(scene, times, turn.position, turn.orientation).min() >= 0:
         return ""
-    free_of_rotor = clearance(replace(scene, plate=None), times, turn.position, turn.moment).min() >= 0
+    free_of_rotor = clearance(replace(scene, plate=None), times, turn.position, turn.orientation).min() >= 0
     return IN_PLATE if free_of_rotor else IN_ROTOR

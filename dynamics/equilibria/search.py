@@ -13,16 +13,17 @@ from ...fem.rotor.table import ROUND_OFF, FieldTable, RangeError, RotorTable
 from ...geometry.common import Array, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..motion.effect import Interaction
-from ..motion.effects import with_effects
+from ..motion.effects import mean_over_turns, with_effects
 from ..motion.equations import parameters
 from ..motion.events import rotor_gap
 from ..motion.floater_effects import FloaterShape
 from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
-from .balance import Balance, tangent_basis
+from .balance import CONVERGED_STEP, EVERY, Balance, solve, tangent_basis
 from .curves import FARTHEST, SearchRange, fixed_points
-from .equilibrium import Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey, modes
+from .equilibrium import AVERAGED, LOCKED, Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey, modes
+from .locked import TURNS, locked_equilibrium, locked_poses, without_twins
 from .orbits import ForcedMotion, overlap
 
 # Part of what a model leaves out that is wrong of its effect to first order, by all causes together and by each. Below
@@ -53,6 +54,7 @@ class FixedPoints:
         return cls(points, doubts, *balance(position, moment), jacobians, curves)
 
 
+Remembered = Callable[[Callable[[], FixedPoints], str], FixedPoints]
 # In a folder of their own, of some thousand scenes.
 FIXED_POINTS = TableKind("equilibria", FixedPoints, "Fixed points of a scene without plate", most=2**26)
 
@@ -96,7 +98,7 @@ def survey(
     spin: float = 0.0,
     farthest: float = FARTHEST,
     rates: Rates | None = None,
-    remembered: Callable[[Callable[[], FixedPoints]], FixedPoints] = lambda search: search(),
+    remembered: Remembered = lambda search, _: search(),
     watch: Watch = unwatched,
 ) -> Survey:
     """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
@@ -109,7 +111,7 @@ def survey(
         how fast the floater spins about its moment, of which stability depends, as of a spinning top
     farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
-    remembered : gets the search and gives what it finds, perhaps from an earlier one, see `cached_points`
+    remembered : gets a search with its kind and gives what it finds, perhaps from an earlier one, see `cached_points`
     watch : progress of the search
 
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
@@ -123,12 +125,79 @@ def survey(
     EquilibriumError : the rotor is at rest and the floater does not spin
     """
     check_turning(scene)
+    if not scene.floater.round:
+        return _survey_of_any_body(scene, table, spin, farthest, rates, remembered, watch)
     scales = Scales.of(scene)
     equations = rates or Rates(with_effects(scene, table))
     top = _own_spin(scene) * scales.time * scales.spin_ratio
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio, top)
-    found = remembered(lambda: _search(scene, table, balance, farthest, watch))
+    found = remembered(lambda: _search(scene, table, balance, farthest, watch), "")
     return survey_of(scene, balance, found)
+
+
+def _survey_of_any_body(
+    scene: Scene,
+    table: FieldTable,
+    spin: float,
+    farthest: float,
+    rates: Rates | None,
+    remembered: Remembered,
+    watch: Watch,
+) -> Survey:
+    """Equilibria of a body that is not round about its moment: its mean over turns about that, and frequency-locked.
+
+    See `survey`.
+    """
+    round_scene, exactly, roughly = mean_over_turns(scene, table)
+    scales, ratio = Scales.of(round_scene), round_scene.floater.spin_ratio
+    values, quick = parameters(round_scene, scales, frozen_spin=True), Rates(roughly)
+    found: list[Equilibrium] = []
+    curves: tuple[ForceCurve, ...] = ()
+    if scene.floater.turns_freely:
+        about = Balance(quick, values, spin * ratio, _own_spin(scene) * scales.time * ratio)
+        seeds = remembered(lambda: _search(round_scene, exactly, about, farthest, watch), AVERAGED)
+        exact = replace(about, rates=Rates(exactly))
+        place, moment, step = solve(exact, seeds.points[:, :3], seeds.points[:, 3:], EVERY)
+        free = [s < CONVERGED_STEP and rotor_gap(scene, p * scales.length, scene.floater.axes(m)) > 0
+                for p, m, s in zip(place, moment, step, strict=True)]  # fmt: skip
+        points = np.column_stack([place, moment])[free]
+        known = survey_of(round_scene, exact, FixedPoints.at(exact, points, seeds.doubts[free], seeds.curves))
+        found, curves = [replace(one, kind=AVERAGED) for one in known.equilibria], known.curves
+    if scene.frequency and not np.any(scene.gravity[:2]):
+        still = Balance(quick, values, ratio, still=True)
+        seeds = remembered(lambda: _search(round_scene, exactly, still, farthest, watch), LOCKED)
+        found += _locked(scene, with_effects(scene, table), seeds, farthest, rates)
+        curves = curves or seeds.curves
+    return _survey(found, curves)
+
+
+def _locked(
+    scene: Scene, table: Interaction, seeds: FixedPoints, farthest: float, rates: Rates | None
+) -> list[Equilibrium]:
+    """Frequency-locked equilibria near those of the body's mean, `seeds`."""
+    scales, floater = Scales.of(scene), scene.floater
+    if not len(seeds.points):
+        return []
+    rates, values = rates or Rates(table), parameters(scene, scales)
+    angles = 2 * np.pi * np.arange(TURNS) / TURNS
+    axes = list[Array]()
+    for moment in seeds.points[:, 3:]:
+        first, second = tangent_basis(moment[None])[0]
+        plain = floater.axes(moment)
+        across = np.stack([first, second, moment], axis=1)
+        for cosine, sine in zip(np.cos(angles), np.sin(angles), strict=True):
+            turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+            axes.append(across @ turn @ across.T @ plain)
+    places = np.repeat(seeds.points[:, :3], TURNS, axis=0)
+    position, quaternion = locked_poses(rates, values, places, np.array(axes))
+    inside = SearchRange(scene, farthest).holds(position)
+    known, doubts = field_doubts(table, position[inside] * scales.length)
+    chosen = np.flatnonzero(inside)[known]
+    found = [
+        locked_equilibrium(scales, rates, values, position[k], quaternion[k], _sizes(doubt))
+        for k, doubt in zip(chosen, doubts, strict=True)
+    ]
+    return without_twins([one for one in found if rotor_gap(scene, one.position, one.state.orientation) > 0])
 
 
 def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, watch: Watch) -> FixedPoints:
@@ -136,7 +205,7 @@ def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, 
     balance.rates.compile()
     curves, where = fixed_points(balance, SearchRange(scene, farthest), watch)
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
-    if scene.floater.body is not None:
+    if not (scene.floater.is_sphere or scene.floater.mean):
         known, doubts = _of_shape(scene, table, known, doubts, where)
     weight = scene.floater.mass * float(scene.gravity[2])
     unit = scene.floater.mass * scales.length / scales.time**2
@@ -162,6 +231,13 @@ def _of_shape(
                 kept[k] = missed[1] * floater.moment < BEYOND * floater.mass * unit
                 more += [np.concatenate([doubt[:2] + missed, doubt[2:]])] if kept[k] else []
     return kept, np.reshape(more, (-1, doubts.shape[1]))
+
+
+def _sizes(doubt: Array) -> Array:
+    """(2,) T and T/m of doubts (2 + 12 c,), see `field_doubts`, whatever their directions."""
+    left_out = doubt[2:].reshape(-1, 4, 3)
+    more = np.linalg.norm(left_out[:, 0], axis=1).sum(), np.linalg.norm(left_out[:, 1:], axis=(1, 2)).sum()
+    return np.asarray(doubt[:2] + more)
 
 
 def survey_of(scene: Scene, balance: Balance, known: FixedPoints) -> Survey:
@@ -215,6 +291,12 @@ def with_plate(
     memory : these currents
     """
     known = free_of_bodies(scene, known)
+    if not scene.floater.round:
+        round_scene, exactly, _ = mean_over_turns(scene, table)
+        means = [e for e in known.equilibria if e.kind == AVERAGED]
+        over = with_plate(round_scene, exactly, replace(known, equilibria=tuple(means)), memory)
+        rest = [e for e in known.equilibria if e.kind != AVERAGED]  # frequency-locked ones are told without the plate
+        return _survey([*(replace(e, kind=AVERAGED) for e in over.equilibria), *rest], known.curves, over.left_out)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
     return _forced(ForcedMotion(scene, rates or Rates(with_effects(scene, table)), values, memory), known)
 

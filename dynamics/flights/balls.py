@@ -67,7 +67,7 @@ def in_ball(whole: Interaction, formula: BallField) -> Interaction:
             first += local.count
         else:
             effects.append(effect)
-    return Interaction(formula, tuple(effects))
+    return replace(whole, field=formula, effects=tuple(effects))
 
 
 @dataclass(frozen=True, eq=False)

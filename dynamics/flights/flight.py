@@ -25,6 +25,7 @@ from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..continuation.frequencies import way_out
 from ..equilibria.equilibrium import AXIAL, Equilibrium, EquilibriumError
 from ..equilibria.search import find_equilibria
+from ..motion.effect import Stateful
 from ..motion.effects import with_effects
 from ..motion.equations import Equations, equations_of_motion, parameters
 from ..motion.events import (
@@ -175,13 +176,13 @@ class Flight:
         return np.asarray(function(inputs, pars=pars[: function.nparams], time=times))
 
     def balanced(self, values: Array, times: Array, states: Array) -> Array:
-        """The floater's (n, 12) at scaled times (n,), and J - work, from states (n, s) under parameters `values`.
+        """The floater's own at scaled times (n,), and J - work, from states (n, s) under parameters `values`.
 
         With a drive what the motor has given, angular momentum and work, is between.
         """
         energy = self.jacobi(values, times, states).sum(axis=0) - states[:, -1]
         given = states[:, -3:-1] if self.scene.drive else states[:, :0]
-        return np.concatenate([states[:, :12], given, energy[:, None]], axis=1)
+        return np.concatenate([states[:, : self.scales.size], given, energy[:, None]], axis=1)
 
     def begin(
         self, start: State, duration: float, currents: Array | None = None, interval: float | None = None
@@ -198,7 +199,7 @@ class Flight:
             left = self.memory.left_by_rotor(rate).signals(0.0, depth)
             own = ((0.0 if currents is None else currents) - left) * values[Parameter.PLATE_SHARE]
         given = np.zeros(3 if self.scene.drive else 1)  # by the motor, and the work
-        course = Course(self, duration, values, np.concatenate([self.scales.pack(start), own, given]))
+        course = Course(self, duration, values, np.concatenate([self.own_states(start), own, given]))
         course.enter_ball()
         if interval is not None:
             row, now = course.state[None], np.zeros(1)
@@ -207,6 +208,11 @@ class Flight:
             course.scale = whole if whole > 1e-3 * largest else largest  # they may nearly cancel
             course.recorder = Recorder(self.balanced(course.values, now, row)[0], interval, MOST_SAMPLES)
         return course
+
+    def own_states(self, state: State) -> Array:
+        """Scaled states of the floater and of effects that have some, for a `state` along the rotor's axes."""
+        more = [effect.states_at(state) for effect in self.whole.effects if isinstance(effect, Stateful)]
+        return np.concatenate([self.scales.pack(state), *more])
 
     def interval(self, duration: float) -> float:
         """First scaled time between samples of a trajectory of so many seconds."""
@@ -354,7 +360,8 @@ class Course:
             times, states = np.append(times, integrator.time), np.vstack([states, integrator.state])
             self.ended_by = part.meanings[-outcome.value - 1]
         if LEFT not in part.meanings:  # there are no bodies in a ball
-            gap = clearance(self.flight.scene, times * scales.time, states[:, :3] * scales.length, states[:, 6:9])
+            there = scales.unpack(states)
+            gap = clearance(self.flight.scene, times * scales.time, there.position, there.orientation)
             touching = np.flatnonzero(gap < -1e-9)
             if len(touching):
                 self.ended_by = CONTACT
@@ -392,7 +399,7 @@ class Course:
             beyond = float(1 - np.mean(memory.in_range(lab.position, plate_depth(memory.plate, time))))
         if scene.drive:
             unit = scene.floater.mass * scales.length**2 / scales.time  # of an angular momentum
-            given = states[:, 12:14] * [unit, unit / scales.time]
+            given = states[:, scales.size : scales.size + 2] * [unit, unit / scales.time]
         drift = np.abs(states[:, -1] - states[0, -1]).max() / self.scale
         return Trajectory(
             time=time,
@@ -400,7 +407,7 @@ class Course:
             angle=angle,
             rate=scene.rate(time),
             ended_by=LOST if self.ended_by == BEYOND else self.ended_by,
-            energy_error=float(max(drift, np.abs(np.linalg.norm(states[:, 6:9], axis=1) - 1).max())),
+            energy_error=float(max(drift, np.abs(np.linalg.norm(states[:, 6 : scales.size - 3], axis=1) - 1).max())),
             realtime_factor=speed,
             steps=self.steps,
             compile_seconds=self.flight.compile_seconds,
@@ -512,28 +519,35 @@ def initial_state(
     currents = np.zeros(0)
     if isinstance(scene.start, AbsoluteStart):
         start = scene.start
-        state = State(start.position, start.velocity, start.moment / np.linalg.norm(start.moment), start.spin)
+        moment, axes = start.moment / np.linalg.norm(start.moment), None
+        if not scene.floater.round:
+            axes = scene.floater.axes(moment, start.body_x)
+        state = State(start.position, start.velocity, moment, start.spin, axes)
         if memory is not None:
             scales = Scales.of(scene)
             plate = PlateForce(memory, parameters(scene, scales))
-            currents = plate.settled(scales.pack(state)) / plate.values[Parameter.PLATE_SHARE]
+            pointing = replace(scales, pointing=None).pack(state)  # the plate knows the moment alone
+            currents = plate.settled(pointing) / plate.values[Parameter.PLATE_SHARE]
     else:
         known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
         chosen = starting_point(known)
         if chosen is None:
             raise EquilibriumError(way_out(scene, table, known, memory=memory))
-        state = displaced(chosen.start, scene.start.offset, scene.angular_velocity)
+        begun = chosen.start
+        if not scene.floater.round and begun.axes is None:  # the mean over all turns about the moment
+            begun = replace(begun, axes=scene.floater.axes(begun.moment))
+        state = displaced(begun, scene.start.offset, scene.angular_velocity)
         currents = currents if chosen.currents is None else chosen.currents[0]
-    check_free("start", scene, state.position, moment=state.moment)
+    check_free("start", scene, state.position, orientation=state.orientation)
     return state, currents
 
 
-def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, moment: Array | None = None) -> None:
+def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, orientation: Array | None = None) -> None:
     """Raises StartError where a floater at `position` (3,) m, rotor's frame, overlaps a body of `scene` at `time` (s).
 
-    `name` is what the message calls its place; see `clearance` for `moment`.
+    `name` is what the message calls its place; see `clearance` for `orientation`.
     """
-    pointing = None if moment is None else moment[None]
+    pointing = None if orientation is None else orientation[None]
     gap = float(clearance(scene, np.array([time]), position[None], pointing)[0])
     if gap < 0:
         where = ", ".join(f"{1e3 * c:.6g}" for c in position)
@@ -568,7 +582,7 @@ def displaced(start: State, offset: Array, angular_velocity: float) -> State:
     """State `start` moved by `offset` (..., 3) m, as much at rest in a frame of `angular_velocity` as it was."""
     turning = np.cross([0.0, 0.0, angular_velocity], offset)
     moment, spin = (np.broadcast_to(v, offset.shape) for v in (start.moment, start.spin))
-    return State(start.position + offset, start.velocity + turning, moment, spin)
+    return State(start.position + offset, start.velocity + turning, moment, spin, start.axes)
 
 
 def in_plate_range(memory: PlateMemory | None, lab: State, time: float = 0.0) -> bool:

@@ -121,6 +121,7 @@ class LiveFlight:
             )
 
     def _become(self, lab: State) -> None:
-        state = lab.to_rotor(self.scene.angle(self.time))
-        self._course.state[:12] = self._course.flight.scales.pack(state)
+        state, course = lab.to_rotor(self.scene.angle(self.time)), self._course
+        own = course.flight.own_states(state)
+        course.state[: len(own)] = own
         self._course.enter_ball()

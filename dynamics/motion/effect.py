@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.harmonics.interior import Ball, BallField
-from ...fem.rotor.table import FieldFormula, FieldTable
+from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable
 from ...geometry.common import Array
-from .state import STEADY, Parameter, Turn, Vector
+from .state import STEADY, Parameter, State, Turn, Vector
 
 ZERO = hy.expression(0.0)
 NOTHING = (ZERO, ZERO, ZERO)
@@ -36,6 +36,9 @@ class Motion:
     field: Vector  # the rotor's B (3) T and ∂B_i/∂x_j (3, 3) T/m at the floater's centre
     gradient: list[list[hy.expression]]
     turn: Turn = STEADY
+    # (3, 3) whose columns are the body's axes, and (4,) the quaternion of it; None of a body that is round
+    axes: list[list[hy.expression]] | None = None
+    quaternion: Vector | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +52,8 @@ class Added:
     energy: hy.expression = ZERO  # term of the Jacobi integral
     power: hy.expression = ZERO  # rate of change of the Jacobi integral by this effect
     motor: hy.expression | None = None  # torque about the axis that it takes from the motor; None: that on the floater
-
-
-@runtime_checkable
-class DerivedField(Protocol):
-    """A field that knows its derivatives by place."""
-
-    def derivatives(self, points: Array, order: int) -> Array:
-        """See `RotorTable.derivatives`."""
+    states: Vector = ()  # of its own, and their rates
+    rates: Vector = ()
 
 
 class Effect(Protocol):
@@ -81,10 +78,18 @@ class Placeable(Effect, Protocol):
     def placed(self, first: int) -> Placeable:
         """The same with numbers from runtime parameter `first` on; it and its first derivatives hold at one pose."""
 
-    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+    def numbers(
+        self,
+        field: DerivedField,
+        flux: Array,
+        position: Array,
+        moment: Array,
+        values: Array,
+        quaternion: Array | None = None,
+    ) -> Array:
         """(n, count) at scaled positions and moments (n, 3), for runtime parameters `values` (n, p).
 
-        `field` is the rotor's, and `flux` (n, 3) T its B there.
+        `field` is the rotor's, and `flux` (n, 3) T its B there; `quaternion` (n, 4) that of a body that is not round.
         """
 
 
@@ -97,6 +102,14 @@ class Fittable(Placeable, Protocol):
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
         """The numbers (count,) in a ball, where the rotor's gradient is ∇B0 (3, 3) T/m; the error by that allowed."""
+
+
+@runtime_checkable
+class Stateful(Effect, Protocol):
+    """One that has states of its own in flights."""
+
+    def states_at(self, state: State) -> Array:
+        """Them (k,) in a state along the rotor's axes."""
 
 
 @runtime_checkable
@@ -139,6 +152,7 @@ class Interaction:
 
     field: FieldFormula  # the rotor's field; a table where more than its expressions are asked for
     effects: tuple[Effect, ...] = ()  # what else acts on the floater
+    turning: bool = False  # whether the floater is not round about its moment, so that its whole turn is in the motion
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         return self.field.expressions(position)

@@ -1,5 +1,7 @@
 """Whether rotor and floater magnetise each other in a scene's motion."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...fem.mutual.making import most_points, without_response
@@ -9,8 +11,8 @@ from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
+from .body_shape import BodyShape
 from .effect import Interaction, interaction_of
-from .equations import FORCE_ALONE
 from .floater_effects import FLOATER_SHAPE, FloaterShape, check_floater_metal, scene_effects
 from .rotor_effects import ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
 
@@ -29,11 +31,7 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
     """
     if requested == "rigid":
         return False, "as asked"
-    magnets, floater = scene.rotor, scene.floater
-    if floater.body is not None:
-        if requested == "mutual":
-            floater.must_be("sphere", where="for --interaction mutual", instead="Choose --interaction rigid.")
-        return False, "known for spherical floaters alone"
+    magnets, floater = scene.rotor, scene.floater.ball
     reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := without_response(magnet))}
     if requested == "mutual":
         if table.model == "map":
@@ -75,7 +73,7 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
 
 def rough_part(scene: Scene, table: FieldTable) -> float:
     """Roughly, what induced magnetisation adds to the force near the rotor, relative to the rigid dipole's."""
-    magnets, floater = scene.rotor, scene.floater
+    magnets, floater = scene.rotor, scene.floater.ball
     lowest = min((float(corner[2]) for magnet in magnets for corner in magnet.box.corners), default=0.0)
     direction = np.array([0.0, 0.0, 1.0])
     deep = lowest - NEAR * floater.radius * 2.0 ** np.arange(10)
@@ -85,26 +83,35 @@ def rough_part(scene: Scene, table: FieldTable) -> float:
     return float(np.linalg.norm(force) / (floater.moment * np.linalg.norm(table.evaluate(place[None])[1][0])))
 
 
-BESIDE_METAL = "beside metal that turns with the rotor"
-WITHOUT_METAL = "Leave conductivity_S_m of the rotor and rotor.conductors out."
-
-
 def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     """A table with the effects of a scene's conductivities and air, that of the rotor's from the cache; others stay.
 
-    Raises InputError: the rotor turns too fast for its metal or the floater's, or metal turns with it beside a floater
-    that is no sphere, or the floater is a cuboid.
+    Raises InputError: the rotor turns too fast for its metal or the floater's.
     """
     whole = interaction_of(table)
     check_floater_metal(scene)
     effects = scene_effects(scene)
-    if scene.floater.body is not None and FLOATER_SHAPE not in {effect.name for effect in whole.effects}:
-        scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
-        effects.append(FloaterShape.of(scene.floater, floater_sources(scene.floater), whole.field))
+    if not scene.floater.is_sphere and FLOATER_SHAPE not in {effect.name for effect in whole.effects}:
+        if scene.floater.round and not scene.floater.mean:
+            effects.append(FloaterShape.of(scene.floater, floater_sources(scene.floater), whole.field))
+        else:
+            bodies = [magnet.body for magnet in scene.rotor]
+            effects.append(BodyShape.of(scene.floater, whole.field, bodies))
     pieces = pieces_of(scene.rotor, scene.conductors)
     if pieces:
-        scene.floater.must_be("sphere", where=BESIDE_METAL, instead=WITHOUT_METAL)
         check_metal(pieces, scene.fastest, scene.floater.radius)
     if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
-    return whole.joined(*effects)
+    return replace(whole.joined(*effects), turning=not scene.floater.round)
+
+
+def mean_over_turns(scene: Scene, table: FieldFormula) -> tuple[Scene, Interaction, Interaction]:
+    """The scene with the floater's mean over turns about its moment, and the `table` with what acts on that.
+
+    The last is the same with the mean's multipoles about its moment as dipoles up to degree 7, for searches.
+    """
+    whole, round_scene = interaction_of(table), replace(scene, floater=scene.floater.averaged)
+    # Beside what the shape does all effects are those of a round body as well.
+    others = replace(whole, turning=False, effects=tuple(e for e in whole.effects if e.name != FLOATER_SHAPE))
+    rough = FloaterShape.of(round_scene.floater, floater_sources(round_scene.floater), whole.field)
+    return round_scene, with_effects(round_scene, others), with_effects(round_scene, others.joined(rough))

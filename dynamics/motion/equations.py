@@ -6,8 +6,9 @@ the laboratory but along the rotor's axes, unit moment m̂ and the rotor's rate 
     ṙ = v - W × r                         m̂' = (Ω - W) × m̂
     v̇ = F + g - c v - W × v               Ω̇ = τ - γ Ω⊥ - γ_s Ω∥ - W × Ω
 
-F = (m T²/M R) ∇(m̂·B) and τ = (m T²/I) m̂ × B: exact for a rigidly magnetised sphere.  Without drag and with gravity
-along the axis everything is autonomous, and the Jacobi integral
+F = (m T²/M R) ∇(m̂·B) and τ = (m T²/I) m̂ × B: exact for a rigidly magnetised sphere; what another shape adds is an
+effect.  A body that is not round about its moment has a quaternion instead of m̂ (`attitude`).  Without drag and with
+gravity along the axis everything is autonomous, and the Jacobi integral
 
     J = v²/2 + i Ω²/2 - i (m T²/I) m̂·B - g·r - W·(r × v + i Ω),   i = I/(M R²)   (unit: M R²/T²)
 
@@ -30,19 +31,21 @@ from ...fem.closed_forms.eddy_sphere import thin_field_torque
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
+from .attitude import ROUND_NAMES, TURNING_NAMES, round_attitude, turning_attitude
 from .effect import Motion, interaction_of
 from .plate import PlateMemory, memory_terms
+from .quaternions import left_product, rotation_of
 from .state import DRIVEN, STEADY, Parameter, Scales, Vector, cross, dot, subtract, turned
 
-FORCE_ALONE = "spinlev.floater_force gives force and torque on it; for a motion take a cylinder or a sphere."
-NAMES = tuple(f"{vector}_{axis}" for vector in ("position", "velocity", "moment", "spin") for axis in "xyz")
+CENTRE = tuple(f"{vector}_{axis}" for vector in ("position", "velocity") for axis in "xyz")
+NAMES = (*CENTRE, *ROUND_NAMES)
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
     """The equations of motion as heyoka expressions."""
 
-    variables: Vector  # the twelve of the floater, then the plate's, and with a drive what the motor has given
+    variables: Vector  # the floater's, those of effects, the plate's, and with a drive what the motor has given
     rates: Vector  # their derivatives with respect to scaled time
     # the terms of the Jacobi integral: motion, turning, magnet, weight, swirl, effects, and the plate's energy
     jacobi: Vector
@@ -50,11 +53,7 @@ class Equations:
 
 
 def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array:
-    """Runtime parameters of a `scene` in units `scales`; `frozen_spin` takes the drag off the spin about the moment.
-
-    Raises InputError: the floater is a cuboid, whose turn about its own moment the equations do not have.
-    """
-    scene.floater.must_be("sphere", "cylinder", where="where it moves", instead=FORCE_ALONE)
+    """Runtime parameters of a `scene` in units `scales`; `frozen_spin` takes the drag off the spin about the moment."""
     floater, drag, (length, time) = scene.floater, scene.drag, (scales.length, scales.time)
     root_energy = np.sqrt(floater.mass) * length / time
     values = np.zeros(len(Parameter))
@@ -74,6 +73,8 @@ def parameters(scene: Scene, scales: Scales, frozen_spin: bool = False) -> Array
     values[Parameter.PLATE_MOMENT] = floater.moment / root_energy
     values[Parameter.PLATE_SHARE] = 1 / root_energy
     values[Parameter.INDUCED] = floater.polarizability / root_energy
+    values[Parameter.INERTIA_X : Parameter.INERTIA_Z + 1] = floater.principal_inertia / floater.inertia
+    values[Parameter.POINTING_X : Parameter.POINTING_Z + 1] = floater.pointing
     return values
 
 
@@ -93,8 +94,11 @@ def equations_of_motion(
     memory, first : the plate's currents, if they are modelled, and the first of their runtime parameters
     driven : whether the rotor's rate changes in time
     """
-    variables, rotor = list(hy.make_vars(*NAMES)), DRIVEN if driven else STEADY
-    position, velocity, moment, spin = (variables[i : i + 3] for i in (0, 3, 6, 9))
+    whole, rotor = interaction_of(table), DRIVEN if driven else STEADY
+    variables = list(hy.make_vars(*CENTRE, *(TURNING_NAMES if whole.turning else ROUND_NAMES)))
+    position, velocity, turn_states, spin_states = variables[:3], variables[3:6], variables[6:-3], variables[-3:]
+    attitude = (turning_attitude if whole.turning else round_attitude)(turn_states, spin_states, rotor.rate)
+    moment, spin = attitude.moment, attitude.spin
     length, torque, inertia, linear = (
         hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
     )
@@ -106,24 +110,26 @@ def equations_of_motion(
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
     drift = subtract(velocity, turned(position, rotor.rate))
     lag = [spin[0], spin[1], spin[2] - rotor.rate]
-    brake = _angular_drag(moment, spin)
-    momentum = cross(position, velocity)[2] + inertia * spin[2]
+    momentum = cross(position, velocity)[2] + inertia * attitude.swirl
     jacobi = [
         0.5 * dot(velocity, velocity),
-        0.5 * inertia * dot(spin, spin),
+        inertia * attitude.energy,
         -inertia * torque * dot(moment, field),
         -axial[2] * position[2],
         -rotor.rate * momentum,
     ]
-    power = dot(push, drift) + inertia * dot(brake, lag)
-    motion = Motion(position, velocity, moment, spin, drift, lag, field, gradient, rotor)
-    parts = [effect.added(motion) for effect in interaction_of(table).effects]
-    states: list[hy.expression] = []
-    state_rates: Vector = []
+    power = dot(push, drift) + inertia * attitude.braking
+    motion = Motion(
+        position, velocity, moment, spin, drift, lag, field, gradient, rotor, attitude.axes, attitude.quaternion
+    )
+    parts = [effect.added(motion) for effect in whole.effects]
+    states = [state for added in parts for state in added.states]
+    state_rates = [rate for added in parts for rate in added.rates]
     if memory is not None:
-        states = [hy.expression(f"plate_{i}") for i in range(len(memory.table.rates))]
-        by_plate, state_rates = memory_terms(memory, first, position, moment, states, driven)
+        currents = [hy.expression(f"plate_{i}") for i in range(len(memory.table.rates))]
+        by_plate, their_rates = memory_terms(memory, first, position, moment, currents, driven)
         parts.append(by_plate)
+        states, state_rates = [*states, *currents], [*state_rates, *their_rates]
     for added in parts:
         force = [a + b for a, b in zip(force, added.force, strict=True)]
         turn = [a + b for a, b in zip(turn, added.torque, strict=True)]
@@ -144,8 +150,7 @@ def equations_of_motion(
     rates = [
         *drift,
         *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity, rotor.rate)),
-        *cross(lag, moment),
-        *subtract([turn[i] + brake[i] for i in range(3)], turned(spin, rotor.rate)),
+        *attitude.rates(turn),
     ]
     return Equations([*variables, *states], [*rates, *state_rates], jacobi, power)
 
@@ -160,22 +165,20 @@ def _gravity(tilted: bool, angle: hy.expression) -> tuple[Vector, Vector]:
     return axial, [hy.cos(angle) * x + hy.sin(angle) * y, hy.cos(angle) * y - hy.sin(angle) * x, zero]
 
 
-def _angular_drag(moment: Vector, spin: Vector) -> Vector:
-    tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
-    excess = (tilt - along) * dot(spin, moment)
-    return [excess * moment[i] - tilt * spin[i] for i in range(3)]
-
-
 # Position, moment, its two tangents, and body spin s: what balances are functions of.
 GIVEN = ("x", "y", "z", "m_x", "m_y", "m_z", "t_x", "t_y", "t_z", "u_x", "u_y", "u_z", "body_spin")
 TILTS = ("tilt_t", "tilt_u")
 
 
-def balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
-    """The balances (5,) of a motion with their derivatives (5 × 5, row by row), and their variables (13,)."""
+def balances(equations: Equations, still: bool = False) -> tuple[list[hy.expression], list[hy.expression]]:
+    """The balances (5,) of a motion with their derivatives (5 × 5, row by row), and their variables (13,).
+
+    Of a body `still` in the rotor's frame the body spin is the given one times the cosine of the polar angle.
+    """
     given, tilts = list(hy.make_vars(*GIVEN)), list(hy.make_vars(*TILTS))
     position, tangents, spin = given[:3], (given[6:9], given[9:12]), given[12]
     moment = [given[3 + i] + tilts[0] * tangents[0][i] + tilts[1] * tangents[1][i] for i in range(3)]
+    spin = spin * moment[2] if still else spin
     rates = hy.subs(list(equations.rates[:12]), dict(zip(NAMES, _state(position, moment, spin), strict=True)))
     force, torque = rates[3:6], rates[9:12]
     values = [*force, *(dot(tangent, torque) for tangent in tangents)]
@@ -192,3 +195,35 @@ def _state(position: Vector, moment: Vector, spin: hy.expression) -> list[hy.exp
     along = rate * (spin - moment[2])
     velocity = [-rate * position[1], rate * position[0], hy.expression(0.0)]
     return [*position, *velocity, *moment, along * moment[0], along * moment[1], along * moment[2] + rate]
+
+
+def still_balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
+    """`balances` of a body at rest in the rotor's frame."""
+    return balances(equations, still=True)
+
+
+# Position, quaternion and small turns about the rotor's axes: what those of a frequency-locked body are functions of.
+LOCKED = ("x", "y", "z", "q_w", "q_x", "q_y", "q_z")
+TURNS = ("by_x", "by_y", "by_z")
+
+
+def locked_balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
+    """The balances (6,) of a body at rest in the rotor's frame, their derivatives (6 × 6), and their variables (7,).
+
+    Accelerations of place and of spin along the body's axes; the derivatives are by x, y, z and by small turns about
+    the rotor's axes.
+    """
+    given, turns = list(hy.make_vars(*LOCKED)), list(hy.make_vars(*TURNS))
+    position, before = given[:3], given[3:]
+    quaternion = [q + 0.5 * d for q, d in zip(before, left_product(turns, before), strict=True)]
+    rate = hy.par[Parameter.RATE]
+    spin = [rate * part for part in rotation_of(quaternion)[2]]
+    velocity = [-rate * position[1], rate * position[0], hy.expression(0.0)]
+    names = (*CENTRE, *TURNING_NAMES)
+    rates = hy.subs(
+        list(equations.rates[:13]), dict(zip(names, [*position, *velocity, *quaternion, *spin], strict=True))
+    )
+    values = [*rates[3:6], *rates[10:13]]
+    slopes = hy.diff_tensors(values, diff_args=[*position, *turns], diff_order=1).jacobian
+    unturned = {name: hy.expression(0.0) for name in TURNS}
+    return hy.subs([*values, *np.asarray(slopes).ravel()], unturned), given

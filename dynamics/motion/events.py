@@ -63,11 +63,11 @@ def lost_distance(start: Array) -> float:
     return max(0.1, 2 * float(np.linalg.norm(start)))
 
 
-def clearance(scene: Scene, time: Array, position: Array, moment: Array | None = None) -> Array:
+def clearance(scene: Scene, time: Array, position: Array, orientation: Array | None = None) -> Array:
     """Smallest gap (n,) in m between floater and bodies of `scene` at `time` (n,) s, `position` (n, 3) m (rotor's).
 
     Of a floater that is no sphere the gap of the smallest one about it where that is positive, else its own; without
-    its `moment` (n, 3), that of the sphere.
+    its `orientation` (see `State`), that of the sphere.
     """
     gaps = [body.distance(position) for body in scene.turning_bodies]
     if scene.plate is not None:
@@ -75,29 +75,30 @@ def clearance(scene: Scene, time: Array, position: Array, moment: Array | None =
         seen[:, 2] += plate_depth(scene.plate, time)
         gaps.append(scene.plate.body.distance(seen))
     found = np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
-    if scene.floater.body is not None and moment is not None:
+    if not scene.floater.is_sphere and orientation is not None:
         for k in np.flatnonzero(found < 0):
-            found[k] = _own_gap(scene, float(time[k]), position[k], moment[k])
+            found[k] = _own_gap(scene, float(time[k]), position[k], orientation[k])
     return found
 
 
-def _own_gap(scene: Scene, time: float, position: Array, moment: Array) -> float:
+def _own_gap(scene: Scene, time: float, position: Array, orientation: Array) -> float:
     """Gap of a floater that is no sphere in one place, m."""
-    floater, bodies = scene.floater, list(scene.turning_bodies)
-    gaps = [-body_overlap(body, floater.placed(position, moment)) for body in bodies]
+    parts = scene.floater.placed(position, orientation)
+    gaps = [-body_overlap(body, part) for body in scene.turning_bodies for part in parts]
     if scene.plate is not None:
         turn = scene.angle(time)
         seen = turned_about_z(position, turn) + plate_depth(scene.plate, np.array([time])) * [0.0, 0.0, 1.0]
-        gaps.append(-body_overlap(scene.plate.body, floater.placed(seen, turned_about_z(moment, turn))))
+        axes = turned_about_z(scene.floater.axes(orientation).T, turn).T
+        gaps += [-body_overlap(scene.plate.body, part) for part in scene.floater.placed(seen, axes)]
     return min(gaps)
 
 
-def rotor_gap(scene: Scene, position: Array, moment: Array | None = None) -> float:
+def rotor_gap(scene: Scene, position: Array, orientation: Array | None = None) -> float:
     """Gap in m between floater at `position` (3,) m, rotor's frame, and rotor of `scene`; negative where they overlap.
 
-    See `clearance` for a floater that is no sphere, whose `moment` (3,) it needs.
+    See `clearance` for a floater that is no sphere, whose `orientation` it needs.
     """
-    pointing = None if moment is None else moment[None]
+    pointing = None if orientation is None else orientation[None]
     return float(clearance(replace(scene, plate=None), np.zeros(1), position[None], pointing)[0])
 
 

@@ -52,11 +52,12 @@ from numpy.typing import ArrayLike
 from ...fem.closed_forms.eddy_sphere import skin_number
 from ...fem.harmonics.interior import LocalField
 from ...fem.rotor.floater import FloaterSources, force_and_torque
-from ...fem.rotor.table import FieldFormula, FieldTable
+from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable
 from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
-from ...geometry.scene.contents import AIR_VISCOSITY, Floater, Scene
-from .effect import ZERO, Added, DerivedField, Effect, Motion, dissipative
+from ...geometry.scene.contents import AIR_VISCOSITY, Scene
+from ...geometry.scene.floater import Floater
+from .effect import ZERO, Added, Effect, Motion, dissipative
 from .state import Parameter, Vector, cross, dot
 
 REAL_AIR = "air beyond Stokes"
@@ -147,9 +148,10 @@ class FloaterShape:
     @classmethod
     def of(cls, floater: Floater, sources: FloaterSources, field: FieldFormula) -> FloaterShape:
         """Dipoles with the multipoles of a floater's `sources`, in `field`, less the one that the equations have."""
-        half = floater.solid.half_edges[2]
+        axis = np.array([[0.0, 0.0, 1.0]])
+        half = max(float(abs(body.center[2]) + body.reach(axis)[0]) for body in floater.bodies)
         heights = half * np.array([0.0, *HEIGHTS, *-HEIGHTS])
-        degrees = 2 * np.arange(len(HEIGHTS) + 1) + 1
+        degrees = np.arange(1, len(heights) + 1)
         powers = (heights / half) ** (degrees[:, None] - 1)
         wanted = sources.axial_moments(int(degrees[-1]))[degrees - 1] / (degrees * half ** (degrees - 1))
         dipoles = np.linalg.pinv(powers) @ wanted / (floater.moment or 1.0)
@@ -164,7 +166,15 @@ class FloaterShape:
         numbers = range(len(self.heights) - 1)
         return replace(self, fields=tuple(LocalField(first + k * LocalField.count) for k in numbers))
 
-    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+    def numbers(
+        self,
+        field: DerivedField,
+        flux: Array,
+        position: Array,
+        moment: Array,
+        values: Array,
+        quaternion: Array | None = None,
+    ) -> Array:
         """See `Placeable`."""
         found = []
         for height in self.heights[1:]:

@@ -21,7 +21,8 @@ from ...fem.harmonics.interior import LocalField
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import Array
 from .effect import Effect, Interaction, Placeable, interaction_of
-from .equations import Equations, balances, equations_of_motion
+from .equations import Equations, balances, equations_of_motion, locked_balances, still_balances
+from .quaternions import matrices_of
 from .state import Parameter
 
 
@@ -51,13 +52,14 @@ class Rates:
                 self._placed.append(effect)
                 first += effect.count
             effects.append(effect)
-        self._equations = equations_of_motion(Interaction(self._local, tuple(effects)))
+        self.turning = whole.turning
+        self._equations = equations_of_motion(Interaction(self._local, tuple(effects), whole.turning))
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._level = 1 if optimised else 0
 
     def compile(self) -> None:
         """Compile now what is else compiled when it is first called."""
-        _ = self._function, self._balances
+        _ = self._function, self._locked if self.turning else self._balances
 
     def _compiled(self, write: Callable[[Equations], tuple[list[hy.expression], list[hy.expression]]]) -> Any:
         """Outputs and variables that are written from the equations, compiled."""
@@ -66,25 +68,36 @@ class Rates:
         return compiled_later(hy.cfunc, lambda: write(self._equations), source, **options)
 
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
-        """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12).
+        """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12); 13 for 12 of a turning body.
 
         `values` of the parameters: (p,) for all states or (n, p), one row for each.
         """
         states = np.asarray(states, float)
-        found = _called(self._function, states.T, self._about(states[:, :3], states[:, 6:9], values)).T
-        return found[:, :12], found[:, 12:].reshape(-1, 12, 12)
+        size = states.shape[1]
+        found = _called(self._function, states.T, self._about(states[:, :3], states[:, 6 : size - 3], values)).T
+        return found[:, :size], found[:, size:].reshape(-1, size, size)
+
+    def locked_balance(self, position: Array, quaternion: Array, values: Array) -> tuple[Array, Array]:
+        """What has to vanish of a turning body at rest in the rotor's frame (n, 6), and its derivatives (n, 6, 6).
+
+        At scaled positions (n, 3) and unit quaternions (n, 4); see `locked_balances`, and `values` as above.
+        """
+        given = np.concatenate([position, quaternion], axis=1).T
+        found = _called(self._locked, given, self._about(position, quaternion, values))
+        return found[:6].T, found[6:].T.reshape(-1, 6, 6)
 
     def balance(
-        self, position: Array, moment: Array, tangents: Array, spin: Array, values: Array
+        self, position: Array, moment: Array, tangents: Array, spin: Array, values: Array, still: bool = False
     ) -> tuple[Array, Array]:
-        """What has to vanish at rest in the rotor's frame (n, 5), and its derivatives (n, 5, 5), see `at_rest`.
+        """What has to vanish at rest in the rotor's frame (n, 5), and its derivatives (n, 5, 5), see `balances`.
 
         At scaled positions and moments (n, 3) with their tangents (n, 2, 3) and body spins (n,); `values` as above.
         """
         given = np.empty((13, len(position)))
         given[:3], given[3:6], given[12] = position.T, moment.T, spin
         given[6:12] = tangents.reshape(-1, 6).T
-        found = _called(self._balances, given, self._about(position, moment, values))
+        function = self._still if still else self._balances
+        found = _called(function, given, self._about(position, moment, values))
         return found[:5].T, found[5:].T.reshape(-1, 5, 5)
 
     @property
@@ -102,18 +115,25 @@ class Rates:
         found._rough = True
         return found
 
-    def _about(self, position: Array, moment: Array, values: Array) -> Array:
-        """Parameters (p, n) with those of the field and of effects about scaled positions and moments (n, 3)."""
+    def _about(self, position: Array, turn: Array, values: Array) -> Array:
+        """Parameters (p, n) with those of the field and of effects about scaled positions (n, 3).
+
+        `turn` is moments (n, 3), or quaternions (n, 4) of a turning body.
+        """
         count = len(position)
         rows = np.broadcast_to(values, (count, len(Parameter)))
         field = self._field.at(rows[:, Parameter.MEASURE]) if hasattr(self._field, "at") else self._field
         places = position * rows[:, [Parameter.LENGTH]]
+        moment, quaternion = turn, None
+        if self.turning:
+            pointing = rows[:, Parameter.POINTING_X : Parameter.POINTING_Z + 1]
+            moment, quaternion = (matrices_of(turn) @ pointing[..., None])[..., 0], turn
         slopes = field.derivatives(places, LocalField.ORDER)
         parts = [rows, places, slopes]
         if self._rough:
             parts += [np.zeros((count, part.count)) for part in self._placed]
         else:
-            parts += [part.numbers(field, slopes[:, :3], position, moment, rows) for part in self._placed]
+            parts += [part.numbers(field, slopes[:, :3], position, moment, rows, quaternion) for part in self._placed]
         return np.ascontiguousarray(np.concatenate([part.T for part in parts]))
 
     @cached_property
@@ -123,6 +143,14 @@ class Rates:
     @cached_property
     def _balances(self) -> Any:
         return self._compiled(balances)
+
+    @cached_property
+    def _still(self) -> Any:
+        return self._compiled(still_balances)
+
+    @cached_property
+    def _locked(self) -> Any:
+        return self._compiled(locked_balances)
 
 
 def _with_jacobian(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:

@@ -31,12 +31,13 @@ from numpy.typing import ArrayLike
 from ...fem.harmonics.interior import Ball, BallField
 from ...fem.mutual.table import MutualTable
 from ...fem.plate.multipoles import weighted
-from ...fem.rotor.table import FieldTable
+from ...fem.rotor.table import DerivedField, FieldTable
 from ...fem.rotor_metal import RotorLosses
 from ...geometry.common import MU_0, Array, even_directions
 from ...geometry.magnets import Magnet, polarizability
-from ...geometry.scene.contents import Floater, Scene
-from .effect import Added, DerivedField, Motion, conservative, dissipative
+from ...geometry.scene.contents import Scene
+from ...geometry.scene.floater import Floater
+from .effect import Added, Motion, conservative, dissipative
 from .state import Parameter, Scales, State, Vector, cross, dot, dotted, subtract
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
@@ -162,7 +163,15 @@ class Mutual(_Near):
         strength, share = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.PLATE_SHARE]
         return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
 
-    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+    def numbers(
+        self,
+        field: DerivedField,
+        flux: Array,
+        position: Array,
+        moment: Array,
+        values: Array,
+        quaternion: Array | None = None,
+    ) -> Array:
         """See `Placeable`."""
         length, strength, share = values[:, WHICH].T[:, :, None]
         place = position * length
@@ -294,7 +303,15 @@ class RotorCurrents(_Near):
         known = dict(zip(ENTRIES, entries, strict=True))
         return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
 
-    def numbers(self, field: DerivedField, flux: Array, position: Array, moment: Array, values: Array) -> Array:
+    def numbers(
+        self,
+        field: DerivedField,
+        flux: Array,
+        position: Array,
+        moment: Array,
+        values: Array,
+        quaternion: Array | None = None,
+    ) -> Array:
         """See `Placeable`."""
         return self._entries(position * values[:, Parameter.LENGTH, None]).T
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum, auto
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
+from .quaternions import matrices_of, quaternions_of
 
 Vector = Sequence[hy.expression]
 
@@ -25,6 +26,8 @@ class Parameter(IntEnum):
     INDUCED is the moment that 1 T induces in the floater, by the same root, A m²/(T √J).
     TILT_EDDY and SPIN_EDDY are the floater's own eddy currents, 1/T²: accelerations by unit field and relative turn;
     SLOWNESS is μ0σR² of it in units of time.
+    INERTIA_X to _Z are principal moments of inertia over that of INERTIA, POINTING_X to _Z the moment's direction along
+    the body's axes: those of a body that is not round about its moment.
     MEASURE is that of a rotor whose shape is a parameter, m or rad (`rotor_family`); no other rotor has it.
     """
 
@@ -48,6 +51,12 @@ class Parameter(IntEnum):
     TILT_EDDY = auto()
     SPIN_EDDY = auto()
     SLOWNESS = auto()
+    INERTIA_X = auto()
+    INERTIA_Y = auto()
+    INERTIA_Z = auto()
+    POINTING_X = auto()
+    POINTING_Y = auto()
+    POINTING_Z = auto()
     MEASURE = auto()
     ACCELERATION = auto()
     ANGLE = auto()
@@ -115,18 +124,30 @@ class State:
     velocity: Array  # m/s
     moment: Array  # direction of the magnetic moment, a unit vector fixed in the body
     spin: Array  # angular velocity of the body, rad/s
+    # (3, 3) or (n, 3, 3) whose columns are the axes of the floater's frame; None of a body that is round about its
+    # moment, where nothing depends on its turn about it
+    axes: Array | None = None
 
     def __getitem__(self, chosen: Any) -> State:
         """One of many states, or some."""
-        return State(*(v[chosen] for v in self.vectors))
+        return replace(State(*(v[chosen] for v in self.vectors)), axes=None if self.axes is None else self.axes[chosen])
 
     def to_rotor(self, angle: ArrayLike) -> State:
         """Components along the rotor's axes, from those along the laboratory's; `angle` of the rotor in rad."""
-        return State(*(turned_about_z(v, -np.asarray(angle, float)) for v in self.vectors))
+        return self.to_lab(-np.asarray(angle, float))
 
     def to_lab(self, angle: ArrayLike) -> State:
         """Components along the laboratory's axes, from those along the rotor's; `angle` of the rotor in rad."""
-        return State(*(turned_about_z(v, angle) for v in self.vectors))
+        axes = None
+        if self.axes is not None:
+            columns = turned_about_z(self.axes.swapaxes(-1, -2), np.asarray(angle, float)[..., None])
+            axes = columns.swapaxes(-1, -2)
+        return replace(State(*(turned_about_z(v, angle) for v in self.vectors)), axes=axes)
+
+    @property
+    def orientation(self) -> Array:
+        """What is known of how the body is turned: its axes, or (…, 3) the direction of its moment."""
+        return self.moment if self.axes is None else self.axes
 
     @property
     def vectors(self) -> tuple[Array, Array, Array, Array]:
@@ -151,27 +172,46 @@ class Scales:
     # moment of inertia about the magnetic moment over that across it; the integrated spin is L/I, which has so much of
     # the true one along the moment
     spin_ratio: float = 1.0
+    # direction of the moment along the axes of a body that is not round about it, whose states are a quaternion and the
+    # true spin along these axes; None of a round one
+    pointing: tuple[float, float, float] | None = None
 
     @classmethod
     def of(cls, scene: Scene) -> Scales:
-        radius, weight = scene.floater.radius, float(np.linalg.norm(scene.gravity))
-        ratio = scene.floater.spin_ratio
+        floater, weight = scene.floater, float(np.linalg.norm(scene.gravity))
+        x, y, z = floater.pointing.tolist()
+        turning = (floater.spin_ratio, None) if floater.round else (1.0, (x, y, z))
         if scene.fastest:
-            return cls(radius, 1 / (2 * np.pi * scene.fastest), ratio)
-        return cls(radius, float(np.sqrt(radius / weight)) if weight > WEIGHTLESS else 1.0, ratio)
+            return cls(floater.radius, 1 / (2 * np.pi * scene.fastest), *turning)
+        time = float(np.sqrt(floater.radius / weight)) if weight > WEIGHTLESS else 1.0
+        return cls(floater.radius, time, *turning)
+
+    @property
+    def size(self) -> int:
+        """Number of the floater's own states."""
+        return 12 if self.pointing is None else 13
 
     def pack(self, state: State) -> Array:
-        """Scaled state (..., 12): position, velocity, moment, spin."""
+        """Scaled state (..., 12): position, velocity, moment, spin; or (..., 13), see `attitude`."""
         speed = self.length / self.time
-        spin = _stretched(state.spin, state.moment, self.spin_ratio)
-        parts = state.position / self.length, state.velocity / speed, state.moment, spin * self.time
+        if self.pointing is None:
+            turn, spin = state.moment, _stretched(state.spin, state.moment, self.spin_ratio)
+        else:
+            assert state.axes is not None
+            turn, spin = quaternions_of(state.axes), np.einsum("...ij,...i->...j", state.axes, state.spin)
+        parts = state.position / self.length, state.velocity / speed, turn, spin * self.time
         return np.concatenate(parts, axis=-1)
 
     def unpack(self, scaled: Array) -> State:
         """The state of `scaled` (..., 12 or more) in SI units, along the same axes."""
-        position, velocity, moment, spin = (scaled[..., i : i + 3] for i in (0, 3, 6, 9))
-        spin = _stretched(spin, moment, 1 / self.spin_ratio)
-        return State(position * self.length, velocity * (self.length / self.time), moment + 0.0, spin / self.time)
+        position, velocity = scaled[..., :3] * self.length, scaled[..., 3:6] * (self.length / self.time)
+        turn, spin = scaled[..., 6 : self.size - 3], scaled[..., self.size - 3 : self.size]
+        if self.pointing is None:
+            return State(position, velocity, turn + 0.0, _stretched(spin, turn, 1 / self.spin_ratio) / self.time)
+        axes = matrices_of(turn)
+        return State(
+            position, velocity, axes @ np.array(self.pointing), (axes @ spin[..., None])[..., 0] / self.time, axes
+        )
 
 
 def _stretched(spin: Array, moment: Array, ratio: float) -> Array:

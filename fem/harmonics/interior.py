@@ -188,7 +188,7 @@ def dipole_sources(moment: Array, ball: Ball, degree: int) -> Coefficients:
 
 
 @cache
-def _real(degree: int) -> tuple[Array, Array]:
+def real_basis(degree: int) -> tuple[Array, Array]:
     """`members` (K, 3), and [l, m] of Υ_lm by S_m Q_lm, (-1)^m (2l-1)!!/((l-m)! (l+m)!)."""
     l, m = np.indices((degree + 1, degree + 1))
     doubled = np.cumprod([1.0, *(2.0 * k - 1 for k in range(1, degree + 1))])
@@ -197,7 +197,7 @@ def _real(degree: int) -> tuple[Array, Array]:
 
 def real_weights(coefficients: Coefficients) -> Array:
     """Weights (K,), in the order of `members`, of Σ conj a_lm Υ_lm over positive and negative m."""
-    (l, m, part), sizes = _real(len(coefficients) - 1)[0].T, _real(len(coefficients) - 1)[1]
+    (l, m, part), sizes = real_basis(len(coefficients) - 1)[0].T, real_basis(len(coefficients) - 1)[1]
     chosen = (coefficients * sizes)[l, m] * np.where(m, 2.0, 1.0)
     return np.asarray(np.where(part, chosen.imag, chosen.real))
 
@@ -205,7 +205,7 @@ def real_weights(coefficients: Coefficients) -> Array:
 @cache
 def _real_values(degree: int) -> Array:
     """(K, n): R_k up to one degree less at the points of `sphere`."""
-    (l, m, part), sizes = _real(degree - 1)[0].T, _real(degree - 1)[1]
+    (l, m, part), sizes = real_basis(degree - 1)[0].T, real_basis(degree - 1)[1]
     known = regular_values(degree - 1, *sphere(degree, MORE)[0].T)
     values = np.array([known[key] for key in zip(l.tolist(), m.tolist(), strict=True)]) / sizes[l, m][:, None]
     return np.asarray(np.where(part[:, None], values.imag, values.real))

@@ -10,7 +10,7 @@ import scipy
 
 from ...geometry.common import Array, InputError, Watch, unwatched, watched
 from ...geometry.magnets import Magnet
-from ...geometry.scene.contents import Floater
+from ...geometry.scene.floater import Floater
 from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center

@@ -14,7 +14,7 @@ from ...geometry.common import Array, ComputationError
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MagnetMesh, mesh_magnets
 from ...geometry.overlap import TOUCHING, sphere_overlap
-from ...geometry.scene.contents import Floater
+from ...geometry.scene.floater import Floater
 from ...geometry.shapes import Box, Sphere
 from ..closed_forms.moments import carrier, volume_rule
 from ..closed_forms.uniform import remanent_field

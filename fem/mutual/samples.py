@@ -7,7 +7,7 @@ import numpy as np
 
 from ...geometry.common import MU_0, Array, Watch, watched
 from ...geometry.magnets import Magnet
-from ...geometry.scene.contents import Floater
+from ...geometry.scene.floater import Floater
 from ...geometry.solids import places_off
 from ..harmonics.interior import Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
 from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums

@@ -9,22 +9,28 @@ which have these multipoles because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s), and n
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Self
 
 import numpy as np
 import scipy
 
-from ...geometry.common import MU_0, Array
+from ...geometry.common import MU_0, Array, even_directions
 from ...geometry.magnets import Magnet
-from ...geometry.scene.contents import Floater
+from ...geometry.scene.floater import Floater
+from ...geometry.shapes import rotation_matrix
 from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
 from ..harmonics.interior import sphere
-from ..harmonics.solid import factorials, regular_values
+from ..harmonics.rigid import field_coefficients, harmonics, matrices, shells as multipole_degrees
+from ..harmonics.solid import factorials, regular_values, tensors
 from .choice import cached_rotor_table
-from .table import FieldTable
+from .table import DerivedField, FieldTable
 
 DEGREE = 20  # of polynomials over the body that the dipoles integrate exactly
 RTOL = 1e-5  # accuracy of the field of a permeable floater, from its circumradius off its faces on
+DIRECTIONS = 24  # of a dipole beside a floater, by which the sizes of its multipoles' shares are told
+TURNS = 8  # over which the mean of a body over turns about its moment is taken
 SHARE = 0.4  # least radius of the sphere of charges, in circumradii
 
 
@@ -38,6 +44,33 @@ class FloaterSources:
     # corners, charges: (k, 3) m and (k,) A m, of magnetic charges
     corners: Array
     charges: Array
+
+    @classmethod
+    def dipole(cls, moment: Array) -> Self:
+        """One dipole (3,) A m² in the centre."""
+        return cls(np.zeros((1, 3)), np.asarray(moment)[None], np.zeros((0, 3)), np.zeros(0))
+
+    def turned(self, axes: Array) -> Self:
+        """The same of a body with axes (3, 3)."""
+        return replace(self, places=self.places @ axes.T, moments=self.moments @ axes.T, corners=self.corners @ axes.T)
+
+    def averaged(self) -> Self:
+        """Its mean over turns about its z, exact for orders m of its multipoles below `TURNS`."""
+        angles = 2 * np.pi * np.arange(TURNS) / TURNS
+        turned = [self.turned(rotation_matrix((0.0, 0.0, angle))) for angle in np.degrees(angles)]
+        return replace(
+            self,
+            places=np.concatenate([one.places for one in turned]),
+            moments=np.concatenate([one.moments for one in turned]) / TURNS,
+            corners=np.concatenate([one.corners for one in turned]),
+            charges=np.tile(self.charges, TURNS) / TURNS,
+        )
+
+    def multipoles(self, degree: int, unit: float) -> Array:
+        """(K,) A m: M_k of `harmonics.rigid` up to a degree about the centre, lengths in a `unit`, m."""
+        _, slopes = harmonics(degree, self.places / unit)
+        values, _ = harmonics(degree, self.corners / unit)
+        return np.asarray(np.einsum("ni,nki->k", self.moments, slopes) / unit + self.charges @ values)
 
     def axial_moments(self, highest: int) -> Array:
         """(highest,) A m^(l+1): the zonal multipoles Q_l = Σ charge · r^l P_l about its z, l = 1 … highest."""
@@ -70,7 +103,7 @@ class FloaterSources:
 def floater_sources(
     floater: Floater, report: Callable[[str], None] = lambda _: None, degree: int = DEGREE
 ) -> FloaterSources:
-    """Sources of a floater of any shape, polarised along its z.
+    """Sources of a floater of any shape, in its frame.
 
     Exact for μr = 1 up to a `degree` of the rotor's field over the body; with a permeability to 1e-5 of the field
     beside the floater, from finite elements, which are kept in the user's cache.
@@ -81,16 +114,19 @@ def floater_sources(
     report : called with a message where the cache is damaged
     degree : of the polynomials over the body that are integrated exactly
     """
-    magnet = floater.magnet(np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    if floater.body is None:
-        moment = np.array([[0.0, 0.0, floater.moment]])
-        return FloaterSources(np.zeros((1, 3)), moment, np.zeros((0, 3)), np.zeros(0))
+    if floater.is_sphere:
+        return FloaterSources.dipole(floater.dipole)
     if floater.recoil_permeability == 1:
-        return _joined([magnet], [], degree)
-    table, _ = cached_rotor_table((magnet,), "fem", RTOL, report, floater.radius)
+        return remanent_sources(floater, degree)
+    table, _ = cached_rotor_table(floater.magnets, "fem", RTOL, report, floater.radius)
     # Charges farther in would be large and cancel
     least = max(floater.inner_radius, SHARE * floater.radius)
     return _joined(table.uniform, [_charges(e, least) for e in table.expansions], degree)
+
+
+def remanent_sources(floater: Floater, degree: int) -> FloaterSources:
+    """Dipoles of the remanent polarisations of a floater alone, in its frame; `degree` as of `floater_sources`."""
+    return _joined(floater.magnets, [], degree)
 
 
 def _joined(magnets: Sequence[Magnet], charges: Sequence[tuple[Array, Array]], degree: int) -> FloaterSources:
@@ -138,3 +174,90 @@ def force_and_torque(sources: FloaterSources, table: FieldTable, position: Array
         force[k] = pulls.sum(axis=0) + pushes.sum(axis=0)
         torque[k] = turns.sum(axis=0) + np.cross(ends, pushes).sum(axis=0)
     return force, torque
+
+
+def shares(floater: Floater, sources: FloaterSources, highest: int) -> Array:
+    """(`highest` + 1,) of each degree of multipoles in the force of a dipole one radius off a floater.
+
+    By that of its magnets' moments taken together, the mean over directions: what is left out with a degree. The part
+    of degree 1 is what the floater's dipole misses.
+    """
+    radius, degrees = floater.radius, multipole_degrees(highest + 1)
+    own = np.zeros(len(degrees))
+    found = sources.multipoles(highest, radius)
+    own[: len(found)] = found
+    own[1:4] -= FloaterSources.dipole(floater.dipole).multipoles(1, radius)[1:4]
+    slopes, forces = matrices(highest + 1)[0], np.zeros(highest + 1)
+    for place in 2 * radius * even_directions(DIRECTIONS):
+        for pole in np.eye(3):
+            field = field_coefficients(
+                partial(_dipole_field, place, pole), np.zeros(3), radius / 2, highest + 1, radius
+            )
+            pulls = np.einsum("akl,k,l->al", slopes, field, own) / radius
+            plain = np.linalg.norm(np.einsum("akl,k->al", slopes, field)[:, 1:4]) / radius**2
+            sizes = [np.linalg.norm(pulls[:, degrees == l].sum(axis=1)) for l in range(highest + 1)]
+            forces += np.array(sizes) / (plain * strength(floater))
+    return np.asarray(forces / (3 * DIRECTIONS))
+
+
+def strength(floater: Floater) -> float:
+    """A m², the moments of a floater's magnets together, whatever their directions; 1 without any."""
+    return sum(float(np.linalg.norm(magnet.moment)) for magnet in floater.magnets) or 1.0
+
+
+def _dipole_field(place: Array, moment: Array, points: Array) -> Array:
+    """B (n, 3) T at points (n, 3) m of a `moment` (3,) A m² in a `place` (3,) m."""
+    away = points - place
+    distance = np.linalg.norm(away, axis=1, keepdims=True)
+    return np.asarray(MU_0 / (4 * np.pi) * (3 * (away @ moment)[:, None] * away / distance**5 - moment / distance**3))
+
+
+TOGETHER = 200_000  # points at which a field is looked at at once
+
+
+def slopes_of(sources: FloaterSources, field: DerivedField, position: Array, axes: Array) -> tuple[Array, Array]:
+    """Force and torque about the centre (n, 6), N and N m, and their derivatives (n, 6, 6).
+
+    The latter by a change of place, m, and by a small turn about the field's axes.
+
+    Parameters
+    ----------
+    sources, field : the floater's, and the rotor's field
+    position, axes : as of `force_and_torque`
+    """
+    count = len(sources.places) + len(sources.corners)
+    pieces = np.array_split(np.arange(len(position)), max(1, len(position) * count // TOGETHER))
+    parts = [_slopes_of(sources, field, position[piece], axes[piece]) for piece in pieces]
+    return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+
+
+def _slopes_of(sources: FloaterSources, field: DerivedField, position: Array, axes: Array) -> tuple[Array, Array]:
+    count = len(sources.places)
+    arms = np.einsum("nij,kj->nki", axes, np.concatenate([sources.places, sources.corners]))
+    points = (position[:, None] + arms).reshape(-1, 3)
+    b, g, h = (part.reshape(*arms.shape[:2], *part.shape[1:]) for part in tensors(field.derivatives(points, 3)))
+    dipoles, charges = np.einsum("nij,kj->nki", axes, sources.moments), sources.charges[:, None]
+    arm, end = _crossing(arms[:, :count]), _crossing(arms[:, count:])
+    bend = np.einsum("nki,nkijl->nkjl", dipoles, h[:, :count])  # (m·∇)∇B
+    pull = np.einsum("nki,nkij->nkj", dipoles, g[:, :count])
+    pole, flux, tug = _crossing(dipoles), _crossing(b[:, :count]), _crossing(pull)
+    by_turn = -(g[:, :count] @ pole + bend @ arm)
+    push, stiff = charges * b[:, count:], charges[..., None] * g[:, count:]
+    force = pull.sum(axis=1) + push.sum(axis=1)
+    torque = np.sum(np.cross(dipoles, b[:, :count]) + np.cross(arms[:, :count], pull), axis=1)
+    torque += np.cross(arms[:, count:], push).sum(axis=1)
+    slopes = np.zeros((len(position), 6, 6))
+    slopes[:, :3, :3] = bend.sum(axis=1) + stiff.sum(axis=1)
+    slopes[:, :3, 3:] = by_turn.sum(axis=1) - (stiff @ end).sum(axis=1)
+    slopes[:, 3:, :3] = np.sum(pole @ g[:, :count] + arm @ bend, axis=1) + (end @ stiff).sum(axis=1)
+    turned = flux @ pole - pole @ g[:, :count] @ arm + tug @ arm + arm @ by_turn
+    slopes[:, 3:, 3:] = turned.sum(axis=1) + np.sum(_crossing(push) @ end - end @ stiff @ end, axis=1)
+    return np.concatenate([force, torque], axis=1), slopes
+
+
+def _crossing(vectors: Array) -> Array:
+    """(..., 3, 3) matrices of v × for vectors (..., 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast, runtime_checkable
 
 import heyoka as hy
 import numpy as np
@@ -55,6 +55,14 @@ class FieldFormula(Protocol):
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
+
+
+@runtime_checkable
+class DerivedField(Protocol):
+    """A field that knows its derivatives by place."""
+
+    def derivatives(self, points: Array, order: int) -> Array:
+        """See `RotorTable.derivatives`."""
 
 
 # Doubts that are what a model leaves out, with its sign, and no mere size of an error

@@ -1,4 +1,4 @@
-"""The scene in SI units: floater, plate, drag, start, and the whole."""
+"""The scene in SI units: plate, drag, start, and the whole."""
 
 from __future__ import annotations
 
@@ -11,115 +11,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..common import MU_0, Array, InputError, frozen_array, html_table, listed, millimetres
-from ..magnets import Magnet, polarizability
+from ..common import Array, frozen_array, html_table, listed, millimetres
+from ..magnets import Magnet
 from ..rotor import Conductor
-from ..shapes import Box, Cylinder, Sphere
-from ..solids import Part, Solid, moved
-
-
-@dataclass(frozen=True)
-class Floater:
-    """The floating magnet; a sphere, rigidly magnetised, is exactly a dipole, seen and seeing.
-
-    Parameters
-    ----------
-    radius : of the sphere, or of the smallest one about another body's centre that holds it, m
-    remanence : remanent polarisation, T
-    recoil_permeability : μr
-    density : kg/m³
-    conductivity : S/m, or None where its own eddy currents are not modelled
-    body : its shape about the origin where it is no sphere; it is polarised along its z
-    """
-
-    radius: float
-    remanence: float
-    recoil_permeability: float
-    density: float
-    conductivity: float | None = None
-    body: Box | Cylinder | None = None
-
-    @property
-    def shape(self) -> str:
-        """ "sphere", "cuboid" or "cylinder"."""
-        return self.solid.kind
-
-    @cached_property
-    def solid(self) -> Box | Cylinder | Sphere:
-        """Its body about the origin."""
-        return self.body or Sphere(self.radius)
-
-    @property
-    def inner_radius(self) -> float:
-        """Radius of the largest sphere about its centre that it holds, m."""
-        return float(self.solid.half_edges.min())
-
-    @property
-    def volume(self) -> float:
-        """Volume, m³."""
-        return self.solid.volume
-
-    @property
-    def mass(self) -> float:
-        """Mass, kg."""
-        return self.density * self.volume
-
-    @property
-    def principal_inertia(self) -> Array:
-        """(3,) moments of inertia about its axes, kg m²."""
-        divisor = {"sphere": [20, 20, 20], "cuboid": [12, 12, 12], "cylinder": [16, 16, 12]}[self.shape]
-        square = self.solid.size**2 / np.array(divisor)
-        return np.asarray(self.mass * (square.sum() - square))
-
-    @property
-    def inertia(self) -> float:
-        """Moment of inertia about an axis across the magnetic moment, kg m²."""
-        return float(self.principal_inertia[0])
-
-    @property
-    def spin_ratio(self) -> float:
-        """Moment of inertia about the magnetic moment over that across it."""
-        return float(self.principal_inertia[2]) / self.inertia
-
-    @property
-    def moment(self) -> float:
-        """Magnetic moment of the free body, A m²: (Br V/μ0) 3/(μr + 2) of a sphere, Br V/μ0 of another."""
-        factor = 3 / (self.recoil_permeability + 2) if self.body is None else 1.0
-        return self.remanence * self.volume / MU_0 * factor
-
-    @property
-    def polarizability(self) -> float:
-        """Moment that a uniform field of 1 T induces in a sphere of its volume, A m²."""
-        return polarizability(self.volume, self.recoil_permeability)
-
-    def axes(self, moment: Array) -> Array:
-        """(3, 3) body axes as columns where the moment points along (3,); turned about it as little as can be."""
-        across = np.eye(3)[int(np.argmin(np.abs(moment)))] if abs(moment[0]) > 0.99 else np.eye(3)[0]
-        first = across - (across @ moment) * moment / (moment @ moment)
-        first /= np.linalg.norm(first)
-        return np.stack([first, np.cross(moment, first), moment], axis=1)
-
-    def placed(self, position: Array, moment: Array) -> Box | Cylinder | Sphere:
-        """Its body with its centre at (3,) m and its moment along a unit vector (3,)."""
-        turn = np.eye(3) if self.body is None else self.axes(moment)
-        return moved(self.solid, position, turn)  # type: ignore[return-value]
-
-    def magnet(self, position: Array, moment: Array) -> Magnet:
-        """It as a magnet in its place."""
-        body = self.placed(position, moment)
-        return Magnet(body, self.remanence * (body.rotation.T @ moment), self.recoil_permeability)
-
-    def must_be(self, *shapes: str, where: str, instead: str) -> None:
-        """Raises InputError for a floater of another shape than `where` needs; `instead` is a way out."""
-        if self.shape not in shapes:
-            rule = " or ".join(f'"{shape}"' for shape in shapes)
-            raise InputError(f'Input floater.shape must be {rule} {where}; instead received "{self.shape}". {instead}')
-
-    def __repr__(self) -> str:
-        size = f"Ø {self.radius * 2e3:.4g} mm" if self.body is None else f"{self.shape} {self.body.described_size}"
-        text = f"Floater {size}, {self.mass * 1e3:.4g} g, {self.moment:.4g} A m², μr {self.recoil_permeability:g}"
-        return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"
-
+from ..shapes import Box
+from ..solids import Part, Solid
+from .floater import Floater
 
 AIR_VISCOSITY = 1.83e-5  # Dynamic viscosity of air at 20-25 °C, Pa s
 
@@ -182,7 +79,7 @@ class Drag:
     @classmethod
     def of(cls, floater: Floater) -> Self:
         """Stokes drag of a floater: that of the sphere of its volume."""
-        return cls.stokes(floater.radius if floater.body is None else float(np.cbrt(floater.volume * 0.75 / np.pi)))
+        return cls.stokes(floater.radius if floater.is_sphere else float(np.cbrt(floater.volume * 0.75 / np.pi)))
 
 
 @dataclass(frozen=True)
@@ -201,6 +98,7 @@ class AbsoluteStart:
     velocity: Array
     moment: Array
     spin: Array
+    body_x: Array | None = None  # direction near which x of the floater's keys lies; None: as `Floater.axes` has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +127,7 @@ class Scene:
     ----------
     frequency : turns of the rotor per second about +z, Hz; of one with a drive at t = 0
     rotor : magnets in the rotor's frame, which is the laboratory's at t = 0
-    floater : the sphere
+    floater : the floating magnet
     gravity : (3,) m/s², laboratory frame
     plate : conducting plate, or None
     drag : of the surrounding medium

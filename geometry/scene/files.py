@@ -365,7 +365,16 @@ def _magnet(magnet: Magnet) -> dict[str, Any]:
 
 
 def _floater(scene: Scene) -> dict[str, Any]:
-    return _said(schema.FloaterTable, scene.floater) | shape_keys(scene.floater.solid)
+    floater = scene.floater
+    given = {} if floater.moments_of_inertia is None else {"inertia_kg_m2": list(floater.moments_of_inertia)}
+    if not floater.pieces:
+        return _said(schema.FloaterTable, floater) | shape_keys(floater.bodies[0]) | given
+    magnets, bodies = list[dict[str, Any]](), list[dict[str, Any]]()
+    for part in floater.pieces:
+        keys = {**shape_keys(part.magnet.body), **pose_keys(part.magnet.body), "density_kg_m3": part.density}
+        bare = not (part.magnet.polarization.any() or part.magnet.contrast)
+        (bodies if bare else magnets).append(keys if bare else keys | _said(schema.FloaterMagnetTable, part.magnet))
+    return {"magnets": magnets, **({"bodies": bodies} if bodies else {}), **given}
 
 
 def _plate(scene: Scene) -> dict[str, Any] | None:

@@ -16,9 +16,10 @@ from ..files import regular_file
 from ..step_file import read_part
 from .contents import Scene
 from .messages import SceneError, described_faults, overlap_faults
-from .schema import OF_MAP, OF_PLATE, ExplicitRotor, SceneTable, key_faults
+from .schema import ExplicitRotor, SceneTable, key_faults
 
 LARGEST = 2**30  # Bytes of a file that a scene may name
+MAP = "rotor", -1  # the number of the map of the rotor's field among the files
 MOST_BODIES = 64  # Magnets and conductors of a scene beside a known one, unless that has more
 
 
@@ -51,10 +52,11 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         raise SceneError(source, faults)
     try:
         paths = _named_files(table, Path(source).parent if folder is None else folder, known)
-        field_map, of_bodies = paths.get(OF_MAP), {k: path for k, path in paths.items() if k != OF_MAP}
         read = {part.file: part for part in known.parts} if known else {}
+        of_bodies = {key: path for key, path in paths.items() if key != MAP}
         parts = {path: read.get(path) or read_part(path) for path in of_bodies.values()}
-        scene = table.scene({k: parts[path] for k, path in of_bodies.items()}, field_map)
+        field_map = paths.get(MAP)
+        scene = table.scene({key: parts[path] for key, path in of_bodies.items()}, field_map)
         files = {str(path): content_digest(path) for path in paths.values()} if known is None else dict(known.files)
     except InputError as error:  # a file
         raise SceneError(source, [str(error)]) from None
@@ -63,8 +65,9 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         raise SceneError(source, faults)
     own = copy.deepcopy(dict(keys))
     own["rotor"].update({"field_map": str(field_map)} if field_map else {})
-    for k, path in of_bodies.items():
-        (own["plate"] if k == OF_PLATE else own["rotor"]["magnets"][k])["file"] = str(path)
+    for (owner, k), path in of_bodies.items():
+        tables = own[owner].get("magnets", []) + (own[owner].get("bodies", []) if owner == "floater" else [])
+        (own[owner] if k < 0 else tables[k])["file"] = str(path)
     scene = replace(scene, files=tuple(files.items()), parts=tuple(parts.values()))
     return replace(scene, keys=(own, scene))
 
@@ -86,28 +89,31 @@ def _digest(path: Path, state: tuple[int, ...]) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _named_files(table: SceneTable, folder: Path, known: Scene | None) -> dict[int, Path]:
-    """The files that a scene names: of magnets by their number, of its map and plate by `OF_MAP` and `OF_PLATE`.
+def _named_files(table: SceneTable, folder: Path, known: Scene | None) -> dict[tuple[str, int], Path]:
+    """The files that a scene names: of the rotor's magnets and the floater's parts by their number, and the `MAP`.
 
-    Beside a known scene a name means one of its files, which is `folder / name` or ends so. No disk is asked.
+    Those of the plate and of the floater itself have the number -1. Beside a known scene a name means one of its files:
+    that which is `folder / name` or ends so. No disk is asked.
     """
-    rotor = table.rotor
-    names = {OF_MAP: rotor.field_map, OF_PLATE: table.plate.file if table.plate else None}
+    rotor, names = table.rotor, {MAP: table.rotor.field_map}
+    names |= {("plate", -1): table.plate.file if table.plate else None}
     if isinstance(rotor, ExplicitRotor):
-        names |= {k: magnet.file for k, magnet in enumerate(rotor.magnets)}
-    found = {k: folder / name for k, name in names.items() if name}
-    for k, path in found.items() if known else ():
+        names |= {("rotor", k): magnet.file for k, magnet in enumerate(rotor.magnets)}
+    names |= {("floater", k): name for k, name in table.floater.named.items()}
+    found = {key: folder / name for key, name in names.items() if name}
+    for key, path in found.items() if known else ():
         assert known is not None
-        name, own = str(names[k]), [known.field_map] if k == OF_MAP else [part.file for part in known.parts]
+        name, own = str(names[key]), [known.field_map] if key == MAP else [part.file for part in known.parts]
         end = Path(name).parts
         alike = [file for file in own if file and (file == path or file.parts[-len(end) :] == end)]
         if not alike:
-            key = {OF_MAP: "rotor.field_map", OF_PLATE: "plate.file"}.get(k, f"rotor.magnets[{k}].file")
+            owner, k = key
+            place = "field_map" if key == MAP else "file" if k < 0 else f"magnets[{k}].file"
             raise InputError(
-                f"Input {key} must be a file of the scene that was opened first; instead received "
+                f"Input {owner}.{place} must be a file of the scene that was opened first; instead received "
                 f"{shown(name)}. Give the scene to the command line."
             )
-        found[k] = path if path in alike else alike[0]
+        found[key] = path if path in alike else alike[0]
     return found
 
 

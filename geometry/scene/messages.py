@@ -131,6 +131,8 @@ def _allowed(place: Sequence[Any]) -> list[str]:
     """The keys allowed beside the one at a place of pydantic's."""
     if len(place) == 3 and place[:2] == ("rotor", "magnets"):
         return list(ExplicitRotor.model_fields)
+    if len(place) == 4 and place[:2] == ("floater", "magnets"):
+        return list(TABLES["floater.magnets"].model_fields)
     return list(TABLES[next((p for p in reversed(place[:-1]) if isinstance(p, str)), "")].model_fields)
 
 
@@ -179,7 +181,8 @@ def overlap_faults(scene: Scene) -> list[str]:
                 f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
             )
     if isinstance(start := scene.start, AbsoluteStart):
-        floater = scene.floater.placed(start.position, start.moment / np.linalg.norm(start.moment))
+        axes = scene.floater.axes(start.moment / np.linalg.norm(start.moment), start.body_x)
+        floater = scene.floater.placed(start.position, axes)
         obstacles = [(f"rotor {name}", body) for name, body in bodies]
         obstacles += [("the plate", scene.plate.body)] if scene.plate else []
         place = ", ".join(f"{c * 1e3:g}" for c in start.position)
@@ -187,6 +190,13 @@ def overlap_faults(scene: Scene) -> list[str]:
             f"Input start.position_mm must leave the floater clear of all bodies; instead received [{place}], where it "
             f"overlaps {name} by {depth * 1e3:.4g} mm."
             for name, body in obstacles
-            if (depth := body_overlap(body, floater)) > TOUCHING
+            if (depth := max(body_overlap(body, part) for part in floater)) > TOUCHING
         ]
+    parts = [(f"part {k}", part) for k, part in enumerate(scene.floater.bodies, 1)]
+    faults += [
+        f"Input floater must have magnets and bodies that do not overlap; instead {first} and {second} overlap by "
+        f"{depth * 1e3:.4g} mm; move them apart by as much."
+        for (first, one), (second, other) in combinations(parts, 2)
+        if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING
+    ]
     return faults

@@ -13,11 +13,11 @@ from ..magnets import Magnet
 from ..rotor import Conductor, Rotor, horizontal, tilt, vertical
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix
 from ..solids import Part, Solid, known_shape
-from .contents import AbsoluteStart, Drag, DriveStep, Floater, Lowering, MapReading, OffsetStart, Plate, Scene
+from .contents import AbsoluteStart, Drag, DriveStep, Lowering, MapReading, OffsetStart, Plate, Scene
+from .floater import Floater, FloaterPart
 
 MILLI = 1e-3
 ORIGIN = (0.0, 0.0, 0.0)
-OF_MAP, OF_PLATE = -1, -2  # Numbers of named files that are no magnet's
 
 
 def _zero_or(least: float) -> AfterValidator:
@@ -46,6 +46,7 @@ Remanence = Annotated[NotNegative, Field(le=100.0), _zero_or(1e-12)]
 Permeability = Annotated[Number, Field(ge=1.0, le=1e6)]
 Conductivity = Annotated[NotNegative, Field(le=1e9), _zero_or(1e-3)]
 Metal = Annotated[Number, Field(ge=1e-3, le=1e9)]
+Density = Annotated[Positive, Field(ge=1e-3, le=1e6)]
 Coercivity = Annotated[Positive, Field(ge=1e-6, le=1e5)]
 Brake = Annotated[NotNegative, Field(le=1e6), _zero_or(1e-30)]
 Speed = Annotated[Number, Field(ge=-1e9, le=1e9)]
@@ -207,22 +208,97 @@ def _rotor_kind(rotor: Any) -> str | None:
     return "magnets" if "magnets" in table else configuration if isinstance(configuration, str) else None
 
 
-class FloaterTable(Table):
-    """The floating magnet: a sphere, or a cuboid or cylinder that is polarised along the body's z."""
+class _FloaterPartTable(_Placed):
+    """A part of a floater, placed along the axes of the floater's keys."""
 
-    shape: Literal["sphere", "cuboid", "cylinder"] = "sphere"
+    shape: Literal["cuboid", "cylinder", "ring", "sphere"] = "cuboid"
+    inner_diameter_mm: Length | None = None
+    file: Name | None = None
+    density_kg_m3: Density
+
+    def body(self, part: Part | None) -> Solid:
+        """Its body, from a file where that is given."""
+        if part is None:
+            return solid_of(self)
+        turn = rotation_matrix(self.rotation_deg)
+        part = replace(part, center=MILLI * np.array(self.center_mm) - turn @ part.origin, rotation=turn)
+        return known_shape(part) or part
+
+
+class FloaterMagnetTable(_FloaterPartTable):
+    """A magnet of a floater; its polarisation is along the body's axes and turns with it."""
+
+    polarization_T: Annotated[Three[Polarization], _zero_or(1e-12)]
+    recoil_permeability: Permeability = RECOIL_PERMEABILITY
+
+
+class BallastTable(_FloaterPartTable):
+    """A part of a floater that is not magnetic."""
+
+
+class FloaterTable(Table):
+    """The floating magnet: one body that is polarised along its z, or a composite of magnets and ballast."""
+
+    shape: Literal["sphere", "cuboid", "cylinder", "ring", "file"] = "sphere"
     size_mm: Three[Length] | None = None
     diameter_mm: Length | None = None
     height_mm: Length | None = None
-    remanence_T: Remanence
-    recoil_permeability: Permeability = RECOIL_PERMEABILITY
-    density_kg_m3: Annotated[Positive, Field(ge=1e-3, le=1e6)]
+    inner_diameter_mm: Length | None = None
+    file: Name | None = None
+    remanence_T: Remanence | None = None
+    recoil_permeability: Permeability | None = None
+    density_kg_m3: Density | None = None
     conductivity_S_m: Conductivity | None = None
+    inertia_kg_m2: Three[Positive] | None = None
+    magnets: list[FloaterMagnetTable] = []
+    bodies: list[BallastTable] = []
 
-    def floater(self) -> Floater:
-        material = self.remanence_T, self.recoil_permeability, self.density_kg_m3, self.conductivity_S_m
-        body = solid_of(self)
-        return Floater(body.circumradius, *material, body if isinstance(body, Box | Cylinder) else None)
+    @property
+    def composite(self) -> bool:
+        """Whether its parts are given one by one."""
+        return bool(self.model_fields_set & {"magnets", "bodies"})
+
+    def floater(self, parts: Mapping[int, Part]) -> Floater:
+        """The floater, its `parts` from files by the numbers of `named`; -1 is its own file."""
+        permeability = self.recoil_permeability or RECOIL_PERMEABILITY
+        given = None if self.inertia_kg_m2 is None else tuple(self.inertia_kg_m2)
+        if self.composite:
+            pieces = [
+                FloaterPart(self._magnet(table, table.body(parts.get(k))), table.density_kg_m3)
+                for k, table in enumerate(self.tables)
+            ]
+            return Floater.composed(pieces, self.conductivity_S_m, given)  # type: ignore[arg-type]
+        assert self.remanence_T is not None
+        assert self.density_kg_m3 is not None
+        if self.shape == "file":
+            body = known_shape(parts[-1]) or parts[-1]
+            polarization = body.rotation.T @ np.array([0.0, 0.0, self.remanence_T])
+            piece = FloaterPart(Magnet(body, polarization, permeability), self.density_kg_m3)
+            return Floater.composed([piece], self.conductivity_S_m, given)  # type: ignore[arg-type]
+        shape = solid_of(self)
+        material = self.remanence_T, permeability, self.density_kg_m3, self.conductivity_S_m
+        own = None if isinstance(shape, Sphere | Part) else shape
+        return Floater(shape.circumradius, *material, own, moments_of_inertia=given)  # type: ignore[arg-type]
+
+    @property
+    def tables(self) -> list[FloaterMagnetTable | BallastTable]:
+        """Its magnets, then its ballast."""
+        return [*self.magnets, *self.bodies]
+
+    @property
+    def named(self) -> dict[int, str]:
+        """The files that its parts name, by their numbers in `tables`; its own by -1."""
+        files = {-1: self.file} | {k: table.file for k, table in enumerate(self.tables)}
+        return {k: file for k, file in files.items() if file}
+
+    @staticmethod
+    def _magnet(table: FloaterMagnetTable | BallastTable, body: Solid) -> Magnet:
+        if isinstance(table, BallastTable):
+            return Magnet(body, np.zeros(3))
+        polarization = np.array(table.polarization_T)
+        if table.file:  # its axes may be those of a known shape
+            polarization = body.rotation.T @ rotation_matrix(table.rotation_deg) @ polarization
+        return Magnet(body, polarization, table.recoil_permeability)
 
 
 class LoweringTable(Table):
@@ -272,6 +348,7 @@ class StartTable(Table):
     velocity_mm_s: Three[Speed] | None = None
     moment: Three[Number] | None = None
     spin_hz: Three[Coordinate] | None = None
+    body_x: Three[Number] | None = None
 
     def start(self) -> OffsetStart | AbsoluteStart:
         if self.position_mm is None:
@@ -284,6 +361,7 @@ class StartTable(Table):
             velocity=MILLI * np.array(self.velocity_mm_s or ORIGIN),
             moment=moment / np.linalg.norm(moment),
             spin=2 * np.pi * np.array(self.spin_hz or ORIGIN),
+            body_x=None if self.body_x is None else np.array(self.body_x) / np.linalg.norm(self.body_x),
         )
 
 
@@ -317,15 +395,18 @@ class SceneTable(Table):
     start: StartTable | None = None
     drive: list[DriveTable] | None = None
 
-    def scene(self, parts: Mapping[int, Part], field_map: Path | None) -> Scene:
-        """The scene in SI units, its `parts` by the numbers of their magnets, the plate's by `OF_PLATE`."""
-        rotor, floater = self.rotor, self.floater.floater()
+    def scene(self, parts: Mapping[tuple[str, int], Part], field_map: Path | None) -> Scene:
+        """The scene in SI units; `parts` by their tables' names and numbers, -1 that of a table in no list."""
+        of_rotor, of_floater = (
+            {k: part for (owner, k), part in parts.items() if owner == whose} for whose in ("rotor", "floater")
+        )
+        rotor, floater = self.rotor, self.floater.floater(of_floater)
         return Scene(
             frequency=self.frequency_hz,
             gravity=np.array(self.gravity_m_s2),
-            rotor=rotor.in_si(parts),
+            rotor=rotor.in_si(of_rotor),
             floater=floater,
-            plate=self.plate.plate(parts.get(OF_PLATE)) if self.plate else None,
+            plate=self.plate.plate(parts.get(("plate", -1))) if self.plate else None,
             drag=(self.drag or DragTable()).drag(floater),
             start=(self.start or StartTable()).start(),
             field_map=field_map,
@@ -344,6 +425,8 @@ TABLES: dict[str, type[Table]] = {
     "magnets": MagnetTable,
     "conductors": ConductorTable,
     "floater": FloaterTable,
+    "floater.magnets": FloaterMagnetTable,
+    "bodies": BallastTable,
     "plate": PlateTable,
     "lowering": LoweringTable,
     "drag": DragTable,
@@ -376,14 +459,15 @@ def key_faults(table: SceneTable) -> list[str]:
             )
     for k, conductor in enumerate(rotor.conductors):
         faults += _shape_faults(f"rotor.conductors[{k}]", conductor)
-    faults += _shape_faults("floater", floater)
+    faults += _floater_faults(floater)
     faults += _shape_faults("plate", table.plate) if table.plate else []
-    if floater.shape != "sphere" and floater.conductivity_S_m is not None:
+    sphere = floater.shape == "sphere" and not floater.composite
+    if not sphere and floater.conductivity_S_m is not None:
         faults.append(
             "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
             f"known then; instead received {floater.conductivity_S_m:g}."
         )
-    if floater.shape != "sphere" and drag and drag.model == "air":
+    if not sphere and drag and drag.model == "air":
         faults.append(
             'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
             'sphere; instead received "air".'
@@ -402,15 +486,53 @@ def key_faults(table: SceneTable) -> list[str]:
     return faults
 
 
+def _floater_faults(floater: FloaterTable) -> list[str]:
+    """Faults of a floater's keys among themselves."""
+    single = [k for k in (*SIZE_KEYS, "file", "remanence_T", "recoil_permeability", "density_kg_m3")
+              if getattr(floater, k, None) is not None]  # fmt: skip
+    faults = []
+    if floater.composite:
+        if single or floater.shape != "sphere":
+            told = " and ".join([*([] if floater.shape == "sphere" else ["shape"]), *single])
+            faults.append(
+                "Input floater must have its sizes and materials in floater.magnets and floater.bodies alone where it "
+                f"has such; instead received {told} beside them."
+            )
+        if not floater.magnets:
+            faults.append("Input floater.magnets must have at least one magnet; instead there is ballast alone.")
+        for name, tables in (("magnets", floater.magnets), ("bodies", floater.bodies)):
+            for k, table in enumerate(tables):
+                faults += _shape_faults(f"floater.{name}[{k}]", table)
+    else:
+        faults += _shape_faults("floater", floater)
+        faults += [
+            f"Input floater.{key} must be given; instead it is missing."
+            for key in ("remanence_T", "density_kg_m3")
+            if key not in single
+        ]
+    if floater.inertia_kg_m2 is not None:
+        if floater.shape == "sphere" and not floater.composite:
+            faults.append("Input floater.inertia_kg_m2 must be left out of a sphere; instead it is given.")
+        low, middle, high = sorted(floater.inertia_kg_m2)
+        if high > (low + middle) * (1 + 1e-9):
+            faults.append(
+                "Input floater.inertia_kg_m2 must be moments of inertia, of which none is larger than the other two "
+                f"together; instead received {high:g} beside {low:g} and {middle:g}."
+            )
+    return faults
+
+
 def _start_faults(start: StartTable) -> list[str]:
     faults = []
     if start.offset_mm is not None and start.position_mm is not None:
         faults.append("Input start must have offset_mm or position_mm; instead received both.")
     if start.position_mm is None:
-        alone = [key for key in ("velocity_mm_s", "moment", "spin_hz") if getattr(start, key) is not None]
+        alone = [key for key in ("velocity_mm_s", "moment", "spin_hz", "body_x") if getattr(start, key) is not None]
         faults += [f"Input start.{key} must come with start.position_mm; instead received it alone." for key in alone]
-    if start.moment is not None and not any(start.moment):
-        faults.append(f"Input start.moment must be a direction, not zero; instead received {start.moment}.")
+    for key in ("moment", "body_x"):
+        given = getattr(start, key)
+        if given is not None and not any(given):
+            faults.append(f"Input start.{key} must be a direction, not zero; instead received {given}.")
     return faults
 
 
@@ -420,6 +542,8 @@ def _shape_faults(place: str, table: Any) -> list[str]:
     file = getattr(table, "file", None)
     if table.shape == "file" and not file:
         return [f"Input {place}.file must be given, as the shape is 'file'; instead it is missing."]
+    if place == "floater" and file and table.shape != "file":
+        return ["Input floater.file must be left out, or shape be 'file'; instead it is given."]
     if file:
         if table.shape not in ("cuboid", "file"):
             return [f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."]

@@ -16,7 +16,8 @@ from ...dynamics.motion.rates import Rates
 from ...geometry.common import MAGNET_CONDUCTIVITY, Array
 from ...geometry.magnets import Magnet
 from ...geometry.rotor import horizontal, tilt, vertical
-from ...geometry.scene.contents import Drag, Floater, Plate, Scene
+from ...geometry.scene.contents import Drag, Plate, Scene
+from ...geometry.scene.floater import Floater
 from ...geometry.shapes import Box
 from ..cli.options import FieldModel, InteractionModel, Models, PlateModel
 from ..levitation import Levitation

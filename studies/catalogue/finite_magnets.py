@@ -19,8 +19,9 @@ from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.state import Scales
 from ...fem.mutual.response import RotorResponse, element_ladder, two_body, two_body_ladder
 from ...geometry.common import Array
-from ...geometry.scene.contents import Floater, Scene
+from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import load_scene
+from ...geometry.scene.floater import Floater
 from ..cli.options import Models, shipped_scene
 from ..figures.style import PALETTE, panels
 from ..levitation import Levitation

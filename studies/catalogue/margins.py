@@ -29,7 +29,8 @@ from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.events import rotor_gap
 from ...dynamics.motion.state import Scales
 from ...geometry.common import Array
-from ...geometry.scene.contents import Floater, Scene
+from ...geometry.scene.contents import Scene
+from ...geometry.scene.floater import Floater
 from ..cli.console import note
 from ..cli.options import FieldModel
 from ..figures.style import PALETTE, plain_log

@@ -205,5 +205,7 @@ def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
     if (plate := scene.plate) is not None and plate.lowering is not None:
         down = np.array([0.0, 0.0, float(plate.lowering.depth(result["time"].values[-1]))])
         scene = replace(scene, plate=replace(plate, body=moved(plate.body, plate.body.center - down), lowering=None))
-    laboratory = State(*(result[name].values for name in ("position", "velocity", "moment", "spin")))
+    vectors = (result[name].values for name in ("position", "velocity", "moment", "spin"))
+    axes = result["body_axes"].values if "body_axes" in result else None
+    laboratory = replace(State(*vectors), axes=axes)
     return scene, laboratory.to_rotor(scene.angle(result["time"].values))

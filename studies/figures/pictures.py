@@ -48,7 +48,8 @@ def seen_from(scene: Scene, time: Array, motion: State) -> View:
         last -= int(np.argmax(np.cos(angle[:-LATEST:-1])))
     seconds = PATH / scene.frequency if scene.frequency else np.inf
     path = motion.position[(time <= time[last]) & (time >= time[last] - seconds)]  # all of it would be a solid band
-    return View(scene, motion.position[last], motion.moment[last], path, frame=frame)
+    axes = None if motion.axes is None else motion.axes[last]
+    return View(scene, motion.position[last], motion.moment[last], path, frame=frame, axes=axes)
 
 
 def drawn_field(scene: Scene, table: FieldTable) -> Callable[[Array], Array]:
@@ -75,9 +76,11 @@ def flight_frames(scene: Scene, time: Array, motion: State) -> Frames:
         np.stack([np.interp(instants, time, component) for component in vectors.T], axis=-1)
         for vectors in (motion.position, motion.moment)
     )
-    standing = State(position, np.zeros_like(position), moment, np.zeros_like(moment))
+    nearest = np.searchsorted(time, instants).clip(max=len(time) - 1)  # a turn is no sum of turns
+    axes = None if motion.axes is None else motion.axes[nearest]
+    standing = State(position, np.zeros_like(position), moment, np.zeros_like(moment), axes)
     laboratory = standing.to_lab(scene.angle(instants))
-    return Frames(scene, instants, laboratory.position, laboratory.moment)
+    return Frames(scene, instants, laboratory.position, laboratory.moment, laboratory.axes)
 
 
 def plate_currents(scene: Scene, plate: Plate, table: RotorTable, floater: State, points: Array) -> Array:

@@ -57,7 +57,9 @@ def scene_figure(scene: Scene) -> Figure:
     where = np.array([0.0, 0.0, lowest - 2 * scene.floater.radius])
     if isinstance(start := scene.start, AbsoluteStart):
         name, where, moment = "floater, at its start", start.position, start.moment
-    bodies: list[tuple[Solid, str, str]] = [(scene.floater.placed(where, moment), PALETTE[1], name)]
+    orientation = scene.floater.axes(moment, start.body_x if isinstance(start, AbsoluteStart) else None)
+    parts = scene.floater.placed(where, orientation)
+    bodies: list[tuple[Solid, str, str]] = [(part, PALETTE[1], name) for part in parts]
     bodies += [(magnet.body, PALETTE[0], "magnet") for magnet in scene.rotor]
     bodies += [(part.body, "0.5", "conductor of the rotor") for part in scene.conductors]
     reach = max(float(np.abs(1e3 * triangles(body)[0]).max()) for body, _, _ in bodies)

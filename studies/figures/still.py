@@ -17,7 +17,7 @@ from vtkmodules.vtkCommonCore import vtkLogger
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ...geometry.shapes import Box, Sphere, rotation_matrix
+from ...geometry.shapes import Box, rotation_matrix
 from ...geometry.solids import Solid
 from .view import FINE, SEEN, Currents, Frames, View, arrow, near_plate, triangles
 
@@ -69,7 +69,7 @@ def flight_animation(frames: Frames) -> Iterator[float | bytes]:
     plotter, file = new_plotter((800, 640)), io.BytesIO()
     magnets = _add_rotor(plotter, frames.scene)
     add_plate(plotter, frames.scene)
-    floater = add_floater(plotter, frames.scene, frames.position[0], frames.moment[0])
+    floater = _add_frame(plotter, frames, 0)
     _look(plotter, frames.scene)
     gif: Any = imageio.get_writer(file, format="GIF", mode="I", loop=0, duration=1000 / PER_SECOND)
     with gif:
@@ -80,7 +80,7 @@ def flight_animation(frames: Frames) -> Iterator[float | bytes]:
                 actor.user_matrix = pose
             for actor in floater:
                 plotter.remove_actor(actor, render=False)
-            floater = add_floater(plotter, frames.scene, frames.position[number], frames.moment[number])
+            floater = _add_frame(plotter, frames, number)
             plotter.add_text(f"t = {instant:.4f} s", color="black", font_size=10, name="time")
             gif.append_data(plotter.screenshot(return_img=True))
             yield (number + 1) / len(frames.time)
@@ -135,12 +135,22 @@ def new_plotter(size: tuple[int, int] = (1400, 1100)) -> pv.Plotter:
     return plotter
 
 
-def add_floater(plotter: pv.Plotter, scene: Scene, position: Array, moment: Array) -> list[pv.Actor]:
-    """Draw the floater's body and its moment; positions m."""
+def _add_frame(plotter: pv.Plotter, frames: Frames, k: int) -> list[pv.Actor]:
+    axes = None if frames.axes is None else frames.axes[k]
+    return add_floater(plotter, frames.scene, frames.position[k], frames.moment[k], axes)
+
+
+def add_floater(
+    plotter: pv.Plotter, scene: Scene, position: Array, moment: Array, axes: Array | None = None
+) -> list[pv.Actor]:
+    """Draw the floater's body, turned as its `axes` or else its moment say, and its moment; positions m."""
     floater = scene.floater
     direction = moment / (np.linalg.norm(moment) or 1.0)
-    body = Sphere(floater.radius, position) if floater.body is None else floater.placed(position, direction)
-    drawn = _add_body(plotter, body, METAL, opacity=0.45, specular=0.6)
+    drawn = [
+        actor
+        for part in floater.placed(position, direction if axes is None else axes)
+        for actor in _add_body(plotter, part, METAL, opacity=0.45, specular=0.6)
+    ]
     return [*drawn, *_add_arrow(plotter, 1e3 * position, moment, 1e3 * floater.radius)]
 
 
@@ -170,7 +180,7 @@ def _add_bodies(plotter: pv.Plotter, view: View) -> bool:
     scene, path = view.scene, 1e3 * view.path
     _add_rotor(plotter, scene)
     add_plate(plotter, scene, view.currents)
-    add_floater(plotter, scene, view.position, view.moment)
+    add_floater(plotter, scene, view.position, view.moment, view.axes)
     if scene.frequency:
         _add_turning(plotter, scene, -1.5e3 * float(view.position[2]))
     seen = len(path) > 1 and float(np.ptp(path, axis=0).max()) > SHORTEST * 1e3 * scene.floater.radius

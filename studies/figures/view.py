@@ -63,6 +63,7 @@ class View:
     lines: Sequence[Array] = ()  # of the field, (n, 3) m each
     currents: Currents | None = None  # in the plate
     frame: str = "rotor's frame"  # or "laboratory" where the floater does not turn with the rotor
+    axes: Array | None = None  # (3, 3) of the floater where it is not round about its moment
     turnable: bool = False  # whether it is for a page that lets its reader turn it
 
     def draw(self) -> Iterator[bytes]:
@@ -80,6 +81,7 @@ class Frames:
     time: Array
     position: Array
     moment: Array
+    axes: Array | None = None  # (n, 3, 3) of the floater where it is not round about its moment
 
     def draw(self) -> Iterator[float | bytes]:
         """The finished part after each frame, and last a GIF."""

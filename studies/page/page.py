@@ -300,7 +300,7 @@ def scene_bodies(scene: Scene, lines: Sequence[Array]) -> dict[str, Any]:
     found: dict[str, Any] = {
         "turning": turning,
         "arrows": np.round(1e3 * np.reshape(arrows, (-1, 2, 3)), 3),
-        "floater": [] if scene.floater.body is None else [_mesh(triangles(scene.floater.solid), BALL)],
+        "floater": [] if scene.floater.is_sphere else [_mesh(triangles(body), BALL) for body in scene.floater.bodies],
         "fixed": [],
         "lines": [np.round(1e3 * line, 2) for line in lines],
         "radius": 1e3 * scene.floater.radius,

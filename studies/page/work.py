@@ -151,7 +151,7 @@ def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -
 def _survey_near(levitation: Levitation, near: Sequence[Any]) -> Survey | None:
     """What becomes of equilibria of a scene nearby; None where one of them is lost, or is no fixed point."""
     scene, scales = levitation.scene, Scales.of(levitation.scene)
-    if not near or scene.floater.body is not None or np.any(scene.gravity[:2]):
+    if not near or not scene.floater.is_sphere or np.any(scene.gravity[:2]):
         return None
     check_turning(scene)
     balance = Balance(

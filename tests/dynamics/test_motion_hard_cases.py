@@ -20,7 +20,8 @@ from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import rotor
-from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Floater, OffsetStart, Plate, Scene
+from spinlev.geometry.scene.contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
+from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box
 
 SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, NO_DRAG, start=OffsetStart(np.zeros(3)))

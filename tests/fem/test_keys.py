@@ -21,7 +21,8 @@ from spinlev.fem.rotor.table import ROTOR
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.rotor import Conductor, horizontal
-from spinlev.geometry.scene.contents import Drag, Floater, Lowering, MapReading, Plate, Scene
+from spinlev.geometry.scene.contents import Drag, Lowering, MapReading, Plate, Scene
+from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring
 from spinlev.geometry.step_file import read_part
 

@@ -21,7 +21,7 @@ from spinlev.fem.harmonics.interior import (
 from spinlev.fem.harmonics.solid import derivative, outer_sums
 from spinlev.fem.mutual.response import Wrench, closed_dipoles
 from spinlev.geometry.common import Array
-from spinlev.geometry.scene.contents import Floater
+from spinlev.geometry.scene.floater import Floater
 
 
 def solve_both_bodies(

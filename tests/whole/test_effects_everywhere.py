@@ -48,6 +48,9 @@ EFFECTS = {
     "a floater that is no sphere": (
         BASE, BASE.replace("diameter_mm", 'shape = "cylinder"\nheight_mm = 11.0\ndiameter_mm'), DIPOLE, "rigid",
     ),
+    "a floater that is not round": (
+        BASE, BASE.replace("diameter_mm = 12.7", 'shape = "cuboid"\nsize_mm = [10.0, 10.0, 10.0]'), DIPOLE, "rigid",
+    ),
 }  # fmt: skip
 
 
@@ -95,7 +98,8 @@ def live_motion(text, asked):
 
 USES = (equilibria, modes, trajectory, ensemble, sweep, live_motion)
 REFUSED = {
-    ("a floater that is no sphere", "ensemble"): "many fly side by side",
+    (name, "ensemble"): "many are simulated as one batch"
+    for name in ("a floater that is no sphere", "a floater that is not round")
 }
 """What is refused in a sentence; all else answers, and otherwise than without the effect, but for what is left out."""
 LEFT_OUT = {("eddy currents in a plate", "ensemble")}

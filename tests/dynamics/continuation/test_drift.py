@@ -15,7 +15,8 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales, State
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import rotor
-from spinlev.geometry.scene.contents import AIR_VISCOSITY, Drag, Floater, Scene
+from spinlev.geometry.scene.contents import AIR_VISCOSITY, Drag, Scene
+from spinlev.geometry.scene.floater import Floater
 
 RADIUS, SIGMA = 6.35e-3, 6.7e5
 FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0, SIGMA)

@@ -12,7 +12,8 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import rotor
-from spinlev.geometry.scene.contents import Drag, Floater, Scene
+from spinlev.geometry.scene.contents import Drag, Scene
+from spinlev.geometry.scene.floater import Floater
 
 SCENE = Scene(
     75.0,

@@ -22,7 +22,8 @@ from spinlev.dynamics.flights.trajectory import FlightStopped
 from spinlev.dynamics.motion.events import clearance
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable
-from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Floater, Lowering, Plate
+from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Lowering, Plate
+from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box
 
 NEUTRAL = Floater(RADIUS, 0.0, 1.0, 7500.0)

@@ -12,7 +12,8 @@ from spinlev.dynamics.flights.live import LiveFlight
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.common import InputError
-from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Floater, Scene
+from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Scene
+from spinlev.geometry.scene.floater import Floater
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 

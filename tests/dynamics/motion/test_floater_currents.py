@@ -20,7 +20,8 @@ from spinlev.fem.rotor.table import RotorTable
 from spinlev.fem.rotor_metal import CUBE, ball_losses
 from spinlev.geometry.common import MU_0, InputError
 from spinlev.geometry.rotor import horizontal
-from spinlev.geometry.scene.contents import Drag, Floater, Scene
+from spinlev.geometry.scene.contents import Drag, Scene
+from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box
 
 FLOATER = Floater(radius=6.35e-3, remanence=1.305, recoil_permeability=1.0, density=7500.0, conductivity=6.7e5)

@@ -14,7 +14,8 @@ from spinlev.fem.mutual.table import MutualTable, ResponseGrid, response_box
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.rotor import horizontal, tilt, vertical
-from spinlev.geometry.scene.contents import Drag, Floater, Scene
+from spinlev.geometry.scene.contents import Drag, Scene
+from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Cylinder
 
 ROTORS = [

@@ -10,7 +10,7 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.floater import FloaterSources, _charges, floater_sources, force_and_torque
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.scene.contents import Floater
+from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box, Cylinder
 
 CUBE = Magnet(Box((0.01,) * 3, (2e-3, 0.0, 0.0)), (1.3, 0.0, 0.0))
@@ -121,7 +121,7 @@ def test_a_permeable_floater_pulls_the_rotor_as_the_rotor_pulls_it(body):
     held = floater(body, 1.05)
     place, turn = PLACES[0], turned(1)[0]
     force, _ = force_and_torque(floater_sources(held), rotor_table((CUBE,), "cuboid"), place[None], turn[None])
-    field = rotor_table((held.magnet(np.zeros(3), np.array([0.0, 0.0, 1.0])),), "fem", 5e-6, 4e-3)
+    field = rotor_table((held.parts[0].magnet,), "fem", 5e-6, 4e-3)
     cube = Floater(CUBE.body.circumradius, 1.3, 1.0, 7500.0, None, Box((0.01,) * 3))
     # the cube, polarised along its z, as seen from the floater's axes
     axes = turn.T @ np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -12,8 +12,9 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.response import element_ladder
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry.scene.contents import Drag, Floater, Scene
+from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.files import load_scene
+from spinlev.geometry.scene.floater import Floater
 from spinlev.studies.catalogue.finite_magnets import (
     LEVELS,
     floater_figure,

@@ -1,0 +1,129 @@
+"""Study: between which frequencies a floater levitates by its shape, from a flat disc to a long rod, and as a cube.
+
+All have the volume and the material of the article's sphere and are polarised along their axis. The limits are those of
+the mean over turns about the moment, which of discs and rods is the body itself: the fold, and the first growing mode
+without losses. Closed form of μr = 1 for the rotor, force and torque on dipoles all over the floater.
+"""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ...dynamics.continuation.frequencies import levitating_ranges
+from ...dynamics.equilibria.equilibrium import EquilibriumError
+from ...geometry.scene.floater import Floater
+from ...geometry.shapes import Box, Cylinder
+from ..figures.style import PALETTE
+from ..result import Columns
+from ..study import Point, Study, each_case, recorded
+from . import article, showing
+
+ASPECTS = (1 / 4, 1 / 3, 1 / 2, 2 / 3, 3**0.5 / 2, 1.0, 1.5, 2.0, 3.0, 4.0)  # height over diameter
+QUICK = (1 / 2, 1.0, 2.0)
+CUBE, SPHERE = "cube", "sphere"
+COLUMNS: Columns = {
+    "low": ((), "Hz", "lowest stable frequency"),
+    "high": ((), "Hz", "highest stable frequency"),
+    "low_kind": ((), "", "what ends stable levitation below"),
+    "high_kind": ((), "", "what ends stable levitation above"),
+    "distance": ((), "m", "levitation distance at the lowest stable frequency"),
+    "nearest": ((), "m", "levitation distance at the highest"),
+    "shape": ((), "", "shape of the floater"),
+    "aspect": ((), "1", "its height over its diameter"),
+}
+
+
+def shape_points(quick: bool) -> list[Point]:
+    """Cylinders of all aspects, the cube and the sphere, for one rotor of each configuration; `quick` one rotor."""
+    rotors = article.levitated_rotors(True)[: 1 if quick else None]
+    aspects = [("cylinder", float(aspect)) for aspect in (QUICK if quick else ASPECTS)]
+    shapes = [*aspects, (CUBE, 1.0), (SPHERE, 1.0)]
+    return [{**rotor, "shape": shape, "aspect": aspect} for rotor in rotors for shape, aspect in shapes]
+
+
+def floater_of(shape: str, aspect: float) -> Floater:
+    """A floater of the article's volume and material, of μr = 1: a cylinder of an aspect, a cube or a sphere."""
+    ball = article.FLOATER
+    material = ball.remanence, 1.0, ball.density
+    if shape == SPHERE:
+        return Floater(ball.radius, *material)
+    if shape == CUBE:
+        edges = np.full(3, np.cbrt(ball.volume))
+        return Floater(float(np.linalg.norm(edges) / 2), *material, body=Box(edges)).averaged
+    radius = float(np.cbrt(ball.volume / (2 * np.pi * aspect)))
+    body = Cylinder(radius, 2 * radius * aspect)
+    return Floater(body.circumradius, *material, body=body).averaged
+
+
+def limits(point: Point) -> xr.Dataset:
+    """The widest range of stable frequencies of a point."""
+    of = point["shape"], point["aspect"]
+    floater = floater_of(*of)
+    scene = article.rotor_scene(point["configuration"], point["measure"], permeability=1.0, drag=False, floater=floater)
+    levitation = article.levitation_of(scene, "cuboid")
+    try:
+        found = levitating_ranges(scene, levitation.table, levitation.rates)
+    except EquilibriumError:
+        found = []
+    if not found:
+        return recorded(point, COLUMNS, (np.nan, np.nan, "none", "none", np.nan, np.nan, *of), {})
+    widest = max(found, key=lambda run: run.high.parameter - run.low.parameter)
+    ends = widest.low, widest.high
+    numbers = [end.parameter for end in ends], [end.kind for end in ends], [-end.position[2] for end in ends]
+    return recorded(point, COLUMNS, (*(value for pair in numbers for value in pair), *of), {})
+
+
+@showing.drawn
+def shape_figure(result: xr.Dataset) -> Figure:
+    """Range of stable frequencies against the aspect of the floater, one panel for each rotor."""
+    rotors = dict(showing.by_rotor(result))
+    words = "height / diameter of the floater", "frequency (Hz)"
+    figure, rows = showing.small_multiples(rotors, 2.6, 3, *words)
+    for panel, rotor in rows:
+        parts = {shape: rotor.isel(case=rotor["shape"].values == shape) for shape in ("cylinder", CUBE, SPHERE)}
+        round_ones = parts["cylinder"].sortby("aspect")
+        low, high, aspect = (round_ones[name].values for name in ("low", "high", "aspect"))
+        panel.fill_between(aspect, low, high, color=PALETTE[0], alpha=0.2, lw=0, label="stable: discs and rods")
+        for end in (low, high):
+            panel.plot(aspect, end, "o-", color=PALETTE[0], ms=3, lw=1)
+        for shape, marker, color in ((CUBE, "s", PALETTE[1]), (SPHERE, "o", "k")):
+            one = parts[shape]
+            ends = [float(one[name].values[0]) for name in ("low", "high")]
+            where = [1.0, 1.0] if shape == SPHERE else [1.12, 1.12]
+            panel.plot(where, ends, marker + "-", color=color, mfc="white", ms=5, lw=1, label=f"stable: {shape}")
+        panel.set_xscale("log")
+        panel.set_xticks([0.25, 0.5, 1, 2, 4], ["1:4", "1:2", "1:1", "2:1", "4:1"])
+        panel.minorticks_off()
+    return figure
+
+
+def shape_lines(result: xr.Dataset) -> list[str]:
+    rows = []
+    for label, rotor in showing.by_rotor(result):
+        for one in each_case(rotor):
+            low, high, near, far = (float(one[name]) for name in ("low", "high", "nearest", "distance"))
+            shape, aspect = one["shape"].item(), float(one["aspect"])
+            name = shape if shape != "cylinder" else f"cylinder {aspect:.2f} : 1"
+            told = "none" if np.isnan(low) else f"{low:.1f} to {high:.1f}"
+            between = "" if np.isnan(low) else f"{1e3 * far:.1f} to {1e3 * near:.1f}"
+            rows.append((label, name, told, between, f"{one['low_kind'].item()}, {one['high_kind'].item()}"))
+    return showing.text_table(("rotor", "floater", "stable (Hz)", "distance (mm)", "ends"), rows)
+
+
+def shape_numbers(result: xr.Dataset) -> dict[str, Any]:
+    """The limits by rotor and shape as numbers: `limits`."""
+    names = {"configuration": "configuration", "value": "measure", "shape": "shape", "aspect": "aspect"}
+    return {"limits": showing.records(result, names | {"low_hz": "low", "high_hz": "high"})}
+
+
+STUDY = Study(
+    name="floater-shape",
+    summary="limits of stable frequency by the floater's shape at equal volume: discs, rods, a cube and a sphere",
+    points=shape_points,
+    compute=limits,
+    figures={"floater-shape": shape_figure},
+    report=shape_lines,
+    numbers=shape_numbers,
+)

@@ -1,0 +1,225 @@
+"""Bodies that are not round: free and heavy tops by elliptic functions, energy, spheres as such bodies, contact."""
+
+from dataclasses import replace
+
+import heyoka as hy
+import numpy as np
+import pytest
+from article import NO_DRAG, SCENE
+from scipy.special import ellipj, ellipk
+
+from spinlev.dynamics.equilibria.equilibrium import AVERAGED, LOCKED
+from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
+from spinlev.dynamics.motion.body_shape import BodyShape
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.effects import with_effects
+from spinlev.dynamics.motion.equations import equations_of_motion, parameters
+from spinlev.dynamics.motion.events import rotor_gap
+from spinlev.dynamics.motion.quaternions import matrices_of, quaternions_of
+from spinlev.dynamics.motion.state import Parameter, Scales, State
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.rotor import tilt
+from spinlev.geometry.scene.contents import AbsoluteStart
+from spinlev.geometry.scene.floater import Floater
+from spinlev.geometry.shapes import Box
+
+CUBE = Floater(0.01 * 3**0.5 / 2, 1.3, 1.0, 7500.0, None, Box((0.01,) * 3))
+BRICK = Floater(float(np.linalg.norm([9e-3, 12e-3, 6e-3]) / 2), 1.3, 1.0, 7500.0, None, Box((9e-3, 12e-3, 6e-3)))
+ROTOR = tilt(np.radians(10.0), Box((0.01,) * 3), 1.305, 1.0)
+TABLE = rotor_table(ROTOR, "cuboid")
+LEVITATING = replace(SCENE, frequency=130.0, rotor=ROTOR, floater=CUBE)
+
+
+class Uniform:
+    """A field along z, T."""
+
+    def __init__(self, strength):
+        self.strength = strength
+
+    def expressions(self, position):
+        zero = hy.expression(0.0)
+        return [zero, zero, hy.expression(self.strength)], [[zero] * 3] * 3
+
+
+def top(inertia, field=0.0, torque=1.0):
+    """The equations of a body in a field, in a frame at rest: its integrator."""
+    equations = equations_of_motion(Interaction(Uniform(field), turning=True))
+    values = np.zeros(len(Parameter))
+    values[[Parameter.LENGTH, Parameter.INERTIA, Parameter.TIME, Parameter.POINTING_Z]] = 1.0
+    values[Parameter.TORQUE] = torque
+    values[Parameter.INERTIA_X : Parameter.INERTIA_Z + 1] = inertia
+    system = list(zip(equations.variables, equations.rates, strict=True))
+    integrator = hy.taylor_adaptive(system, np.zeros(13), tol=1e-17, compact_mode=True)
+    integrator.pars[:] = values[: len(integrator.pars)]
+    return integrator
+
+
+def test_a_free_body_turns_as_jacobis_functions_say():
+    """Euler's equations for 1000 turns (L. D. Landau, E. M. Lifshitz, Mechanics, section 37), and L stays as it is."""
+    inertia, spin = np.array([1.0, 1.7, 2.3]), np.array([0.3, 0.0, 1.1])
+    integrator = top(inertia)
+    quaternion = np.array([0.5, 0.5, -0.5, 0.5])
+    integrator.state[6:] = np.concatenate([quaternion, spin])
+    twice_energy, square = inertia @ spin**2, (inertia * spin) @ (inertia * spin)
+    a, b, c = inertia
+    amplitudes = np.sqrt(
+        [
+            (twice_energy * c - square) / (a * (c - a)),
+            (twice_energy * c - square) / (b * (c - b)),
+            (square - twice_energy * a) / (c * (c - a)),
+        ]
+    )
+    rate = np.sqrt((c - b) * (square - twice_energy * a) / (a * b * c))
+    modulus = (b - a) * (twice_energy * c - square) / ((c - b) * (square - twice_energy * a))
+    assert 0 < modulus < 1
+    times = np.linspace(0.0, 1000 * 2 * np.pi / 1.1, 300)
+    states = integrator.propagate_grid(times)[-1]
+    quarter = ellipk(modulus)
+    sn, cn, dn, _ = ellipj(np.mod(rate * times, 4 * quarter), modulus)
+    known = amplitudes * np.stack([cn, sn, dn], axis=1)
+    assert states[:, 10:] == pytest.approx(known, abs=1e-10)
+    momenta = np.einsum("nij,nj->ni", matrices_of(states[:, 6:10]), inertia * states[:, 10:])
+    assert momenta == pytest.approx(np.broadcast_to(momenta[0], momenta.shape), abs=1e-10)
+
+
+def test_a_heavy_symmetric_top_nods_with_its_period():
+    """u = cos θ obeys u̇² = (α - βu)(1 - u²) - (b - au)² (H. Goldstein, Classical Mechanics, section 5.7)."""
+    across, along, strength = 1.0, 0.6, 1.3
+    integrator = top([across, across, along], -1.0, strength)  # the moment falls as a weight does
+    angle, spin = 0.9, np.array([0.0, 0.0, 3.1])  # it begins at the highest point
+    integrator.state[6:] = [np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0, *spin]
+    axes = matrices_of(integrator.state[6:10])
+    start = axes[2, 2]
+    a = along * spin[2] / across
+    b = (axes[2] @ (np.array([across, across, along]) * spin)) / across
+    beta = 2 * strength / across
+    alpha = beta * start
+    cubic = np.polynomial.Polynomial([alpha, -beta]) * np.polynomial.Polynomial([1, 0, -1])
+    cubic -= np.polynomial.Polynomial([b, -a]) ** 2
+    low, high, beyond = np.sort(cubic.roots().real)
+    period = 4 / np.sqrt(beta * (beyond - low)) * ellipk((high - low) / (beyond - low))
+    states = integrator.propagate_grid(period * np.array([0.0, 0.5, 1.0, 100.0, 100.5]))[-1]
+    heights = matrices_of(states[:, 6:10])[:, 2, 2]
+    assert heights == pytest.approx([high, low, high, high, low], abs=1e-10)
+
+
+class Turning(Floater):
+    """A sphere that is taken as a body that is not round."""
+
+    round = False
+
+
+def test_a_sphere_is_a_special_case():
+    """Twenty turns of a sphere by the equations of any body: 1e-12 of its place, direction and spin."""
+    start = AbsoluteStart(
+        np.array([1e-3, 0.0, -19e-3]), np.zeros(3), np.array([0.3, -0.1, 0.9]), np.array([20.0, 5.0, 40.0])
+    )
+    sphere = replace(LEVITATING, floater=replace(CUBE, body=None, radius=6.35e-3), start=start)
+    fields = {name: getattr(sphere.floater, name) for name in sphere.floater.__dataclass_fields__}
+    found = []
+    for scene in (sphere, replace(sphere, floater=Turning(**fields))):
+        flight = Flight(scene, TABLE, 0.1, in_balls=False)
+        course = flight.begin(initial_state(scene, TABLE)[0], 0.1, None, flight.interval(0.1))
+        part = flight.part(0)
+        part.integrator.pars[:], part.integrator.state[:] = course.values[: len(part.integrator.pars)], course.state
+        part.integrator.propagate_until(20 * 2 * np.pi)
+        state = flight.scales.unpack(part.integrator.state[: flight.scales.size])
+        found.append(np.concatenate([state.position / 6.35e-3, state.moment, state.spin / scene.angular_velocity]))
+    assert found[1] == pytest.approx(found[0], abs=1e-12)
+
+
+@pytest.mark.parametrize("floater", [CUBE, BRICK], ids=["cube", "brick"])
+def test_energy_is_kept(floater):
+    scene = replace(LEVITATING, floater=floater)
+    start = AbsoluteStart(
+        np.array([0.0, 0.0, -25e-3]), np.zeros(3), np.array([-0.2, 0.0, 1.0]), np.array([10.0, -30.0, 50.0])
+    )
+    flown = simulate(replace(scene, start=start), TABLE, 0.03)
+    assert flown.energy_error < 1e-12
+    assert flown.lab.axes.shape == (len(flown.time), 3, 3)
+
+
+def test_multipoles_in_a_ball_do_what_the_body_feels():
+    """Force and torque of a flight's equations against dipoles all over the body: as well as it says."""
+    start = AbsoluteStart(np.array([1e-3, 0.0, -20e-3]), np.zeros(3), np.array([-0.2, 0.1, 1.0]), np.zeros(3))
+    scene = replace(LEVITATING, start=start)
+    flight = Flight(scene, TABLE, 0.1)
+    state = initial_state(scene, TABLE)[0]
+    course = flight.begin(state, 0.1)
+    equations = flight.equations(flight.degree(course.values))[0]
+    function = hy.cfunc(list(equations.rates[:13]), list(equations.variables), compact_mode=True)
+    rates = function(course.state[:-1], pars=course.values[: function.nparams])
+    shape = next(effect for effect in flight.whole.effects if isinstance(effect, BodyShape))
+    wrench = shape.wrench(TABLE, state.position[None], state.axes[None])[0][0]
+    field, gradient = (part[0] for part in TABLE.evaluate(state.position[None]))
+    moment = CUBE.moment * state.moment
+    force, torque = wrench[:3] + moment @ gradient, wrench[3:] + np.cross(moment, field)
+    turned, place, rate = state.axes @ rates[10:13], course.state[:3], course.values[Parameter.RATE]
+    scales = flight.scales
+    push = (
+        CUBE.mass
+        * scales.length
+        / scales.time**2
+        * (rates[3:6] + rate * np.array([-course.state[4], course.state[3], 0.0]))
+        - CUBE.mass * scene.gravity
+    )
+    assert np.linalg.norm(push - force) < 2 * shape.truncation * np.linalg.norm(force)
+    assert np.linalg.norm(CUBE.inertia / scales.time**2 * turned - torque) < 2 * shape.truncation * np.linalg.norm(
+        torque
+    )
+    assert place.any()
+
+
+def test_equilibria_are_told_apart_and_a_stable_one_stays():
+    """The mean over the cube's own turn levitates; the cube itself stays there, turning."""
+    found = find_equilibria(LEVITATING, TABLE)
+    assert {one.kind for one in found} == {AVERAGED, LOCKED}
+    first = found[0]
+    assert first.stable
+    assert first.kind == AVERAGED
+    assert all(one.residual < 1e-9 for one in found)
+    flown = simulate(LEVITATING, TABLE, 0.3, found)
+    assert flown.ended_by == "duration"
+    distance = np.linalg.norm(flown.lab.position, axis=1)
+    assert abs(distance.mean() - first.distance) < 0.1e-3
+    assert np.ptp(distance) < 0.6e-3
+
+
+def test_a_locked_equilibrium_is_at_rest_in_the_rotors_frame():
+    locked = next(one for one in find_equilibria(LEVITATING, TABLE) if one.kind == LOCKED)
+    scales, whole = Scales.of(LEVITATING), with_effects(LEVITATING, TABLE)
+    assert locked.state.spin == pytest.approx([0.0, 0.0, LEVITATING.angular_velocity])
+    flight = Flight(LEVITATING, whole, 0.05)
+    flown = integrate(flight, locked.state, 0.05)
+    moved = np.linalg.norm(flown.rotor.position - locked.position, axis=1)
+    growth = np.exp(locked.growth_per_s * flown.time[-1])
+    # what the flight's multipoles miss of the force is where it starts from
+    assert moved.max() < 1e-5 * growth
+    assert scales.unpack(scales.pack(locked.state)).axes == pytest.approx(locked.state.axes, abs=1e-14)
+
+
+def test_contact_is_that_of_the_true_surface():
+    """A cube under a cube of 10 mm: face to face, and on an edge."""
+    scene = replace(SCENE, floater=CUBE)
+    edge = np.array([[1.0, 0.0, 0.0], [0.0, 0.5**0.5, -(0.5**0.5)], [0.0, 0.5**0.5, 0.5**0.5]])
+    place = np.array([2e-3, 0.0, -12e-3])
+    assert rotor_gap(scene, place, np.eye(3)) == pytest.approx(2e-3, abs=1e-9)
+    assert rotor_gap(scene, place, edge) == pytest.approx(7e-3 - 0.01 / 2**0.5, abs=1e-9)
+
+
+def test_quaternions_are_those_of_rotations():
+    quaternions = np.random.default_rng(2).normal(size=(50, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    axes = matrices_of(quaternions)
+    assert axes @ axes.swapaxes(1, 2) == pytest.approx(np.broadcast_to(np.eye(3), axes.shape), abs=1e-14)
+    again = quaternions_of(axes)
+    assert np.abs(np.sum(again * quaternions, axis=1)) == pytest.approx(np.ones(50), abs=1e-13)
+    state = State(np.zeros(3), np.zeros(3), np.eye(3)[2], np.ones(3), axes[0])
+    assert state.to_lab(0.7).to_rotor(0.7).axes == pytest.approx(axes[0], abs=1e-14)
+
+
+def test_drag_and_inertia_of_the_parameters():
+    values = parameters(replace(LEVITATING, floater=BRICK, drag=NO_DRAG), Scales.of(LEVITATING))
+    ratios = values[Parameter.INERTIA_X : Parameter.INERTIA_Z + 1]
+    assert ratios * BRICK.inertia == pytest.approx(BRICK.mass / 12 * np.array([180, 117, 225]) * 1e-6)

@@ -1,0 +1,115 @@
+"""Any rigid floater in a rotor's field: against magpylib's sums over cells, taken to their limit, at twenty poses."""
+
+import magpylib as magpy
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from spinlev.fem.harmonics.rigid import field_coefficients, harmonics, matrices, shells, translation
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.floater import floater_sources, force_and_torque, slopes_of
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.scene.floater import Floater, FloaterPart
+from spinlev.geometry.shapes import Box, Cylinder, ring, rotation_matrix
+
+CUBE = Magnet(Box((0.01,) * 3, (2e-3, 0.0, 0.0)), (1.3, 0.0, 0.0))
+SOURCE = magpy.magnet.Cuboid(dimension=(0.01,) * 3, position=(2e-3, 0, 0), polarization=(1.3, 0, 0))
+TABLE = rotor_table((CUBE,), "cuboid")
+RANDOM = np.random.default_rng(5)
+TURNS = Rotation.random(20, random_state=RANDOM).as_matrix()
+PLACES = np.column_stack([RANDOM.uniform(-8e-3, 8e-3, (20, 2)), RANDOM.uniform(-32e-3, -21e-3, 20)])
+
+
+def part(body, *polarization, density=7500.0):
+    return FloaterPart(Magnet(body, polarization), density)
+
+
+BODIES = {
+    "cube": Floater(0.01 * 3**0.5 / 2, 1.3, 1.0, 7500.0, None, Box((0.01,) * 3)),
+    "disc": Floater(0.0065, 1.3, 1.0, 7500.0, None, Cylinder(6e-3, 5e-3)),
+    "ring": Floater(0.0065, 1.3, 1.0, 7500.0, None, ring(6e-3, 3e-3, 5e-3)),
+    "composite": Floater.composed(
+        [
+            part(Box((6e-3, 6e-3, 4e-3), (0.0, 1e-3, 3e-3), rotation_matrix((0, 20, 0))), 0.4, 0.0, 1.2),
+            part(Cylinder(3e-3, 4e-3, (1e-3, 0.0, -3e-3), rotation_matrix((90, 0, 0))), 0.0, 0.0, -1.1),
+            part(Box((4e-3, 4e-3, 2e-3), (0.0, 0.0, -7e-3)), 0.0, 0.0, 0.0, density=1200.0),
+        ]
+    ),
+}
+
+
+def summed(floater, place, turn, n):
+    """Force and torque about the centre of mass by magpylib's sums over cells, `n` along a radius or an edge."""
+    total = np.zeros((2, 3))
+    for magnet in floater.magnets_at(place, turn):
+        body = magnet.body
+        where = {"polarization": magnet.polarization, "position": body.center}
+        where["orientation"] = Rotation.from_matrix(body.rotation)
+        if isinstance(body, Box):
+            targets, meshing = [magpy.magnet.Cuboid(dimension=body.size, **where)], (n, n, n)
+        else:  # in thirds, as the innermost cells of a whole turn would be larger than others
+            size = body.inner_radius, body.radius, body.height
+            thirds = ((0, 120), (120, 240), (240, 360))
+            targets = [magpy.magnet.CylinderSegment(dimension=(*size, *third), **where) for third in thirds]
+            meshing = (4 * n, n, n)
+        total += sum(np.array(magpy.getFT(SOURCE, target, pivot=place, meshing=meshing)) for target in targets)
+    return total
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_force_and_torque_are_the_limit_of_magpylibs_sums(name):
+    """The sums err by even powers of the cells' edges, of which two are taken off; its steps in place leave 4e-7."""
+    floater = BODIES[name]
+    force, torque = force_and_torque(floater_sources(floater), TABLE, PLACES, TURNS)
+    for place, turn, *found in zip(PLACES, TURNS, force, torque, strict=True):
+        a, b, c = (summed(floater, place, turn, n) for n in (4, 8, 16))
+        once, twice = (4 * b - a) / 3, (4 * c - b) / 3
+        known = (16 * twice - once) / 15
+        for ours, theirs in zip(found, known, strict=True):
+            assert np.linalg.norm(ours - theirs) < 1e-6 * np.linalg.norm(theirs)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_multipoles_feel_what_the_body_feels(name):
+    """U = Σ A M, its change by place and turn: to degree 20 what is left out beside a magnet is 1e-6 of the force."""
+    floater, degree = BODIES[name], 20
+    sources, unit = floater_sources(floater), floater.radius
+    slopes, turns = matrices(degree)
+    for place, turn in zip(PLACES[:5], TURNS[:5], strict=True):
+        distance = float(CUBE.body.distance(place))
+        field = field_coefficients(lambda p: TABLE.evaluate(p)[0], place, 0.5 * distance, degree, unit)
+        moments = sources.turned(turn).multipoles(degree, unit)
+        force = -np.einsum("k,akl,l->a", field, slopes, moments) / unit
+        torque = -np.einsum("k,akl,l->a", field, turns, moments)
+        known = force_and_torque(sources, TABLE, place[None], turn[None])
+        assert np.linalg.norm(force - known[0][0]) < 1e-6 * np.linalg.norm(force)
+        assert np.linalg.norm(torque - known[1][0]) < 1e-6 * np.linalg.norm(torque)
+
+
+def test_derivatives_of_force_and_torque_are_those_of_small_steps():
+    sources, step = floater_sources(BODIES["composite"], degree=6), 1e-6
+    place, turn = PLACES[:1], TURNS[:1]
+    slopes = slopes_of(sources, TABLE, place, turn)[1][0]
+
+    def at(change):
+        there = Rotation.from_rotvec(change[3:]).as_matrix() @ turn[0]
+        return slopes_of(sources, TABLE, place + change[:3], there[None])[0][0]
+
+    for k, way in enumerate(step * np.eye(6)):
+        found = (at(way) - at(-way)) / (2 * step)
+        assert np.abs(found - slopes[:, k]).max() < 1e-6 * np.abs(slopes[:, k]).max()
+
+
+def test_matrices_of_the_harmonics():
+    """∂R = D R, (e × r)·∇R = G R, and R(r + ξ), whose next term is of the fourth power of ξ."""
+    points = RANDOM.normal(size=(6, 3))
+    values, gradient = harmonics(6, points)
+    slopes, turns = matrices(6)
+    assert np.einsum("akl,nl->nka", slopes, values) == pytest.approx(gradient, abs=1e-11 * np.abs(gradient).max())
+    turned = np.stack([np.einsum("ni,nki->nk", np.cross(axis, points), gradient) for axis in np.eye(3)])
+    assert np.einsum("akl,nl->ank", turns, values) == pytest.approx(turned, abs=1e-11 * np.abs(turned).max())
+    way = 1e-3 * RANDOM.normal(size=(6, 3))
+    known = np.einsum("kln,il,in->ik", translation(6, 3), values, harmonics(3, way)[0])
+    there = harmonics(6, points + way)[0]
+    assert there == pytest.approx(known, abs=3e-9 * np.abs(there).max())
+    assert there[:, shells(6) < 4] == pytest.approx(known[:, shells(6) < 4], abs=1e-11 * np.abs(there).max())
