@@ -1,6 +1,6 @@
 """spinlev: force and torque on a magnetised sphere, rigid by closed form, permeable by the two-body solution.
 
-The resolution is the order of the finite elements of the rotor's answer.
+The resolution is the number of nodes along an edge of the charges with which the rotor responds.
 """
 
 import sys
@@ -10,12 +10,12 @@ import numpy as np
 from problems import EDGE, RECOIL, REMANENCE, SPHERE, SPHERE_AXIS, SPHERE_CENTER
 from said import measure, say
 
-from spinlev.fem.mutual.response import element_ladder, two_body
+from spinlev.fem.mutual.response import ChargeResponse, two_body
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import Box, Floater, Magnet
 
 case = sys.argv[1]
-order = 1 if case == "rigid" else int(sys.argv[2])
+nodes = 1 if case == "rigid" else int(sys.argv[2])
 cube = Magnet(Box((EDGE,) * 3, np.zeros(3)), np.array([REMANENCE, 0, 0]), 1.0 if case == "rigid" else RECOIL)
 recoil = 1.0 if case == "rigid" else SPHERE["recoil"]
 floater = Floater(SPHERE["diameter"] / 2, SPHERE["polarization"], recoil, 7500.0)
@@ -29,11 +29,10 @@ def rigid():
 
 
 def permeable():
-    """The same of two bodies that magnetise each other, by finite elements."""
-    (rotor,) = element_ladder((cube,), (order,))
-    total = two_body(rotor, floater, SPHERE_CENTER, SPHERE_AXIS).total
+    """The same of two bodies that magnetise each other, by charges on the magnet."""
+    total = two_body(ChargeResponse((cube,), nodes), floater, SPHERE_CENTER, SPHERE_AXIS).total
     return total.force, total.torque
 
 
 values, seconds = measure(rigid if case == "rigid" else permeable)
-say(values, seconds, order, {"spinlev": version("spinlev")})
+say(values, seconds, nodes, {"spinlev": version("spinlev")})

@@ -103,10 +103,10 @@ FORCE = Work(
     ("rigid", "permeable"),
     (
         _reference("force_exact.py", "40 digits", ("rigid",)),
-        _reference("force_spinlev.py", "6", ("permeable",)),
+        _reference("force_spinlev.py", "28", ("permeable",)),
     ),
     (
-        Peer("spinlev", "spinlev", "force_spinlev.py", ("2", "3", "4", "5"), only=("permeable",)),
+        Peer("spinlev", "spinlev", "force_spinlev.py", ("6", "10", "14", "20"), only=("permeable",)),
         Peer("spinlev", "spinlev", "force_spinlev.py", ("closed form",), only=("rigid",)),
         Peer("magpylib getFT", "magpylib", "force_magpylib.py", ("3 1", "4 1", "5 1", "6 1"), only=("rigid",)),
         Peer("magpylib getFT, sphere as one cell", "magpylib", "force_magpylib.py", ("4 1", "8 1", "16 1"), True,

@@ -180,33 +180,6 @@ def solve_condensed(form: ngsolve.BilinearForm, inverse: ngsolve.BaseMatrix, loa
     return found
 
 
-class OpenFactor:
-    """A factor that knows the open boundary: many loads, each at the price of one in the ball of air alone.
-
-    It is made by a solution for each harmonic of the boundary; for a single load `solve_open` takes fewer.
-
-    What the boundary adds to the matrix K is of low rank, P D Pᵀ, so that with U = K⁻¹P a solution is
-    u - U (D⁻¹ + Pᵀ U)⁻¹ Pᵀ u of K u = f (Sherman, Morrison, Woodbury).
-
-    Parameters
-    ----------
-    form : assembled with `condense=True`
-    inverse : of its matrix on the free coupling unknowns
-    boundary : whose harmonics are added
-    """
-
-    def __init__(self, form: ngsolve.BilinearForm, inverse: ngsolve.BaseMatrix, boundary: OpenBoundary) -> None:
-        self._form, self._inverse = form, inverse
-        self._loads, factors = boundary.lacking()
-        answers = solve_condensed(form, inverse, self._loads)
-        self._mixed = np.linalg.solve(np.diag(1 / factors) + self._loads @ answers.T, answers)
-
-    def solve(self, loads: Array) -> Array:
-        """Solutions (n, unknowns) for loads (n, unknowns)."""
-        alone = solve_condensed(self._form, self._inverse, loads)
-        return np.asarray(alone - (alone @ self._loads.T) @ self._mixed)
-
-
 class ConvergenceError(ComputationError):
     """The linear solver did not reach its tolerance."""
 

@@ -1,11 +1,10 @@
-"""Magnetostatics of permeable bodies in a ball of air: given fields (one factorised matrix), or remanence by parity.
+"""Magnetostatics of permeable magnets in a ball of air, with open space outside, by parity.
 
-With the given field H0 (sources outside or remanence, in T) and μ0 H = H0 - ∇ψ,
+With the field H0 (T) that is split off and μ0 H = H0 - ∇ψ,
 
-    ∫ ∇v·μ∇ψ = ∫_bodies ∇v·(μ - 1) H0,        μ0 M = (μ - 1)(H0 - ∇ψ),
+    ∫ ∇v·μ∇ψ = ∫_bodies ∇v·(μ - 1) H0,        μ0 M = (μ - 1)(H0 - ∇ψ).
 
-and open space outside the ball. H0 enters and M leaves at integration points. In the formulation "split" H0 is the
-closed form of the remanence; in "direct" it is 0, and the remanence J adds ∫ ∇v·J.
+In the formulation "split" H0 is the closed form of the remanence; in "direct" it is 0, and the remanence J adds ∫ ∇v·J.
 """
 
 from __future__ import annotations
@@ -17,72 +16,15 @@ from typing import Any, Literal
 import netgen.meshing as netgen
 import ngsolve as ng
 import numpy as np
-import scipy
-from numpy.typing import NDArray
 
 from ...geometry.common import Array, MeshError
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MagnetMesh
 from ..closed_forms.uniform import remanent_field
-from .condensed import OpenBoundary, OpenFactor, TooLargeError, require_memory, solve_open
+from .condensed import OpenBoundary, TooLargeError, require_memory, solve_open
 from .spaces import volume_points
 
 BOUNDARY_DEGREE = 8  # harmonics up to this degree see an exactly open boundary; higher ones reach the bodies below 1e-8
-
-
-@dataclass(frozen=True, eq=False)
-class PermeableRegions:
-    """Bodies, their matrix and its factors; made by `assemble_regions`."""
-
-    names: tuple[str, ...]  # of the bodies
-    owner: NDArray[np.intp]  # (n,) number of the body of each integration point
-    # points, weights: (n, 3) and (n,) in the mesh's coordinates
-    points: Array
-    weights: Array
-    susceptibility: Array  # (n, 3, 3) μ - 1 at each
-    slopes: scipy.sparse.csr_matrix  # (3n, unknowns) gradients of the basis at the points
-    factor: OpenFactor  # of the matrix
-
-    def magnetization(self, field: Array) -> Array:
-        """μ0 M (n, 3) T at the points for a given field H0 (n, 3) T there."""
-        source = self.direct(field)
-        load = self.slopes.T @ (source * self.weights[:, None]).ravel()
-        (potential,) = self.factor.solve(load[None])
-        return np.asarray(source - self.direct((self.slopes @ potential).reshape(-1, 3)))
-
-    def direct(self, field: Array) -> Array:
-        """(μ - 1) H (n, 3) T of a field (n, 3) T at the points."""
-        return np.asarray(np.einsum("ni,nij->nj", field, self.susceptibility))
-
-
-def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int) -> PermeableRegions:
-    """Assemble and factorise.
-
-    Parameters
-    ----------
-    mesh : NGSolve mesh of a ball about the origin with the boundary `outer`
-    permeability : (3, 3) μ by region name; regions not named have μ = 1
-    ball_radius : in the mesh's coordinates
-    order : degree of the elements
-
-    Raises
-    ------
-    TooLargeError : the memory does not hold the system
-    """
-    space, stiffness = _assembled(mesh, permeability, ball_radius, order, "Take elements of a lower degree")
-    boundary = OpenBoundary(mesh, space, ball_radius, BOUNDARY_DEGREE, order)
-    inverse = stiffness.mat.Inverse(space.FreeDofs(True), inverse="sparsecholesky")
-    rules = [volume_points(mesh, name, 2 * order - 2) for name in permeability]
-    owner = np.repeat(np.arange(len(rules)), [len(rule.weights) for rule in rules])
-    return PermeableRegions(
-        tuple(permeability),
-        owner,
-        np.concatenate([rule.points for rule in rules]),
-        np.concatenate([rule.weights for rule in rules]),
-        (np.array([*permeability.values()]) - np.eye(3))[owner],
-        scipy.sparse.vstack([rule.value_matrix(space, ng.grad(space.TrialFunction())) for rule in rules], format="csr"),
-        OpenFactor(stiffness, inverse, boundary),
-    )
 
 
 Formulation = Literal["split", "direct"]
@@ -125,10 +67,10 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
     TooLargeError : the memory does not hold the system
     """
     permeability = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}
-    return System(mesh, order, *_assembled(mesh.mesh, permeability, mesh.ball_radius, order, WAY_OUT))
+    return System(mesh, order, *stiffness_of(mesh.mesh, permeability, mesh.ball_radius, order, WAY_OUT))
 
 
-def _assembled(
+def stiffness_of(
     mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int, way_out: str
 ) -> tuple[Any, Any]:
     """The space H1 and ∫ ∇v·μ∇ψ on it, condensed, with the Robin term of the sphere `outer`."""

@@ -15,7 +15,7 @@ from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
-from .response import COARSE, FINE, OF_MANY, ChargeResponse, enough_degree, two_body
+from .response import COARSE, FINE, OF_MANY, OWN, ChargeResponse, enough_degree, two_body
 from .samples import (
     NEAR_GAPS,
     ROTOR_GAPS,
@@ -136,7 +136,6 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = u
     InputError : a magnet's permeability has other axes than its body, or it is a part from a file
     """
     started = time.perf_counter()
-    coarse, rotor = (ChargeResponse(magnets, n) for n in ((COARSE, FINE) if len(magnets) < MANY else OF_MANY))
     grids = []
     for magnet in magnets:
         if reason := without_response(magnet):
@@ -150,6 +149,8 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = u
         zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
         axis = magnet.polarization / size if size else np.zeros(3)
         grids.append(ResponseGrid(box, axis, floater.radius, counts, *zeros))
+    numbers = (COARSE, FINE) if len(magnets) < MANY else OF_MANY
+    coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, OWN)) for nodes in numbers)
     images = image_weights(floater.recoil_permeability)
     inner = [grid.inner(INNER if 1 < len(grids) < MANY else 1) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -12,13 +11,11 @@ from numpy.typing import ArrayLike
 
 from ...geometry.common import Array, ComputationError
 from ...geometry.magnets import Magnet
-from ...geometry.meshes.magnets import MagnetMesh, mesh_magnets
 from ...geometry.overlap import TOUCHING, sphere_overlap
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import Box, Sphere
 from ..closed_forms.moments import carrier, volume_rule
 from ..closed_forms.uniform import remanent_field
-from ..elements.magnetostatics import PermeableRegions, assemble_regions
 from ..elements.surface import SurfaceCharges
 from ..harmonics.expansion import box_rule, gauss
 from ..harmonics.interior import (
@@ -67,7 +64,8 @@ DIRECT_DIGITS = 12.0  # as `table.DIGITS`, for the direct part of the response
 # Nodes along an edge of a face for what is charged beyond the direct response, of few and of many magnets. With 10
 # the response of a cube with μr = 1.05 to a dipole errs by at most 7e-4 of it at any distance, with 14 by 6e-4.
 COARSE, FINE, OF_MANY = 10, 14, (4, 6)
-OWN = 8  # for the rotor's own field, which then errs by 7e-5
+OWN = 8  # for the rotor's own field in a table, which then errs by 7e-5
+ACROSS = 8  # of a rule in a magnet for what its second permeability adds to its own field
 
 
 class RotorResponse(Protocol):
@@ -112,10 +110,10 @@ class ChargeResponse:
     Parameters
     ----------
     magnets : of the rotor; cuboids, cylinders, rings or spheres
-    count : nodes along an edge of a face
+    count, own : nodes along an edge of a face, and of those for the rotor's own field; None: as many
     """
 
-    def __init__(self, magnets: tuple[Magnet, ...], count: int) -> None:
+    def __init__(self, magnets: tuple[Magnet, ...], count: int, own: int | None = None) -> None:
         means = [
             m.recoil_permeability if m.isotropic else float(np.trace(m.permeability_in_rotor)) / 3 for m in magnets
         ]
@@ -126,11 +124,11 @@ class ChargeResponse:
             self.charges = SurfaceCharges([isotropic(*each) for each in zip(magnets, means, strict=True)], count)
             along = [isotropic(magnet, magnet.recoil_permeability) for magnet in magnets]
             self._carriers = tuple(carrier(magnet) for magnet in along)
-            alone = SurfaceCharges(along, min(count, OWN))
+            alone = SurfaceCharges(along, own or count)
             self._own = alone.places, alone.areas * alone.beyond(self._carriers)
             # what two permeabilities add to that along the easy axis, to first order
             rest = [m.permeability_in_rotor - m.recoil_permeability * np.eye(3) for m in magnets]
-            self._across = closed_dipoles(self._carriers, rest, OWN)
+            self._across = closed_dipoles(self._carriers, rest, ACROSS)
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""
@@ -162,79 +160,6 @@ class ChargeResponse:
         """Charges (n, k) T beyond the first part, at the nodes, of k fields with n·b (n, k) T there."""
         chi = self.charges.contrast[:, None]
         return self.charges.response(field) - chi / (1 + chi / 2) * field
-
-
-@dataclass(frozen=True, eq=False)
-class ElementResponse:
-    """A rotor that responds by its finite elements; made by `element_response`."""
-
-    mesh: MagnetMesh  # of the magnets
-    regions: PermeableRegions | None  # their finite elements, or None where every μ = 1
-
-    @property
-    def magnets(self) -> tuple[Magnet, ...]:
-        """The bodies."""
-        return self.mesh.magnets
-
-    def own_field(self, ball: Ball, degree: int) -> Coefficients:
-        """See `RotorResponse`."""
-        return closed_field(self.magnets, ball, degree) + from_magnetization(*self.remanent_dipoles, ball, degree)
-
-    def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
-        """See `RotorResponse`."""
-        return from_magnetization(*self.induced_dipoles(sources, ball), ball, degree)
-
-    def induced_dipoles(self, sources: Coefficients, ball: Ball) -> tuple[Array, Array]:
-        """Positions (n, 3) m and μ0 M dV (n, 3) T m³ of what sources c_lm (T) in the ball induce in the magnets."""
-        if self.regions is None:
-            return np.zeros((0, 3)), np.zeros((0, 3))
-        potentials = [-derivative(sources, axis) for axis in range(3)]
-        points, tensors = direct_rule(self.magnets, ball.radius)
-        places = np.concatenate([self.places, points])
-        field, direct = np.split(outer_sums(potentials, (places - ball.center) / ball.radius), [len(self.places)])
-        moments = self.weights[:, None] * self.beyond(field), np.einsum("na,nab->nb", direct, tensors)
-        return places, np.concatenate(moments)
-
-    @cached_property
-    def remanent_dipoles(self) -> tuple[Array, Array]:
-        """Positions (n, 3) m and μ0 M dV (n, 3) T m³ that the permeability adds to the remanence of the lone rotor.
-
-        The part (μ - 1) H0 stands on points apart from the mesh, graded towards edges; that of ∇ψ on the mesh's.
-        """
-        if self.regions is None:
-            return np.zeros((0, 3)), np.zeros((0, 3))
-        moments = self.weights[:, None] * self.beyond(remanent_field(self.magnets, self.places))
-        places, closed = closed_dipoles(self.magnets, [m.permeability_in_rotor - np.eye(3) for m in self.magnets])
-        return np.concatenate([self.places, places]), np.concatenate([moments, closed])
-
-    def beyond(self, field: Array) -> Array:
-        """μ0 M (n, 3) T of a field H0 (n, 3) T at `places` without its direct part (μ - 1) H0."""
-        assert self.regions is not None
-        return self.regions.magnetization(field) - self.regions.direct(field)
-
-    @cached_property
-    def places(self) -> Array:
-        """Integration points in the magnets (n, 3), m."""
-        assert self.regions is not None
-        places = self.mesh.to_meter(self.regions.points)
-        for k, name in enumerate(self.regions.names):  # curved elements leave a round body by a little
-            mine = self.regions.owner == k
-            places[mine] = self.magnets[int(name.removeprefix("magnet"))].body.within(places[mine])
-        return places
-
-    @property
-    def weights(self) -> Array:
-        """Of the integration points (n,), m³."""
-        assert self.regions is not None
-        return self.regions.weights * self.mesh.unit**3
-
-
-def element_response(mesh: MagnetMesh, order: int = 3) -> ElementResponse:
-    """Assemble and factorise a rotor on a mesh of `mesh_magnets`, with elements of degree `order`."""
-    permeability = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}
-    if all(np.array_equal(mu, np.eye(3)) for mu in permeability.values()):
-        return ElementResponse(mesh, None)
-    return ElementResponse(mesh, assemble_regions(mesh.mesh, permeability, mesh.ball_radius, order))
 
 
 def direct_rule(magnets: Sequence[Magnet], nearest: float, shares: ArrayLike = 1.0) -> tuple[Array, Array]:
@@ -276,12 +201,6 @@ def closed_dipoles(
             points.append(places)
             moments.append(weights[:, None] * (remanent_field(magnets, places) @ susceptibility))
     return np.concatenate(points), np.concatenate(moments)
-
-
-def element_ladder(rotor: tuple[Magnet, ...], orders: tuple[int, ...] = (3, 4)) -> tuple[ElementResponse, ...]:
-    """The same rotor on one mesh with elements of several degrees, from coarse to fine."""
-    mesh = mesh_magnets(rotor)
-    return tuple(element_response(mesh, order) for order in orders)
 
 
 MOST_TERMS = 60

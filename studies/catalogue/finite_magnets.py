@@ -17,7 +17,7 @@ from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.state import Scales
-from ...fem.mutual.response import RotorResponse, element_ladder, two_body, two_body_ladder
+from ...fem.mutual.response import ChargeResponse, RotorResponse, two_body, two_body_ladder
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import load_scene
@@ -253,7 +253,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     Parameters
     ----------
     distances : of the floater's centre below the rotor's origin, m; by default from contact to 50 mm
-    quick : coarser elements and fewer distances
+    quick : fewer nodes and distances
 
     Returns
     -------
@@ -262,7 +262,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the
     stable equilibrium (along -x if there is none), fixed where no balance is near.
     """
-    rotors = element_ladder(scene.rotor, (2, 3) if quick else (3, 4))
+    rotors = [ChargeResponse(scene.rotor, nodes) for nodes in ((10, 14) if quick else (16, 24))]
     alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))
     if distances is None:  # from contact on the axis, evenly in their logarithm
         step = 1e-5
@@ -289,7 +289,7 @@ def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, dir
 
     Parameters
     ----------
-    rotors : the rotor's response by elements of growing order
+    rotors : the rotor's response by growing numbers of nodes
     floater : the sphere
     places, directions : (n, 3) m, and of its moment (n, 3)
     """
@@ -337,7 +337,7 @@ def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, sta
 
     Parameters
     ----------
-    rotors : the rotor's response by elements of growing order, two at least
+    rotors : the rotor's response by growing numbers of nodes, two at least
     scene, balance, stable : the scene, its equations for the rigid dipole, and their equilibrium
     """
     place, moment = stable.position, stable.state.moment

@@ -6,9 +6,9 @@ polarisations, and one finite-element solution gives the magnetisation that the 
 
 import numpy as np
 
+from second_opinions.magnet_elements import assemble_regions
 from second_opinions.two_bodies import TwoBodyMesh
 from spinlev.fem.closed_forms.uniform import remanent_field
-from spinlev.fem.elements.magnetostatics import assemble_regions
 from spinlev.fem.harmonics.expansion import moments_of_magnetization
 from spinlev.fem.harmonics.interior import (
     Ball,

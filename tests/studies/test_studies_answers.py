@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from second_opinions.magnet_elements import element_ladder
 
 from spinlev.dynamics.continuation.frequencies import at_frequency, levitating_ranges, reference_state, stable_range
 from spinlev.dynamics.equilibria.balance import Balance
@@ -16,7 +17,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import element_ladder, two_body
+from spinlev.fem.mutual.response import two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.studies.catalogue.article import FLOATER, rotor_scene
 from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem

@@ -6,6 +6,7 @@ import heyoka as hy
 import numpy as np
 import pytest
 from article import PERMEABLE, PERMEABLE_MAGNETS
+from second_opinions.magnet_elements import element_ladder
 
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights.balls import LARGE, SMALL, Balls, in_ball
@@ -18,7 +19,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import element_ladder, two_body
+from spinlev.fem.mutual.response import two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.rotor import horizontal, tilt, vertical

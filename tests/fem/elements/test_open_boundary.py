@@ -3,8 +3,9 @@
 import ngsolve as ng
 import numpy as np
 import pytest
+from second_opinions.magnet_elements import OpenFactor
 
-from spinlev.fem.elements.condensed import OpenBoundary, OpenFactor, solve_open
+from spinlev.fem.elements.condensed import OpenBoundary, solve_open
 from spinlev.fem.elements.spaces import volume_points
 from spinlev.geometry.meshes.magnets import mesh_magnets
 from spinlev.geometry.scene.files import load_scene

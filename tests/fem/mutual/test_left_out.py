@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from article import PERMEABLE, PERMEABLE_MAGNETS as MAGNETS
+from second_opinions.magnet_elements import element_ladder
 
 from spinlev.fem.harmonics.interior import dipole_sources, field_at_center, multipole_force, multipole_torque
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import element_ladder, two_body
+from spinlev.fem.mutual.response import two_body
 from spinlev.fem.mutual.samples import places_around
 from spinlev.fem.mutual.table import induced_sources
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from article import PERMEABLE, PERMEABLE_MAGNETS as MAGNETS
 from numpy.polynomial import legendre
+from second_opinions.magnet_elements import element_response
 
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center
 from spinlev.fem.mutual.making import MUTUAL, cached_mutual_table, mutual_table
-from spinlev.fem.mutual.response import element_response, enough_degree, two_body
+from spinlev.fem.mutual.response import enough_degree, two_body
 from spinlev.fem.mutual.samples import places_around
 from spinlev.fem.mutual.table import image_weights, reflection, response_to_charge
 from spinlev.geometry.common import InputError

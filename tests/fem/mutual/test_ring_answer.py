@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 from second_opinions.both_bodies import solve_both_bodies
+from second_opinions.magnet_elements import element_ladder
 from second_opinions.ring_segments import RingOfSegments
 from second_opinions.two_bodies import mesh_two_bodies
 
 from spinlev.fem.harmonics.interior import field_at_center, gradient_at_center
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import Wrench, element_ladder, two_body
+from spinlev.fem.mutual.response import Wrench, two_body
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.shapes import ring
 

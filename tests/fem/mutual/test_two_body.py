@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from article import PERMEABLE, RADIUS
 from second_opinions.both_bodies import solve_both_bodies
+from second_opinions.magnet_elements import element_ladder
 from second_opinions.permeable_sphere import inner_field
 from second_opinions.two_bodies import mesh_two_bodies
 
@@ -19,7 +20,7 @@ from spinlev.fem.harmonics.interior import (
     multipole_torque,
 )
 from spinlev.fem.harmonics.solid import derivative, outer_sums
-from spinlev.fem.mutual.response import TwoBodyError, element_ladder, enough_degree, two_body, two_body_ladder
+from spinlev.fem.mutual.response import TwoBodyError, enough_degree, two_body, two_body_ladder
 from spinlev.fem.mutual.table import induced_sources
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from places import SCENES
+from second_opinions.magnet_elements import element_ladder
 
 from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
 from spinlev.dynamics.equilibria.perturbed import shifted_equilibrium
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
-from spinlev.fem.mutual.response import element_ladder
+from spinlev.fem.mutual.response import ChargeResponse
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.files import load_scene
@@ -35,7 +36,7 @@ def dataset(scene):
     depths = np.array([0.015, 0.03, 0.045])
     places = np.stack([0 * depths, 0 * depths, -depths], axis=1)
     directions = np.tile([0.6, 0.0, 0.8], (3, 1))
-    return missed(element_ladder(scene.rotor, (2, 3)), scene.floater, places, directions)
+    return missed([ChargeResponse(scene.rotor, nodes) for nodes in (8, 12)], scene.floater, places, directions)
 
 
 def test_parts_make_the_total_but_for_products_of_answers(dataset):
@@ -103,8 +104,8 @@ def test_additional_weight_moves_the_equilibrium_like_gravity(scene):
 @pytest.mark.slow
 def test_with_coarse_elements_the_study_tells_the_same(scene, monkeypatch):
     """Elements of the lowest degrees give the missed lift and the shift to some per cent; both are on the figure."""
-    name = "spinlev.studies.catalogue.finite_magnets.element_ladder"
-    monkeypatch.setattr(name, lambda magnets, orders: element_ladder(magnets, (1, 2)))
+    name = "spinlev.studies.catalogue.finite_magnets.ChargeResponse"
+    monkeypatch.setattr(name, lambda magnets, nodes: element_ladder(magnets, ({10: 1, 14: 2}[nodes],))[0])
     result = floater_permeability(scene, quick=True)
     nearest, farthest = result["distance"].values[[0, -1]]
     box = scene.rotor[0].box
