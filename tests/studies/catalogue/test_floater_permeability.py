@@ -72,7 +72,10 @@ def test_level_is_met_where_the_law_says():
 
 def test_figure_is_drawn_from_the_dataset(dataset, tmp_path):
     figure = floater_figure(dataset.merge(sufficient(dataset)).assign_attrs(weight_N=0.079))
-    assert [axes.get_ylabel() for axes in figure.axes] == ["missed share", "missed axial force (% of the weight)"]
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "error of the rigid dipole, relative",
+        "axial force left out (% of the weight)",
+    ]
     figure.savefig(tmp_path / "figure.png")
 
 
