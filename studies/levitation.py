@@ -9,9 +9,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..dynamics.continuation.branch import BranchPoint
-from ..dynamics.continuation.frequencies import branch_through, on_branch
-from ..dynamics.equilibria.equilibrium import AVERAGED, Equilibrium, EquilibriumError, Survey
+from ..dynamics.continuation.branch import BranchPoint, follow_branch
+from ..dynamics.continuation.frequencies import branch_through, by_frequency, on_branch
+from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
 from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
@@ -306,6 +306,18 @@ class Levitation:
         except EquilibriumError as error:
             note(f"Equilibria at other frequencies are not known: {error}")
             return ()
+
+    @cached_property
+    def beyond_fold(self) -> tuple[BranchPoint, ...]:
+        """The other equilibria that meet those of `branch` in its lowest fold, from there up to the first frequency."""
+        if not self.branch or self.branch[0].kind != FOLD:
+            return ()
+        below = [point for point in self.branch if point.parameter <= self.still.frequency]
+        near = max(below, key=lambda point: point.parameter)
+        family = by_frequency(self.still, self.rates, self.spin)
+        points = follow_branch(family, near.state, near.parameter, self.branch[0].parameter / 2)
+        folds = [k for k, point in enumerate(points) if point.kind == FOLD]
+        return tuple(points[folds[0] + 1 :]) if folds else ()
 
     def _check_drive(self) -> None:
         """Refuse a plate in the way of a floater after a step of the drive, where it would levitate at all."""

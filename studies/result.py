@@ -102,7 +102,7 @@ class Result:
                 end = down.start + down.distance / down.speed
                 found = found.assign_attrs(lowered_from_s=down.start, lowered_until_s=end)
             if self.flight.given is not None:
-                points = levitation.branch
+                points = [*levitation.beyond_fold[::-1], *levitation.branch]
                 branch = [[p.parameter, -p.position[2], p.growth_per_s] for p in points]
                 motor = self.flight.motor.T, self.flight.given.T, np.reshape(branch, (-1, 3)).T
                 frequency = self.flight.rate / (2 * np.pi)

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WAYS = {-1: ("turned down", PALETTE[0]), 1: ("turned up", PALETTE[1]), 0: ("steady", "0.5")}
-MARGIN = 0.3  # Of the range of distances before the loss: no more of the fall is shown
+MARGIN = 0.3  # Of the range of distances that is shown, above and below it
+MOST = 0.8  # Of the way is shown where it is far from the equilibria, so that a fall at its end is not
 
 
 @styled
@@ -26,9 +27,9 @@ def drive_figure(result: xr.Dataset) -> Figure:
     parts = [part for part in np.array_split(np.arange(len(time)), PARTS) if len(part)]
     mean, low, high = np.array([(frequency[p].mean(), distance[p].min(), distance[p].max()) for p in parts]).T
     ways = np.sign(np.round([frequency[p[-1]] - frequency[p[0]] for p in parts], 9)).astype(int)
-    equilibria = 1e3 * result["quasi_static_distance"].values
+    steady, equilibria = result["quasi_static_frequency"].values, 1e3 * result["quasi_static_distance"].values
     stable = result["quasi_static_growth"].values <= 0.004
-    plot_branch(along, result["quasi_static_frequency"].values, equilibria, stable, color="k", label="equilibrium")
+    plot_branch(along, steady, equilibria, stable, color="k", label="equilibrium")
     along.plot([], [], "k--", label="unstable equilibrium")
     for stretch in np.split(np.arange(len(parts)), np.flatnonzero(np.diff(ways)) + 1):
         label, color = WAYS[int(ways[stretch[0]])]
@@ -38,7 +39,8 @@ def drive_figure(result: xr.Dataset) -> Figure:
             along.fill_between(mean[joined], low[joined], high[joined], lw=0.8, **look)
         else:
             along.plot(mean[stretch][[0, 0]], [low[stretch].min(), high[stretch].max()], lw=3, **look)
-    known = np.concatenate([low[:-1], high[:-1]])
+    there = (steady >= frequency.min()) & (steady <= frequency.max())
+    known = np.array([*equilibria[there], np.quantile(low, 1 - MOST), np.quantile(high, MOST)])
     room = MARGIN * max(float(np.ptp(known)), 1.0)
     if str(result.attrs["ended_by"]) in ("contact", "lost"):
         along.axvline(

@@ -55,6 +55,9 @@ def test_ramp_from_the_command_line(spinlev, tmp_path):
         assert float(kept["motor_work"][-1]) == pytest.approx(answer["motor_work_J"])
         assert kept["motor_torque"].attrs["units"] == "N m"
         assert kept["quasi_static_distance"].sizes["branch_point"] > 10
+        growth = kept["quasi_static_growth"].values
+        assert growth.max() > 10.0  # beyond the fold as well
+        assert np.min(np.abs(growth)) < 1e-6
     assert (tmp_path / "out" / "drive.png").stat().st_size > 10_000
 
 
