@@ -20,6 +20,7 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
 from spinlev.geometry.common import MAGNET_CONDUCTIVITY, MU_0
 from spinlev.geometry.scene.contents import Drag, DriveStep, OffsetStart, Scene
+from spinlev.geometry.scene.files import scene as make_scene, scene_keys
 
 TABLE = rotor_table(MAGNETS, "dipole")
 STEPS = DriveStep(100.0, 0.05), DriveStep(None, 0.02), DriveStep(140.0, 0.03)
@@ -110,6 +111,21 @@ def test_currents_in_rotor_and_floater_take_it_from_the_motor():
     momentum = orbit + FLOATER.inertia * flown.lab.spin[:, 2]
     assert np.abs(momentum - momentum[0] - flown.given[:, 0]).max() < 1e-12 * np.abs(momentum).max()
     assert flown.energy_error < 1e-12
+
+
+def test_a_cuboid_takes_its_angular_momentum_from_the_motor():
+    """A body of three moments of inertia, by its own attitude: orbit and swirl, to round-off."""
+    keys = scene_keys(replace(STEADY, drag=NO_DRAG, drive=STEPS))
+    keys["floater"] = {"shape": "cuboid", "size_mm": [9.0, 10.0, 11.0], "remanence_T": 1.305, "density_kg_m3": 7500.0}
+    spin = (START.spin / (2 * np.pi)).tolist()
+    keys["start"] = {"position_mm": [0.5, 0.0, -23.0], "moment": START.moment.tolist(), "spin_hz": spin}
+    scene = make_scene(**keys)
+    flown, floater = simulate(scene, TABLE, 0.12), scene.floater
+    axes = flown.lab.axes
+    swirl = np.einsum("nik,k,nlk,nl->ni", axes, floater.principal_inertia, axes, flown.lab.spin)[:, 2]
+    momentum = swirl + floater.mass * np.cross(flown.lab.position, flown.lab.velocity)[:, 2]
+    assert np.abs(momentum - momentum[0] - flown.given[:, 0]).max() < 1e-12 * np.abs(momentum).max()
+    assert np.abs(flown.given[:, 0]).max() > 1e-3 * np.abs(momentum).max()
 
 
 def test_currents_in_the_floater_follow_a_ramp():
