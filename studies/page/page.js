@@ -8,7 +8,11 @@
   const VIRIDIS = ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"];  // of |B| by decades
   const at = id => document.getElementById(id);
   const line = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/ws${location.search}`);
-  const send = (...words) => line.readyState === WebSocket.OPEN && line.send(JSON.stringify(words));
+  const send = (...words) => {
+    if (line.readyState !== WebSocket.OPEN) return;
+    line.send(JSON.stringify(words));
+    if (["move", "choose", "open", "preset", "go"].includes(words[0])) pending = performance.now();
+  };
 
   // Elements of the page and of its charts
   const grow = (parent, tag, values = {}, text = null) => {
@@ -281,10 +285,10 @@
     slider: ([name, value]) => slide(name, value),
     numbers: found => {
       at("models").replaceChildren();
-      found.models.forEach(({ name, known, pose: there, polar_angle: angle, stability }, n) => {
+      found.models.forEach(({ name, known, pose: there, distance, polar_angle: angle, stability }, n) => {
         const cell = grow(at("models"), "div", { class: `model${n ? " beside" : ""}${known ? "" : " loading"}` });
         grow(cell, "span", {}, name);
-        grow(cell, "b", {}, there ? `${(-there[0][2]).toPrecision(4)} mm` : known ? "–" : "00.00 mm");
+        grow(cell, "b", {}, there ? `${distance.toPrecision(4)} mm` : known ? "–" : "00.00 mm");
         grow(cell, "span", {}, there ? `${angle.toFixed(1)}°, ${stability}` : known ? stability : "computed when you release");
       });
       ghost = found.models.find(({ name, pose: there }, n) => n && there && name === "point dipole")?.pose[0] || null;
@@ -347,7 +351,8 @@
       pose = found;
       if (!held) drawBall(pose.seen);
       if (drawn && sunk) drawSide();
-      at("motion").hidden = found.flying;
+      at("motion").textContent = found.flying ? "In real time the picture shows single instants; 1/100 and slower show the rotation."
+        : `Slow motion: the rotor and the floater's moment, frequency-locked, turn once in ${TURN} s.`;
       if (!found.flying) { asked &&= playing; return; }
       if (found.ended) show.playing(false);
       if (found.piece) asked = false;  // the next one may come

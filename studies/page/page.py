@@ -23,7 +23,7 @@ from .worker import PATIENCE, Worker
 REST = 0.25  # Seconds after which a slider is taken to rest
 QUICK, LONG = 60.0, 600.0  # Seconds that a scene with its preview, and other work, may take
 SLOWEST = 0.25  # Most seconds of a trajectory between two pictures
-POINTS = 25  # Of a map along each axis
+POINTS = 41  # Of a map along each axis
 ROLLING = 4000  # Samples of a trajectory that are kept
 PLATES = {
     "none": "Plate: only an obstacle",

@@ -88,6 +88,7 @@ class ModelAnswer:
     name: str
     known: bool
     pose: Pose | None = None
+    distance: float = 0.0  # of levitation, mm
     polar_angle: float = 0.0  # °
     stability: str = "no equilibrium"
 
@@ -205,7 +206,11 @@ def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
             e = nearest_of(near, useful[0].position) if useful else next(iter(near), None)
             name = MODEL_WORDS[one.table.model]
             answers.append(
-                ModelAnswer(name, True, *(_pose(e), e.polar_angle_deg, STABILITIES[e.stability]) if e else ())
+                ModelAnswer(
+                    name,
+                    True,
+                    *(_pose(e), -1e3 * e.position[2], e.polar_angle_deg, STABILITIES[e.stability]) if e else (),
+                )
             )
         elif not any(MODEL_WORDS.get(model) == answer.name for answer in answers):
             answers.append(ModelAnswer(MODEL_WORDS.get(model, "model chosen by accuracy"), False))

@@ -167,6 +167,14 @@ def test_a_flight_does_what_it_is_told():
     assert frame["samples"][1, -1] < -60.0
 
 
+def test_a_flight_tells_how_far_the_plate_is_lowered():
+    """From 3 s on at 10 mm/s."""
+    begin_flight(STATE)
+    for seconds, time in ((2.0, 2.0), (2.0, 4.0), (1.5, 5.5)):
+        frame = fly(seconds)
+        assert frame["pose"]["plate"] == pytest.approx(max(0.0, 10 * (time - 3)), abs=1e-6)
+
+
 def test_a_flight_that_cannot_begin_says_why():
     with pytest.raises(EquilibriumError, match="no stable equilibrium"):
         begin_flight(STATE.changed("rotor.angle_deg", 40.0))
