@@ -148,9 +148,7 @@
     const k = Math.min(width / (2 * half), height / (high - low + 6)), pieces = [];
     const px = ([u, s]) => [width / 2 + k * u, height / 2 + k * ((high + low) / 2 * Math.cos(view.pitch) - s)];
     const path = points => { brush.beginPath(); points.forEach((one, n) => brush[n ? "lineTo" : "moveTo"](...px(one))); };
-    const stroke = (points, color, thick, dash = []) => {
-      path(points.map(seen)); brush.strokeStyle = color; brush.lineWidth = thick; brush.setLineDash(dash); brush.stroke(); brush.setLineDash([]);
-    };
+    const stroke = (points, color, thick) => { path(points.map(seen)); [brush.strokeStyle, brush.lineWidth] = [color, thick]; brush.stroke(); };
     const later = (depth, paint) => pieces.push([depth, paint]);
     const solid = (body, points) => {
       const there = points.map(seen);
@@ -211,7 +209,8 @@
     });
     pieces.sort(([a], [b]) => a - b).forEach(([, paint]) => paint());
     brush.fillStyle = COLORS.ink; brush.font = "12px system-ui, sans-serif";
-    brush.fillText("axis of rotation", ...px(seen([7, 0, high - 4])));
+    [brush.strokeStyle, brush.lineWidth] = ["white", 3];
+    for (const kind of ["strokeText", "fillText"]) brush[kind]("axis of rotation", ...px(seen([0, 0, high - 4])).map((value, n) => value + 6 * k * !n));
     if (ghost && !pose.flying && k * Math.hypot(...ghost.map((value, n) => value - pose.position[n])) > 1.5) {
       const [x, y] = px(seen(turned([ghost], angle)[0]));
       brush.beginPath(); brush.arc(x, y, r * k, 0, 2 * Math.PI); brush.strokeStyle = COLORS.dipole; brush.lineWidth = 1.5; brush.setLineDash([4, 3]); brush.stroke(); brush.setLineDash([]);
