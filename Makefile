@@ -108,7 +108,8 @@ fuzz: develop
 # Runs the gallery's programs too, those that have changed since.
 docs: develop
 	$(BIN)/python docs/draw_architecture.py
-	$(BIN)/sphinx-build --fail-on-warning --quiet -b html docs docs/_build/html
+	@echo "Pages, figures and examples, which are run: some minutes ..."
+	$(BIN)/sphinx-build --fail-on-warning --no-color -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
 # The page that lists them, with licences.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.equilibria.equilibrium import LOCKED, Equilibrium
+from ..dynamics.equilibria.equilibrium import LOCKED, MARGINAL, Equilibrium
 from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_mutual
 from ..dynamics.motion.body_shape import HIGHEST
 from ..dynamics.motion.effects import NOTHING_PERMEABLE
@@ -25,6 +25,7 @@ from ..fem.rotor.floater import floater_sources, shares
 from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
 from ..geometry.common import MAGNET_CONDUCTIVITY
 from .levitation import Levitation
+from .words import spoken_time
 
 PLATE_NEGLECTED = "The plate's eddy currents are neglected: the plate is only an obstacle."
 OF_SPHERES = "known for spherical floaters alone"
@@ -65,6 +66,15 @@ def listed_effects(levitation: Levitation, equilibria: Sequence[Equilibrium]) ->
         found.append(_shape(levitation))
     others = {effect.name for effect in scene_effects(levitation.scene)} - {effect.name for effect in found}
     return [*found, *(ListedEffect(name, True, None, None, "given in the scene") for name in sorted(others))]
+
+
+def would_end(first: Equilibrium | None, effects: Sequence[ListedEffect]) -> list[str]:
+    """A sentence where eddy currents that are neglected would make a stable equilibrium unstable."""
+    added = [e.growth_per_s for e in effects if not e.included and e.growth_per_s and e.growth_per_s > 0]
+    if first is None or first.stability == "unstable" or first.growth_per_s + sum(added) <= MARGINAL:
+        return []
+    time = spoken_time(1 / (first.growth_per_s + sum(added)))
+    return [f"With the neglected eddy currents it would be unstable, with an e-folding time of about {time}."]
 
 
 def effects_summary(levitation: Levitation, effects: Sequence[ListedEffect]) -> dict[str, Any]:

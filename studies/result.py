@@ -24,7 +24,7 @@ from ..fem.rotor.table import FieldTable
 from ..geometry.common import Array, millimetres
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
-from .effects import PLATE_NEGLECTED, ListedEffect, effects_summary, listed_effects
+from .effects import PLATE_NEGLECTED, ListedEffect, effects_summary, listed_effects, would_end
 from .levitation import Levitation
 from .words import (
     comparison_words,
@@ -175,7 +175,9 @@ class Result:
         if self.flight is not None or not self.failed:
             lines += plate_words(levitation)
         lines += [PLATE_NEGLECTED] if PLATE_NEGLECTED in self.summary["not_modelled"] else []
-        return [*lines, "Effects beyond the rigid dipole:", *(f"  {effect}" for effect in self._effects)]
+        first = next(iter(self.survey.equilibria), None) if self.survey is not None else None
+        listed = [f"  {effect}" for effect in self._effects]
+        return [*lines, "Effects beyond the rigid dipole:", *listed, *would_end(first, self._effects)]
 
 
 def equilibrium_summary(equilibrium: Equilibrium) -> dict[str, Any]:

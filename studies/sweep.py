@@ -19,7 +19,7 @@ import xarray as xr
 
 from ..fem.cache import program_digest
 from ..fem.files import seal, unsealed, write_whole
-from ..geometry.common import ComputationError, InputError
+from ..geometry.common import ComputationError, InputError, counted
 from .cli.console import missing_extra, note, progress, to_json
 from .cli.options import Workers
 from .processes import Death, NoProcessError, program, results
@@ -67,6 +67,8 @@ def swept(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> 
     failed: dict[int, str] = {}
     missing = frozenset(range(len(points))) - frozenset(finished)
     attempts = computed(Workers(workers=1) if study.timed else engine, study, points, missing)
+    if missing:
+        note(f"{study.name}, {counted(len(missing), 'point')} ...")
     with progress(f"{study.name}: {len(points)} points") as advance, closing(attempts):
         advance(len(finished) / len(points))
         for k, result in attempts:

@@ -30,7 +30,7 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
     Raises InputError: "mutual" is asked for with a measured map, or with magnets whose response is not known.
     """
     if requested == "rigid":
-        return False, "as asked"
+        return False, "as requested"
     magnets, floater = scene.rotor, scene.floater.ball
     reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := without_response(magnet))}
     if requested == "mutual":
@@ -53,7 +53,7 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
                 "Input --interaction must be rigid or auto for a floater so small beside its magnets; instead received "
                 f"mutual, for which a magnet would respond at {points} points ({LARGEST} at most)."
             )
-        return True, "as asked"
+        return True, "as requested"
     if table.model not in PERMEABLE:
         return False, f"the field model {table.model} has no permeability"
     if reasons:

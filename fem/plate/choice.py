@@ -66,7 +66,7 @@ def resolve_plate_model(
     if model == "fem":
         return PlateChoice("reduced", "the finite elements enter the motion by their reduced network")
     if model != "auto":
-        return PlateChoice(model, "as asked", edge_error(plate, place) if model == "slab" else 0.0)
+        return PlateChoice(model, "as requested", edge_error(plate, place) if model == "slab" else 0.0)
     gap = float(plate.body.distance(place))
     mirror = 3 * MU_0 * scene.floater.moment**2 / (32 * np.pi * gap**4)
     weight = scene.floater.mass * float(np.linalg.norm(scene.gravity) or 9.81)

@@ -55,7 +55,7 @@ def resolve_model(
     ValueError : unknown model, or rtol not between 0 and 1
     """
     if model in MODELS:
-        return model, "as asked"
+        return model, "as requested"
     if model != "auto":
         raise ValueError(f"Input model must be one of {', '.join([*MODELS, 'auto'])}; instead received {model!r}.")
     accuracy = Accuracy(rtol, nearest)

@@ -16,6 +16,7 @@ import xarray as xr
 from ...fem.files import write_whole
 from ...geometry.common import InputError
 from ...geometry.files import file_content
+from ..cli.console import note
 from ..figures.pictures import seen_from
 from ..figures.renderer import RenderError, rendered, turnable_page
 from ..figures.run import question_figure, question_lines
@@ -80,7 +81,10 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     paths = sorted(folder.glob("*.nc"))
     if not paths:
         raise InputError(f"Input DIR must have results (*.nc) in it; instead {folder} has none.")
-    parts = [_part(path) for path in paths]
+    parts = []
+    for path in paths:
+        note(f"{path.name} ...")
+        parts.append(_part(path))
     _fit(parts)
     viewer = {}
     if any("view" in part for part in parts):  # what draws the views, packed, and the text that stands for each

@@ -94,6 +94,9 @@ def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
     return found
 
 
+FOR_A_FIGURE = 1e-3  # relative error of the field that no figure shows
+
+
 def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Answer:
     """Compute a study of the catalogue; writes NAME.nc and its figures. Errors: those of `swept`."""
     study = CATALOGUE[name]
@@ -107,6 +110,9 @@ def question_job(question: Question, values: dict[str, list[Any]], engine: Worke
     ------
     SceneError : the scene does not take the first of the values
     """
+    models = {question.models.model, *values.get("model", ())}
+    if question.models.rtol < FOR_A_FIGURE and models & {"auto", "fem", "surface"}:
+        note(f"Field to {question.models.rtol:g}; for a figure --rtol {FOR_A_FIGURE:g} is enough, and takes less time.")
     return _studied(question_study(question, values), combinations(values), engine, out)
 
 
@@ -139,9 +145,11 @@ def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) 
         result = swept(study, points, engine, out)
         write_dataset(result, path)
         forget(study, points, out)
+        note("Figures ...")
         figures = save_figures(figures_of(result), out)
     lines = [*study.report(result), *failure_lines(result)]
-    if "stable" in (text := "\n".join(lines)) and CRITERION not in text:  # one definition for all of them
+    text = "\n".join(lines)
+    if ("stable" in text or "highest (Hz)" in text) and CRITERION not in text:  # one definition for all of them
         lines.append(f"Stable: {CRITERION}.")
     values = {
         "study": name,

@@ -130,7 +130,7 @@ def field(
     model
         Field model at points; maps show dipole, closed form and finite elements.
     rtol
-        Relative accuracy asked of the field wherever the floater can be.
+        Relative accuracy of the field wherever the floater can be; 1e-3 is enough for a figure.
     """
     requested = Models(model, rtol=rtol).checked()
     if (given := (points is not None) + (plane is not None) + working_point) != 1:
@@ -188,9 +188,9 @@ def compare(
     plate_model
         none, slab, fem or reduced, or auto, of all field models alike.
     rtol
-        Relative accuracy asked of the field wherever the floater can be.
+        Relative accuracy of the field wherever the floater can be; 1e-3 is enough for a figure.
     plate_rtol
-        Relative accuracy asked of the plate's reaction.
+        Relative accuracy of the plate's response.
     """
     check_spin("--spin", spin)
     frequencies = None if frequency_hz is None else frequency_grid(frequency_hz)
@@ -264,7 +264,7 @@ def plate(
     model
         slab (infinite, exact), fem, reduced (a table around the place), or auto.
     rtol
-        Relative accuracy asked of the tensor.
+        Relative accuracy of the tensor.
     """
     positive("--rtol", rtol)
     place = three_numbers("--at", at)
@@ -299,7 +299,7 @@ def study(
     name
         Name of the study; with --vary a scene file.
     scene
-        None: studies are of the article's scenes; for your own there are `compare` and --vary.
+        Left out: studies are of the article's scenes; for your own there are `compare` and --vary.
     list
         Show the catalogue.
     quick
@@ -309,9 +309,9 @@ def study(
     ask
         What is computed with --vary.
     at
-        Place X,Y,Z of the field asked for, mm, rotor's frame.
+        Place X,Y,Z of the field, mm, rotor's frame.
     duration_s
-        Duration of the trajectories asked for, s.
+        Duration of the trajectories, s.
     """
     if scene is not None:
         raise InputError(

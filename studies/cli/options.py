@@ -178,7 +178,7 @@ def shipped_scene(name: str) -> Path:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Models:
-    """Which tables are asked for.
+    """Which models are used.
 
     Parameters
     ----------
@@ -190,11 +190,11 @@ class Models:
         none, slab (infinite), fem or reduced (the network of the finite elements), or auto.
     interaction : {"auto", "rigid", "mutual"}
         rigid (the floater as a rigid dipole), mutual (rotor and floater magnetise each other), or auto: mutual where it
-        matters at the accuracy asked for, with the finite elements' field.
+        matters at the accuracy chosen, with the finite elements' field.
     rtol : float
-        Relative accuracy asked of the field wherever the floater can be.
+        Relative accuracy of the field wherever the floater can be; 1e-3 is enough for a figure.
     plate_rtol : float
-        Relative accuracy asked of the plate's reaction.
+        Relative accuracy of the plate's response.
     """
 
     model: FieldModel = "auto"
@@ -227,7 +227,7 @@ class Models:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Output:
-    """Where answers go.
+    """Where results go.
 
     Parameters
     ----------

@@ -23,6 +23,7 @@ from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.shapes import Box
 from spinlev.studies.cli.options import Models
 from spinlev.studies.compare import compared_models
+from spinlev.studies.effects import ListedEffect, would_end
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.result import Result
 from spinlev.studies.words import (
@@ -181,3 +182,13 @@ def test_a_flight_from_an_unstable_equilibrium_is_never_called_stable():
     at_rest = SimpleNamespace(absolute=False, stability=equilibrium())
     assert kind_of_flight(at_rest, flight) == "stable"
     assert "stable" not in headline(unstable, [start]).lower().replace("unstable", "")
+
+
+def test_neglected_currents_that_would_end_levitation_are_said():
+    """0.015 + 0.016 1/s on a mode that decays at 5e-5 1/s: e-folding in 32 s; at 2.8 1/s, over a plate, nothing."""
+    added = [ListedEffect(name, False, 0.0, growth, "") for name, growth in (("rotor", 0.015), ("floater", 0.016))]
+    (line,) = would_end(equilibrium(growth=-4.6e-5), added)
+    assert line == "With the neglected eddy currents it would be unstable, with an e-folding time of about 32.3 s."
+    assert would_end(equilibrium(growth=-2.8), added) == []
+    assert would_end(None, added) == []
+    assert would_end(equilibrium(growth=-4.6e-5), [replace(one, included=True) for one in added]) == []

@@ -48,7 +48,7 @@ def test_more_is_asked_of_the_slab_where_the_tolerance_is_smaller():
 
 def test_as_asked_or_nothing_to_model():
     plate = ((0.3, 0.3, 0.01), (0.0, 0.0, -0.04))
-    assert chosen(*plate, model="slab")[:2] == ("slab", "as asked")
+    assert chosen(*plate, model="slab")[:2] == ("slab", "as requested")
     assert chosen(*plate, model="fem")[0] == "reduced"
     assert chosen(*plate, place=None)[0] == "none"
     assert resolve_plate_model(replace(SCENE, plate=None), "auto", PLACE, 1e-3)[0] == "none"
