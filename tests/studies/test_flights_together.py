@@ -65,7 +65,7 @@ def test_a_flight_that_cannot_begin_leaves_the_others(long_table, tmp_path):
         model="cuboid",
         plate_model="none",
         interaction="rigid",
-        duration=0.2,
+        duration_s=0.2,
         out=tmp_path,
     )
     np.testing.assert_array_equal(np.isfinite(found["levitated"]), [True, False, True])

@@ -37,7 +37,7 @@ def test_each_ends_as_when_it_is_simulated():
 @pytest.mark.slow
 def test_a_seed_gives_the_same_bits_in_any_number_of_workers():
     """Starts as well: spread about the scene's own, with the standard deviations asked for."""
-    asked = {"n": 40, "seed": 3, "spread": SPREAD, "duration": 0.05, "model": "dipole"}
+    asked = {"n": 40, "seed": 3, "spread": SPREAD, "duration_s": 0.05, "model": "dipole"}
     one, two = sl.ensemble(SCENE, **asked), sl.ensemble(SCENE, **asked, workers=2)
     xr.testing.assert_identical(one, two)
     away = one["start_position"].values - np.array(AT["position_mm"]) * 1e-3
@@ -67,7 +67,7 @@ def test_a_seed_gives_the_same_bits_in_any_number_of_workers():
         ({"n": 2}, "spread must have standard deviations"),
         ({"n": 2, "spread": {"offset_mm": -1.0}}, "not negative"),
         ({"n": 2, "spread": {"offset": 1.0}}, "keys among offset_mm, velocity_mm_s"),
-        ({"starts": AT, "duration": 0.0}, "duration must be a positive number"),
+        ({"starts": AT, "duration_s": 0.0}, "duration_s must be a positive number"),
         ({"starts": AT, "workers": 0}, "between 1 and 1024"),
     ],
 )
