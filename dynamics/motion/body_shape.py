@@ -1,6 +1,6 @@
 """What the shape of a body that is not round about its moment adds to the dipole in its centre of mass.
 
-Three forms of one energy. In a ball of a flight it is that of the body's multipoles up to a degree, whose components
+Three forms of one energy. In a ball of a trajectory it is that of the body's multipoles up to a degree, whose components
 along the rotor's axes are states of the motion: they turn with the body, Ṁ = (Ω - W)·G M, as the moment of a round one.
 Beside a magnet, where no ball is, it is that of dipoles all over the body. About a pose, for equilibria and modes, it
 is force and torque on many such dipoles with their exact derivatives.
@@ -29,15 +29,17 @@ from .floater_effects import FLOATER_SHAPE
 from .quaternions import matrices_of
 from .state import Parameter, State, Vector, cross, dot, dotted
 
-HIGHEST = 7  # degree of the multipoles that a flight has
+HIGHEST = 7  # degree of the multipoles in a trajectory
 WAY = 3  # degree of what they feel, in a place within a ball
-KEPT = 5e-3  # of the dipole's force, one radius off the body: shells of multipoles with less are left out of flights
+KEPT = (
+    5e-3  # of the dipole's force, one radius off the body: shells of multipoles with less are left out of simulations
+)
 # Size of the multipoles' states by those of the dipole: they act so much less. A step must not be short for their sake.
 LITTLE = 0.02
 ALLOWED = 2e-4  # error of the force in a ball by that of the dipole
 REACHES = 0.6, 0.4, 0.25  # of the distance from a magnet: radii of the sphere on which the field is expanded
 # Degrees of the polynomials that dipoles integrate: about a pose of a cube, more of long or hollow bodies up to the
-# second; and in flights beside a magnet.
+# second; and in motion beside a magnet.
 SUMMED, MOST, NEAR = 8, 18, 5
 
 
@@ -89,13 +91,13 @@ class BodyShape:
 
     @cached_property
     def kept(self) -> NDArray[np.intp]:
-        """(k,) numbers of the multipoles that flights have."""
+        """(k,) numbers of the multipoles in trajectories."""
         degrees = shells(HIGHEST)
         return np.flatnonzero((self.shares[degrees] > KEPT) & (degrees > 0))
 
     @property
     def truncation(self) -> float:
-        """What flights leave out of the force one radius off the body, by that of the moment."""
+        """What simulations leave out of the force one radius off the body, by that of the moment."""
         left = self.shares.sum() - self.shares[np.unique(shells(HIGHEST)[self.kept])].sum()
         ratio = self.shares[-1] / max(self.shares[-3], 1e-300) if self.shares[-3] else 0.0
         return float(left + self.shares[-1] * min(ratio, 1.0) ** 0.5)

@@ -106,7 +106,7 @@ class Fittable(Placeable, Protocol):
 
 @runtime_checkable
 class Stateful(Effect, Protocol):
-    """One that has states of its own in flights."""
+    """One that has states of its own in trajectories."""
 
     def states_at(self, state: State) -> Array:
         """Them (k,) in a state along the rotor's axes."""

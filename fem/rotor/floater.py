@@ -29,7 +29,7 @@ from .table import DerivedField, FieldTable
 
 DEGREE = 20  # of polynomials over the body that the dipoles integrate exactly
 RTOL = 1e-5  # accuracy of the field of a permeable floater, from its circumradius off its faces on
-DIRECTIONS = 24  # of a dipole beside a floater, by which the sizes of its multipoles' shares are told
+DIRECTIONS = 24  # of a dipole beside a floater, by which the sizes of its multipoles' shares are measured
 TURNS = 8  # over which the mean of a body over turns about its moment is taken
 SHARE = 0.4  # least radius of the sphere of charges, in circumradii
 

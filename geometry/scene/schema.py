@@ -493,10 +493,10 @@ def _floater_faults(floater: FloaterTable) -> list[str]:
     faults = []
     if floater.composite:
         if single or floater.shape != "sphere":
-            told = " and ".join([*([] if floater.shape == "sphere" else ["shape"]), *single])
+            beside = " and ".join([*([] if floater.shape == "sphere" else ["shape"]), *single])
             faults.append(
                 "Input floater must have its sizes and materials in floater.magnets and floater.bodies alone where it "
-                f"has such; instead received {told} beside them."
+                f"has such; instead received {beside} beside them."
             )
         if not floater.magnets:
             faults.append("Input floater.magnets must have at least one magnet; instead there is ballast alone.")

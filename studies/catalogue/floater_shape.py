@@ -106,9 +106,9 @@ def shape_lines(result: xr.Dataset) -> list[str]:
             low, high, near, far = (float(one[name]) for name in ("low", "high", "nearest", "distance"))
             shape, aspect = one["shape"].item(), float(one["aspect"])
             name = shape if shape != "cylinder" else f"cylinder {aspect:.2f} : 1"
-            told = "none" if np.isnan(low) else f"{low:.1f} to {high:.1f}"
+            stable = "none" if np.isnan(low) else f"{low:.1f} to {high:.1f}"
             between = "" if np.isnan(low) else f"{1e3 * far:.1f} to {1e3 * near:.1f}"
-            rows.append((label, name, told, between, f"{one['low_kind'].item()}, {one['high_kind'].item()}"))
+            rows.append((label, name, stable, between, f"{one['low_kind'].item()}, {one['high_kind'].item()}"))
     return showing.text_table(("rotor", "floater", "stable (Hz)", "distance (mm)", "ends"), rows)
 
 
