@@ -1,6 +1,6 @@
 """What the shape of a body that is not round about its moment adds to the dipole in its centre of mass.
 
-Three forms of one energy. In a ball of a trajectory it is that of the body's multipoles up to a degree; their components
+Three forms of one energy. In a ball of a trajectory it is that of its multipoles up to a degree; their components
 along the rotor's axes are states of the motion: they turn with the body, Ṁ = (Ω - W)·G M, as the moment of a round one.
 Beside a magnet, where no ball is, it is that of dipoles all over the body. About a pose, for equilibria and modes, it
 is force and torque on many such dipoles with their exact derivatives.
