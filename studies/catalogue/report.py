@@ -20,7 +20,7 @@ from ..cli.console import note
 from ..figures.pictures import seen_from
 from ..figures.renderer import RenderError, rendered, turnable_page
 from ..figures.run import question_figure, question_lines
-from ..figures.style import figure_bytes
+from ..figures.style import figure_bytes, figures_across
 from .entries import CATALOGUE
 from .runner import DRAWN, QUESTION, failure_lines, figures_of, flight_of, read_result
 
@@ -64,6 +64,7 @@ PLACE = b"the scene comes here"
 LONGEST = 400  # Characters of a value that are shown
 MOST = 100_000_000  # Bytes of a file beside a result
 LARGEST = 2_500_000  # Bytes of pictures on a page; what comes later is named, not shown
+FLIGHT = "Rotor and floater in the laboratory, in slow motion."
 SCENE = "Rotor, floater, plate and field, in the frame that turns with the rotor."
 
 
@@ -107,14 +108,15 @@ def _part(path: Path) -> dict[str, Any]:
     study = CATALOGUE.get(kind)
     drawers = study.figures if study else {**dict(DRAWN.values()), QUESTION: question_figure}
     captions = {name: (getattr(draw, "func", draw).__doc__ or "").split("\n")[0] for name, draw in drawers.items()}
-    pictures = [
-        (captions[name], _embedded(figure_bytes(figure, "png"), "png")) for name, figure in figures_of(result).items()
-    ]
+    embedded = {name: _embedded(figure_bytes(figure, "png"), "png") for name, figure in figures_of(result).items()}
+    with figures_across("column"):  # what a telephone shows
+        narrow = {name: _embedded(figure_bytes(figure, "png"), "png") for name, figure in figures_of(result).items()}
+    pictures = [(captions[name], source, narrow[name]) for name, source in embedded.items()]
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
     for file in filter(Path.exists, beside):
         picture = _embedded(file_content(file, MOST, "picture", "a file"), file.suffix[1:])
-        pictures.append((SCENE if file.stem.endswith("scene") else file.stem, picture))
+        pictures.append((SCENE if file.stem.endswith("scene") else FLIGHT, picture, ""))
     summary = _summary(path) if kind == "run" else {}
     separate = ("headline", "equilibria")  # by themselves
     answers = {key: json.dumps(value, ensure_ascii=False) for key, value in summary.items() if key not in separate}
@@ -126,6 +128,7 @@ def _part(path: Path) -> dict[str, Any]:
         "pictures": pictures,
         "headline": summary.get("headline", result.attrs.get("headline", "")),
         "equilibria": summary.get("equilibria", []),
+        "plate": "[plate]" in str(result.attrs.get("scene", "")),
         "answers": {key: text if len(text) <= LONGEST else f"{text[:LONGEST]} …" for key, text in answers.items()},
         **_view(result),
         "variables": [_row(name, values) for name, values in result.data_vars.items()],
@@ -154,9 +157,9 @@ def _fit(parts: list[dict[str, Any]]) -> None:
     room = LARGEST
     for part in parts:
         kept = []
-        for title, source in part["pictures"]:
-            room -= len(source)
-            kept.append((title, source) if room >= 0 else (f"{title} (left out here, in the folder)", ""))
+        for title, *sources in part["pictures"]:
+            room -= sum(map(len, sources))
+            kept.append((title, *sources) if room >= 0 else (f"{title} (left out here, in the folder)", "", ""))
         part["pictures"] = kept
 
 

@@ -164,7 +164,7 @@ def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = Non
         cloud["J"], cloud[CURRENT] = 1e-6 * currents.density, 1e-6 * np.linalg.norm(currents.density, axis=1)
         longest = float(cloud[CURRENT].max()) or 1.0
         arrows = cloud.glyph(orient="J", scale=CURRENT, factor=12.0 / longest, geom=pv.Arrow())
-        bar = {**BAR, "title": CURRENT, "fmt": "%.2g", "position_x": 0.04}  # the field's is on the right
+        bar = {**BAR, "title": f"{CURRENT}\n ", "fmt": "%.2g", "position_x": 0.04}  # the field's is on the right
         plotter.add_mesh(arrows, scalars=CURRENT, cmap="magma_r", scalar_bar_args=bar)
 
 
