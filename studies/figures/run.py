@@ -333,8 +333,10 @@ def _derived(result: xr.Dataset) -> xr.Dataset:
     """The result with what is drawn instead of what is kept."""
     if "position" in result:
         depth = (-1e3 * result["position"].sel(axis="z")).assign_attrs(units="mm", long_name="levitation distance")
+        result = result.assign(depth=depth)
+    if "growth" in result:
         lasts = (result["stable"] == 1) | (result["growth"] <= MARGINAL)  # as ranges of stable frequencies have it
-        result = result.assign(depth=depth, stable=lasts)
+        result = result.assign(stable=lasts)
     if "lateral_offset" in result:
         offset = (1e3 * result["lateral_offset"]).assign_attrs(units="mm", long_name="lateral offset")
         angle = result["polar_angle"].assign_attrs(long_name="polar angle")
