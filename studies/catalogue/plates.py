@@ -436,7 +436,8 @@ def team7_figure(result: xr.Dataset) -> Figure:
     x = 1e3 * result["x"].values
     for curve, color in zip(result["curve"].values, PALETTE, strict=False):
         here = result.sel(curve=curve)
-        left.plot(1e3 * here["place"], 1e3 * here["line"], color=color, label=curve)
+        line = here["line"] if "line" in here else here["computed"]  # an older result has no more places
+        left.plot(1e3 * line[line.dims[0]], 1e3 * line, color=color, label=curve)
         left.plot(x, 1e3 * here["measured"], "o", ms=3.5, color=color)
         right.plot(x, 100 * here["deviation"], "o-", ms=3, color=color, label=curve)
     showing.explain(left, {"computed": "-", "measured (COMPEL 1990)": "o"}, ms=3.5)

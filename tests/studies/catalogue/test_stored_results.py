@@ -67,7 +67,7 @@ def test_stored_results_make_one_report(tmp_path):
         shutil.copy(path, tmp_path)
     page, names = report_job(tmp_path, tmp_path)
     assert names == ["design", "sensitivity"]
-    assert page.read_text().count("data:image/png;base64,") == 5  # of the sensitivity four
+    assert page.read_text().count("data:image/png;base64,") == 10  # of the sensitivity four, each in two widths
 
 
 MOVING = re.compile("error|shortfall|second|memory|per_point")
