@@ -44,6 +44,7 @@ FORMATS = {
     "slab": 3,
     "edges": 2,
     "rotor-losses": 2,
+    "floating": 1,
     "equilibria": 4,
     "experiment": 2,
     "code": 1,

@@ -38,6 +38,7 @@ from .cli.options import (
     positive,
     unknown_study,
 )
+from .coils import coils_summary, modes_of
 from .compare import compared, compared_dataset
 from .demagnetising import working_point_dataset
 from .exchange import PLANES, field_map as plane_map
@@ -192,6 +193,9 @@ def simulate(
         The scene starts from an equilibrium and has none.
     """
     given = given_scene(scene)
+    if given.coils:
+        modes, _ = modes_of(given, requested.get("plate_rtol", 1e-3))
+        return coils_summary(given, duration_s, modes)[0].assign_attrs(scene=scene_text(given))
     levitation = Levitation(given if drive is None else driven(given, drive), Models(model, plate_model, **requested))
     simulated = Result(levitation, flight=levitation.flight(duration_s)).dataset()
     return simulated.assign_attrs(scene=scene_text(levitation.scene))

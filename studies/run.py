@@ -31,6 +31,7 @@ from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
 from .cli.console import note, to_json
 from .cli.options import COLUMNS, Answer, Models
+from .coils import coils_job
 from .compare import compared_models
 from .demagnetising import write_working_point
 from .figures.drive import drive_figure
@@ -187,6 +188,8 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
 
     A checkpoint is kept while it lasts; `resume` goes on from there.
     """
+    if scene.coils:
+        return coils_job(scene, duration, requested.plate_rtol, out)
     request = {"scene": scene_digest(scene), "duration_s": duration, **vars(requested)}
     identity = to_json({**request, "program": program_digest()})
     checkpoint = Checkpoint(out / "checkpoint.npz", identity)

@@ -29,6 +29,7 @@ SOLVERS = {
     "slab": "fem/plate/tables.py",
     "edges": "fem/plate/slab.py",
     "rotor-losses": "fem/rotor_metal.py",
+    "floating": "fem/plate/floating.py",
     "equilibria": "dynamics/equilibria/search.py",
     "experiment": "studies/catalogue/experiment_design.py",
 }

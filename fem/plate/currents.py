@@ -291,14 +291,16 @@ def class_basis(
 
 
 def worst_error(angular_frequencies: Array, residuals: ComplexArray, couplings: ComplexArray, places: int) -> float:
-    """Largest relative error of a dipole's own tensor, and of another source's field at the dipoles' places.
+    """Largest relative error of a dipole's own tensor, and of another source's field at the dipoles' places, if any.
 
     Of sources of which dipoles at so many `places` come first, at `angular_frequencies` (k,) rad/s: from products
     `residuals` (k, sources, sources), whose norms bound the errors of fields, and `couplings` of the same shape.
     """
     n, omega = places, angular_frequencies[:, None]
-    tensors = np.einsum("kiaib->kiab", couplings[:, : 3 * n, : 3 * n].reshape(-1, n, 3, n, 3))
     sizes = np.einsum("kii->ki", residuals).real
+    if not n:  # of sources alone each one's coupling with itself
+        return float(np.max(omega * sizes / np.abs(np.einsum("kii->ki", couplings))))
+    tensors = np.einsum("kiaib->kiab", couplings[:, : 3 * n, : 3 * n].reshape(-1, n, 3, n, 3))
     powers = sizes[:, : 3 * n].reshape(-1, n, 3)
     own = omega * powers.sum(axis=2) / np.linalg.norm(tensors, axis=(2, 3))
     products = np.sqrt(sizes[:, 3 * n :] * powers.sum(axis=(1, 2))[:, None])

@@ -63,6 +63,33 @@ class Plate:
         return f"{text}, lowered by {down.distance * 1e3:g} mm at {down.speed * 1e3:g} mm/s from {down.start:g} s on"
 
 
+@dataclass(frozen=True, eq=False)
+class Coil:
+    """A round coil about an axis along z, of rectangular cross-section.
+
+    Its current is `current` sin(2π `frequency` t + `phase`), steady where `frequency` is 0, or a table of time.
+    """
+
+    center: Array  # (3,) m
+    radius: float  # of the middle of the winding, m
+    width: float  # of the winding across the axis, m
+    height: float  # along it, m
+    turns: float
+    current: float | Array  # A: a number, or rows of time (s) and current, with straight lines between
+    frequency: float = 0.0  # Hz
+    phase: float = 0.0  # rad
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
+
+    def amperes(self, time: ArrayLike) -> Array:
+        """The current, A, at each `time`, s."""
+        if isinstance(self.current, np.ndarray):
+            return np.asarray(np.interp(np.asarray(time, float), *self.current.T))
+        wave = np.sin(2 * np.pi * self.frequency * np.asarray(time, float) + self.phase) if self.frequency else 1.0
+        return np.asarray(self.current * wave)
+
+
 @dataclass(frozen=True)
 class Drag:
     """Viscous drag: force -linear v (N s/m) and torque -angular Ω (N m s); `air`: the more of a real sphere in air."""
@@ -139,6 +166,7 @@ class Scene:
     files : path of each file that it names, with the SHA-256 of its content when the scene was read
     parts : the solids of the STEP files that its keys name, in canonical pose, also of those computed as another shape
     drive : what the rotor's frequency does in time, step by step; after the last it stays
+    coils : that drive currents in the conductors
     keys : the tables of a scene file that it was made of, and the scene that they made: what of that was not replaced
         since is as they say. None of a scene that was put together from its parts
     """
@@ -157,6 +185,7 @@ class Scene:
     files: tuple[tuple[str, str], ...] = field(default=(), compare=False)
     parts: tuple[Part, ...] = field(default=(), compare=False)
     drive: tuple[DriveStep, ...] = ()
+    coils: tuple[Coil, ...] = ()
     keys: tuple[Mapping[str, Any], Scene] | None = field(default=None, compare=False, repr=False)
 
     @property

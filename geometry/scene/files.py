@@ -19,7 +19,7 @@ from ..magnets import Magnet
 from ..shapes import rotation_angles
 from ..solids import Part, Solid
 from . import schema
-from .contents import Drag, OffsetStart, Scene
+from .contents import Coil, Drag, OffsetStart, Scene
 from .making import assemble, content_digest
 from .messages import SceneError, unusual
 
@@ -68,7 +68,7 @@ def load_scene(path: str | Path) -> Scene:
     except InputError as error:
         raise SceneError(source, [str(error)]) from None
     _warned(scene)
-    for keys, magnet in zip(scene_keys(scene)["rotor"].get("magnets", ()), scene.rotor, strict=False):
+    for keys, magnet in zip(scene_keys(scene).get("rotor", {}).get("magnets", ()), scene.rotor, strict=False):
         body = magnet.body
         if keys.get("file") and not isinstance(body, Part):
             size = body.described_size.removeprefix(body.kind).strip()
@@ -348,7 +348,9 @@ def _said(table: type[schema.Table], thing: Any) -> dict[str, Any]:
     return keys
 
 
-def _rotor(scene: Scene) -> dict[str, Any]:
+def _rotor(scene: Scene) -> dict[str, Any] | None:
+    if scene.coils and not scene.rotor:
+        return None
     keys: dict[str, Any] = {"magnets": [_magnet(magnet) for magnet in scene.rotor]}
     keys |= {"field_map": str(scene.field_map)} if scene.field_map else {}
     conductors = [
@@ -395,6 +397,18 @@ def _drive(scene: Scene) -> list[dict[str, float]] | None:
     return [{"hold_s": s} if f is None else {"to_hz": f, "in_s": s} for f, s in steps] or None
 
 
+def _coils(scene: Scene) -> list[dict[str, Any]] | None:
+    def current(coil: Coil) -> Any:
+        return coil.current.tolist() if isinstance(coil.current, np.ndarray) else float(coil.current)
+
+    phases = [{"phase_deg": _rounded(np.degrees(coil.phase))} for coil in scene.coils]
+    said = [_said(schema.CoilTable, coil) for coil in scene.coils]
+    return [
+        keys | phase | {"current_A": current(coil), "frequency_hz": float(coil.frequency)}
+        for keys, phase, coil in zip(said, phases, scene.coils, strict=True)
+    ] or None
+
+
 def _start(scene: Scene) -> dict[str, Any] | None:
     keys = _said(schema.StartTable, scene.start)
     return None if keys == {"offset_mm": [0.0, 0.0, 0.1]} else keys
@@ -436,6 +450,7 @@ FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
     "plate": (("plate",), _plate),
     "drag": (("drag", "floater"), _drag),
     "start": (("start",), _start),
+    "coils": (("coils",), _coils),
     "drive": (("drive",), _drive),
 }
 

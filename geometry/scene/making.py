@@ -64,7 +64,8 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     if faults:
         raise SceneError(source, faults)
     own = copy.deepcopy(dict(keys))
-    own["rotor"].update({"field_map": str(field_map)} if field_map else {})
+    if field_map:
+        own["rotor"]["field_map"] = str(field_map)
     for (owner, k), path in of_bodies.items():
         tables = own[owner].get("magnets", []) + (own[owner].get("bodies", []) if owner == "floater" else [])
         (own[owner] if k < 0 else tables[k])["file"] = str(path)

@@ -148,7 +148,7 @@ def unusual(scene: Scene) -> str:
     """
     strongest = max([scene.floater.remanence, *(float(np.linalg.norm(one.polarization)) for one in scene.rotor)])
     sizes = [2 * scene.floater.radius, *(edge for one in scene.rotor for edge in one.box.size)]
-    farthest = max(float(np.linalg.norm(one.body.center)) for one in scene.rotor)
+    farthest = max((float(np.linalg.norm(one.body.center)) for one in scene.rotor), default=0.0)
     said = [f"a remanence of {strongest:.4g} T (NdFeB has up to 1.5 T)"] if strongest > STRONGEST else []
     said += [f"a size of {1e3 * size:.4g} mm" for size in (min(sizes), max(sizes)) if not SIZES[0] < size < SIZES[1]]
     said += [f"a magnet {farthest:.4g} m from the rotor's origin"] if farthest > SIZES[1] else []

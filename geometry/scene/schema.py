@@ -13,7 +13,7 @@ from ..magnets import Magnet
 from ..rotor import Conductor, Rotor, horizontal, tilt, vertical
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix
 from ..solids import Part, Solid, known_shape
-from .contents import AbsoluteStart, Drag, DriveStep, Lowering, MapReading, OffsetStart, Plate, Scene
+from .contents import AbsoluteStart, Coil, Drag, DriveStep, Lowering, MapReading, OffsetStart, Plate, Scene
 from .floater import Floater, FloaterPart
 
 MILLI = 1e-3
@@ -327,6 +327,25 @@ class PlateTable(_Placed):
         return Plate(known_shape(body) or body, self.conductivity_S_m, lowering)
 
 
+class CoilTable(Table):
+    """A round coil whose axis is along z."""
+
+    radius_mm: Length
+    width_mm: Length
+    height_mm: Length
+    center_mm: Three[Coordinate]
+    turns: Annotated[Positive, Field(le=1e9)] = 1.0
+    current_A: Number | Annotated[list[Annotated[list[Number], Field(min_length=2, max_length=2)]], Field(min_length=2)]
+    frequency_hz: Frequency = 0.0
+    phase_deg: Angle = 0.0
+
+    def coil(self) -> Coil:
+        size = self.radius_mm * MILLI, self.width_mm * MILLI, self.height_mm * MILLI
+        current = self.current_A if isinstance(self.current_A, float) else np.array(self.current_A)
+        phase = float(np.radians(self.phase_deg))
+        return Coil(MILLI * np.array(self.center_mm), *size, self.turns, current, self.frequency_hz, phase)
+
+
 class DragTable(Table):
     """Drag on the floater: of air by a model, or numbers."""
 
@@ -380,7 +399,7 @@ class DriveTable(Table):
 class SceneTable(Table):
     """The whole file."""
 
-    frequency_hz: Frequency
+    frequency_hz: Frequency = 0.0
     gravity_m_s2: Three[Coordinate] = [0.0, 0.0, -9.81]
     rotor: Annotated[
         Annotated[DisplacedRotor, Tag("horizontal")]
@@ -388,12 +407,13 @@ class SceneTable(Table):
         | Annotated[TiltRotor, Tag("tilt")]
         | Annotated[ExplicitRotor, Tag("magnets")],
         Discriminator(_rotor_kind),
-    ]
+    ] = ExplicitRotor.model_construct(magnets=[])  # none, beside coils
     floater: FloaterTable
     plate: PlateTable | None = None
     drag: DragTable | None = None
     start: StartTable | None = None
     drive: list[DriveTable] | None = None
+    coils: list[CoilTable] | None = None
 
     def scene(self, parts: Mapping[tuple[str, int], Part], field_map: Path | None) -> Scene:
         """The scene in SI units; `parts` by their tables' names and numbers, -1 that of a table in no list."""
@@ -413,6 +433,7 @@ class SceneTable(Table):
             map_reading=MapReading(rotor.map_length_unit, rotor.map_field_unit, rotor.map_columns),
             conductors=tuple(conductor.conductor() for conductor in rotor.conductors),
             drive=tuple(step.step() for step in self.drive or ()),
+            coils=tuple(coil.coil() for coil in self.coils or ()),
         )
 
 
@@ -429,6 +450,7 @@ TABLES: dict[str, type[Table]] = {
     "bodies": BallastTable,
     "plate": PlateTable,
     "lowering": LoweringTable,
+    "coils": CoilTable,
     "drag": DragTable,
     "start": StartTable,
     "drive": DriveTable,
@@ -459,10 +481,21 @@ def key_faults(table: SceneTable) -> list[str]:
             )
     for k, conductor in enumerate(rotor.conductors):
         faults += _shape_faults(f"rotor.conductors[{k}]", conductor)
+    needed = () if table.coils and "rotor" not in table.model_fields_set else ("frequency_hz", "rotor")
+    missing = [key for key in needed if key not in table.model_fields_set]
+    faults += [f"Input {key} must be given; instead it is missing." for key in missing]
+    for k, coil in enumerate(table.coils or ()):
+        if coil.width_mm >= 2 * coil.radius_mm:
+            faults.append(
+                f"Input coils[{k}].width_mm must be less than twice radius_mm, of the middle of the winding; instead "
+                f"received {coil.width_mm:g}."
+            )
+        if isinstance(coil.current_A, list) and np.any(np.diff(np.array(coil.current_A)[:, 0]) <= 0):
+            faults.append(f"Input coils[{k}].current_A must have increasing times; instead they are not.")
     faults += _floater_faults(floater)
     faults += _shape_faults("plate", table.plate) if table.plate else []
     sphere = floater.shape == "sphere" and not floater.composite
-    if not sphere and floater.conductivity_S_m is not None:
+    if not sphere and floater.conductivity_S_m is not None and not table.coils:
         faults.append(
             "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
             f"known then; instead received {floater.conductivity_S_m:g}."

@@ -21,6 +21,7 @@ from ...geometry.scene.files import check_files, parse_scene
 from ...geometry.solids import moved
 from ..cli.console import note, progress
 from ..cli.options import NAMES, Answer, Models, Workers, combinations
+from ..coils import coils_figure
 from ..compare import compare_figure
 from ..exchange import field_map_figure
 from ..figures.drive import drive_figure
@@ -52,6 +53,7 @@ DRAWN = {
     "outside": ("field-map", field_map_figure),
     "easy_axis": ("working-point", working_point_figure),
     "axis_field": ("field", field_figure),
+    "heat": ("trajectory", coils_figure),
     "curve_force": ("force", force_figure),
     "position_rotor_frame": ("trajectory", trajectory_figure),
     "motor_torque": ("drive", drive_figure),

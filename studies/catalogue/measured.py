@@ -1,0 +1,378 @@
+"""What is computed beside what was measured or is known in closed form, one row an experiment; nothing is fitted.
+
+TEAM workshop problem 28: an aluminium disc over two coils (H. Karl, J. Fetzer, S. Kurz, G. Lehner, W. M. Rucker,
+Description of TEAM Workshop Problem 28: An Electrodynamic Levitation Device, Stuttgart): its height against time, of
+the disc's lower face over the windings, after both currents are switched on.  At which phase of the current that was is
+not recorded: once the phase is 0, once it is the one that fits best.
+
+Conductors in the field of a dipole that oscillates, turns or moves, by series and closed forms: a tube (harmonics along
+its axis), a sphere (W. R. Smythe, Static and Dynamic Electricity, section 10.06) and a thick plate at low speed (J. R.
+Reitz, J. Appl. Phys. 41, 2067 (1970)), whose drag is (μ0² σ m²/128π) (h⁻³ - (h+t)⁻³) for a vertical moment m at h.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from scipy.special import iv, kv
+
+from ...dynamics.flights.conductor import (
+    ConductorMotion,
+    Supply,
+    conductor_motion,
+    heights_over,
+    levitation_height,
+    sources_of,
+)
+from ...fem.closed_forms.eddy_sphere import polarizability
+from ...fem.closed_forms.potentials import Dipole, HomogeneousField
+from ...fem.plate.eddy import plate_reaction, solve_eddy
+from ...fem.plate.floating import FloatingModes, floating_modes
+from ...geometry.common import MU_0, Array
+from ...geometry.meshes.plate import MeshRule, plate_mesh
+from ...geometry.scene.contents import Plate, Scene
+from ...geometry.scene.files import parse_scene
+from ...geometry.shapes import Box, Cylinder, Sphere, ring
+from ..coils import modes_of
+from ..figures.style import PALETTE, panels
+from ..result import Columns, columns, variable
+from ..study import study_of_one
+from . import showing
+from .plates import FREQUENCIES, compared, compute_line, measured_line, team7_mesh
+
+DURATION, GRAVITY = 1.72, 9.81
+SETTLED = 1.5  # Time (s) from which the measured disc rests, to the tenth of a millimetre of its table
+PHASES = 12  # Start phases of the current that are tried, in half a turn: the force has twice its frequency
+COPPER, ALUMINIUM = 5.96e7, 3.4e7  # S/m
+WARMING = 4e-3  # Part of its resistivity that aluminium gains in a kelvin at room temperature
+TEAM28 = """
+[floater]
+shape = "cylinder"
+diameter_mm = 130.0
+height_mm = 3.0
+remanence_T = 0.0
+density_kg_m3 = 2687.095
+conductivity_S_m = 3.4e7
+[start]
+position_mm = [0.0, 0.0, 5.3]
+[[coils]]
+radius_mm = 41.0
+width_mm = 28.0
+height_mm = 52.0
+center_mm = [0.0, 0.0, -26.0]
+turns = 960.0
+current_A = 20.0
+frequency_hz = 50.0
+[[coils]]
+radius_mm = 87.5
+width_mm = 15.0
+height_mm = 52.0
+center_mm = [0.0, 0.0, -26.0]
+turns = 576.0
+current_A = -20.0
+frequency_hz = 50.0
+"""
+
+
+def measured_heights() -> tuple[Array, Array]:
+    """Times (n,) s and heights (n,) m of the lower face of problem 28's disc."""
+    lines = files(__package__).joinpath("team28_height.csv").read_text(encoding="utf-8").splitlines()
+    table = np.loadtxt([line for line in lines if line[:1].isdigit()], delimiter=",")
+    return table[:, 0] * 1e-3, table[:, 1] * 1e-3
+
+
+def resting_height(scene: Scene, modes: FloatingModes) -> float:
+    """Height (m) of the lower face at which the mean forces balance."""
+    weight = -scene.floater.mass * float(scene.gravity[2])
+    supply = Supply(scene.coils, sources_of(scene.coils))
+    return levitation_height(modes, supply, weight) - float(scene.floater.bodies[0].half_edges[2])
+
+
+def in_phase(scene: Scene, phase: float) -> Scene:
+    """The scene with another phase (rad) of all currents at the start."""
+    return replace(scene, coils=tuple(replace(coil, phase=phase) for coil in scene.coils))
+
+
+def sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple[str, float]]:
+    """What changes of one thing do to the height at rest, m; those that need other modes if not `quick`.
+
+    The modes of a conductor have other rates at another conductivity, and the same fluxes.
+    """
+    floater, base = scene.floater, resting_height(scene, modes)
+
+    def with_rates(factor: float) -> float:
+        return resting_height(scene, replace(modes, rates=factor * modes.rates)) - base
+
+    def with_current(factor: float) -> float:
+        coils = tuple(replace(coil, current=factor * coil.current) for coil in scene.coils)
+        return resting_height(replace(scene, coils=coils), modes) - base
+
+    lighter = replace(scene, floater=replace(floater, density=0.99 * floater.density))
+    found = [
+        ("conductivity of the disc +1 %", with_rates(1 / 1.01)),
+        ("disc 10 K warmer", with_rates(1 + 10 * WARMING)),
+        ("mass of the disc -1 %", resting_height(lighter, modes) - base),
+        ("both currents +1 %", with_current(1.01)),
+        ("windings 0.1 mm higher in their frame", 1e-4),
+        ("phase of the current at the start", 0.0),
+    ]
+    if quick:
+        return found
+    heights, shares = heights_over(scene), Supply(scene.coils, sources_of(scene.coils)).shares
+    disc, (inner, outer) = floater.bodies[0], scene.coils
+    assert isinstance(disc, Cylinder)
+    assert floater.conductivity
+    thicker = replace(disc, height=1.01 * disc.height)
+    wider = (replace(inner, radius=inner.radius + 1e-4), outer)
+    rings = tuple(replace(coil, width=coil.width / 10) for coil in scene.coils)
+    variants = {
+        "finite elements of order 3 instead of 4": (disc, scene.coils),
+        "thickness of the disc +1 %": (thicker, scene.coils),
+        "radius of the inner coil +0.1 mm": (disc, wider),
+        "windings a tenth as wide": (disc, rings),
+    }
+    rests = []
+    for body, coils in variants.values():
+        other = floating_modes(body, floater.conductivity, coils, shares, heights, coils[0].frequency, order=3)
+        rests.append(resting_height(scene, other) - float(body.half_edges[2] - disc.half_edges[2]))
+    before = [base, *[rests[0]] * (len(rests) - 1)]  # the others are compared on the same order
+    return [*found, *zip(variants, (a - b for a, b in zip(rests, before, strict=True)), strict=True)]
+
+
+def height_error(motion: ConductorMotion, half: float, time: Array, measured: Array) -> float:
+    """Root mean square (m) of the lower face's computed height less the measured."""
+    return float(np.sqrt(np.mean((np.interp(time, motion.time, motion.height) - half - measured) ** 2)))
+
+
+def swing(time: Array, height: Array) -> tuple[float, float]:
+    """Period (s) and decay rate (1/s) of an oscillation about its last mean, by its upper turning points."""
+    rest = float(height[time > SETTLED].mean())
+    fine = np.linspace(time[0], time[-1], 20 * len(time))
+    curve = np.interp(fine, time, np.convolve(np.pad(height, 2, "edge"), np.ones(5) / 5, "valid"))
+    tops = np.flatnonzero((curve[1:-1] >= curve[:-2]) & (curve[1:-1] > curve[2:]) & (curve[1:-1] > rest)) + 1
+    tops = np.array([t for t in tops if curve[t] == curve[abs(fine - fine[t]) < 0.05].max()])[:6]
+    slope = np.polyfit(fine[tops], np.log(curve[tops] - rest), 1)[0]
+    return float(np.diff(fine[tops]).mean()), float(-slope)
+
+
+Row = tuple[str, str, float, float, float, str]  # name, kind, measured, computed, our error, unit
+
+
+def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
+    """Rows of problem 28, and the trajectory's data."""
+    scene = parse_scene(TEAM28)
+    modes, _ = modes_of(scene)
+    half = float(scene.floater.bodies[0].half_edges[2])
+    time, measured = measured_heights()
+    rest, computed = float(measured[time > SETTLED].mean()), resting_height(scene, modes)
+    phases = np.linspace(0.0, np.pi, 2 if quick else PHASES, endpoint=False)
+    motions = [conductor_motion(in_phase(scene, float(phase)), modes, DURATION) for phase in phases]
+    errors = [height_error(motion, half, time, measured) for motion in motions]
+    best = int(np.argmin(errors))
+    sampled = np.interp(time, motions[best].time, motions[best].height) - half
+    (period, decay), (our_period, our_decay) = swing(time, measured), swing(time, sampled)
+    sensitivity = abs(computed * modes.error)
+    rows: list[Row] = [
+        ("TEAM 28: height at rest", "measurement", rest, computed, sensitivity, "m"),
+        ("TEAM 28: period", "measurement", period, our_period, our_period * modes.error, "s"),
+        ("TEAM 28: decay rate", "measurement", decay, our_decay, our_decay * modes.error, "1/s"),
+    ]
+    changes, shifts = zip(*sensitivities(scene, modes, quick), strict=True)
+    data = {
+        "change": list(changes), "shift": np.array(shifts), "missing": rest - computed,
+        "time": time, "measured_height": measured, "computed_height": sampled, "phase": phases, "rms": np.array(errors),
+        "height": computed, "energy_error": max(motion.energy_error for motion in motions),
+        "seconds": max(motion.seconds for motion in motions),
+    }  # fmt: skip
+    return rows, data
+
+
+def tube_reaction(inner: float, outer: float, conductivity: float, frequency: float) -> complex:
+    """G_zz, T/(A m²), of an infinite tube at its axis: of each harmonic e^{ikz} of a dipole's A_φ, k K₁(kρ), C I₁(kρ)
+    comes back, with A and H continuous at both walls (m)."""
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    k, dk = 20 / inner * (nodes + 1), 20 / inner * weights
+    within = np.sqrt(k**2 + 2j * np.pi * frequency * MU_0 * conductivity)
+    rows = np.zeros((len(k), 4, 4), complex)
+    for row, radius, outside, at in ((0, inner, iv, 0), (2, outer, kv, 3)):
+        x, y, sign = k * radius, within * radius, 1.0 if at == 0 else -1.0
+        rows[:, row, at], rows[:, row, 1], rows[:, row, 2] = outside(1, x), -iv(1, y), -kv(1, y)
+        rows[:, row + 1, at] = sign * k * outside(0, x)
+        rows[:, row + 1, 1], rows[:, row + 1, 2] = -within * iv(0, y), within * kv(0, y)
+    source = np.stack([-kv(1, k * inner), k * kv(0, k * inner), 0 * k, 0 * k], axis=1)
+    back = np.linalg.solve(rows, source[:, :, None])[:, 0, 0]
+    return complex(MU_0 / (2 * np.pi**2) * np.sum(dk * k**2 * back))
+
+
+def closed_rows() -> list[Row]:
+    """Conductors whose answer is known."""
+    rows: list[Row] = []
+    radius, frequency = 0.01, 50.0
+    mesh = plate_mesh(Sphere(radius), ALUMINIUM, [[0.0, 0.0, 1.0]], 200.0, MeshRule(skin_share=0.5, reach=30.0))
+    found = complex(solve_eddy(mesh, 4, frequency, [HomogeneousField(np.array([0.0, 0.0, 1.0]))]).couplings[0, 0])
+    exact = complex(polarizability(radius, ALUMINIUM, frequency))
+    # the torque of a field of 1 T that turns across the sphere's axis, or of the sphere in a steady one
+    rows.append(
+        ("sphere that spins in a uniform field: torque", "closed form", -exact.imag, -found.imag, 1e-5, "N m/T²")
+    )
+    inner, outer = 0.01, 0.0125
+    tube = plate_reaction(Plate(ring(outer, inner, 14 * inner), COPPER), np.zeros((1, 3)), 50.0, 1e-3)
+    series = tube_reaction(inner, outer, COPPER, 50.0)
+    lost = -float(tube.tensors[0, 2, 2].imag)
+    size = float(tube.error_estimate[0] * abs(series))
+    rows.append(("dipole in a copper tube, 50 Hz: loss", "series", -series.imag, lost, size, "T/(A m²)"))
+    rows.append(plate_drag())
+    return rows
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """∂A/∂x of a vertical dipole of 1 A m²."""
+
+    position: Array
+    step: float = 1e-5  # m; its square is 1e-6 of the height's
+
+    def vector_potential(self, points: Array) -> Array:
+        moment, along = np.array([0.0, 0.0, 1.0]), np.array([self.step, 0.0, 0.0])
+        ahead, behind = (Dipole(self.position + s * along, moment).vector_potential(points) for s in (1, -1))
+        return np.asarray((ahead - behind) / (2 * self.step))
+
+
+def plate_drag() -> Row:
+    """The slow drag of a vertical dipole along a plate of aluminium, whose edges take some 1e-3 of it."""
+    body, height, frequency = Box(np.array([0.4, 0.4, 0.03])), 0.01, 1e-3
+    place = np.array([0.0, 0.0, body.half_edges[2] + height])
+    mesh = plate_mesh(body, ALUMINIUM, place, frequency, MeshRule(skin_share=1.0))
+    found = solve_eddy(mesh, 3, frequency, [_Moving(place)]).couplings[0, 0]
+    exact = MU_0**2 * ALUMINIUM / (128 * np.pi) * (height**-3 - (height + body.size[2]) ** -3)
+    name = "dipole that slides over a thick plate: slow drag"
+    return (
+        name,
+        "closed form",
+        float(exact),
+        float(-found.imag / (2 * np.pi * frequency)),
+        1e-3 * float(exact),
+        "N s/m/(A m²)²",
+    )
+
+
+@cache
+def _team7(quick: bool) -> xr.Dataset:
+    x, measured = measured_line()
+    lines = [compute_line(f, x, team7_mesh(f), 2 if quick else 3) for f in FREQUENCIES]
+    return compared(x, measured, np.hstack(lines))
+
+
+def team7_row(quick: bool) -> Row:
+    """The largest field on problem 7's line."""
+    line = _team7(quick)
+    place = np.unravel_index(int(np.argmax(np.abs(line["measured"].values))), line["measured"].shape)
+    measured, computed = (float(line[name].values[place]) for name in ("measured", "computed"))
+    return "TEAM 7: largest B_z on the line", "measurement", measured, computed, abs(0.01 * computed), "T"
+
+
+COLUMNS: Columns = {
+    "name": (("experiment",), "", "experiment"),
+    "kind": (("experiment",), "", "measurement, series or closed form"),
+    "unit": (("experiment",), "", "unit"),
+    "measured": (("experiment",), "SI", "measured, or known"),
+    "computed": (("experiment",), "SI", "computed"),
+    "error": (("experiment",), "SI", "estimated error of the computation"),
+}
+TRAJECTORY: Columns = {
+    "measured_height": (("time",), "m", "measured height"),
+    "computed_height": (("time",), "m", "computed height, at the start phase that fits best"),
+    "change": (("parameter",), "", "change of one thing"),
+    "shift": (("parameter",), "m", "what it does to the height at rest"),
+    "rms": (("phase",), "m", "root mean square of computed less measured height"),
+}
+
+
+def measured(quick: bool) -> xr.Dataset:
+    """Every experiment, what disagrees most first."""
+    rows, data = team28_rows(quick)
+    rows += closed_rows()
+    rows.append(team7_row(quick))
+    rows.sort(key=lambda row: -abs(row[3] / row[2] - 1))
+    name, kind, known, found, error, unit = (list(column) for column in zip(*rows, strict=True))
+    by_name = {"name": name, "kind": kind, "unit": unit, "measured": known, "computed": found, "error": error}
+    made = {**columns(COLUMNS, by_name), **columns(TRAJECTORY, data)}
+    axes = {
+        "time": variable(("time",), data["time"], "s", "time"),
+        "phase": variable(("phase",), data["phase"], "rad", "phase"),
+    }
+    said = {name: float(data[name]) for name in ("height", "missing", "energy_error", "seconds")}
+    return xr.Dataset(made, axes, said)
+
+
+def measured_numbers(result: xr.Dataset) -> dict[str, Any]:
+    """For JSON."""
+    keys = ("name", "kind", "unit", "measured", "computed", "error")
+    rows = zip(*(result[key].values.tolist() for key in keys), strict=True)
+    rms = 1e3 * result["rms"].values
+    team28 = {
+        "height_mm": 1e3 * float(result.attrs["height"]),
+        "rms_mm": float(rms[0]),
+        "rms_best_phase_mm": float(rms.min()),
+        "best_phase_deg": float(np.degrees(result["phase"].values[int(rms.argmin())])),
+        "energy_error": float(result.attrs["energy_error"]),
+        "missing_mm": 1e3 * float(result.attrs["missing"]),
+        "sensitivities": [
+            {"change": change, "shift_mm": 1e3 * shift}
+            for change, shift in zip(result["change"].values.tolist(), result["shift"].values.tolist(), strict=True)
+        ],
+    }
+    return {"experiments": [dict(zip(keys, row, strict=True)) for row in rows], "team28": team28}
+
+
+def measured_lines(result: xr.Dataset) -> list[str]:
+    found = measured_numbers(result)
+    lines = ["Computed beside measured or known, nothing fitted; what disagrees most is first:"]
+    for row in found["experiments"]:
+        off = 100 * (row["computed"] / row["measured"] - 1)
+        lines.append(
+            f"  {row['name']:46} {row['kind']:12} {row['measured']:11.5g} computed {row['computed']:11.5g} "
+            f"± {row['error']:.1g} {row['unit']} ({off:+.3g} %)"
+        )
+    own = found["team28"]
+    lines.append(
+        f"TEAM 28: rms of the height {own['rms_mm']:.2f} mm with the current's phase 0 at the start, "
+        f"{own['rms_best_phase_mm']:.2f} mm at {own['best_phase_deg']:.0f}°, which fits best."
+    )
+    lines.append(f"Of its height {own['missing_mm']:.3f} mm are missing. Changes of one thing move it by:")
+    for row in own["sensitivities"]:
+        enough = (
+            f"; {own['missing_mm'] / row['shift_mm']:.3g} of them are enough" if abs(row["shift_mm"]) > 1e-2 else ""
+        )
+        lines.append(f"  {row['change']:40} {row['shift_mm']:+.3f} mm{enough}")
+    return lines
+
+
+@showing.drawn
+def measured_figure(result: xr.Dataset) -> Figure:
+    """Problem 28's height, and every experiment's deviation."""
+    figure, ((left, right),) = panels(1, 2, 3.0)
+    left.plot(result["time"], 1e3 * result["measured_height"], "o", ms=2, color=PALETTE[1], label="measured")
+    left.plot(result["time"], 1e3 * result["computed_height"], color=PALETTE[0], lw=0.9, label="computed")
+    left.set(xlabel="time (s)", ylabel="height over the windings (mm)")
+    left.legend()
+    off = 100 * (result["computed"] / result["measured"] - 1).values
+    right.barh(range(len(off)), off, color=PALETTE[0])
+    right.set_yticks(range(len(off)), [str(name) for name in result["name"].values], fontsize=6)
+    right.invert_yaxis()
+    right.set_xlabel("computed less measured (%)")
+    return figure
+
+
+MEASURED = study_of_one(
+    name="measured",
+    summary="what is computed beside what was measured or is known in closed form, one row an experiment",
+    compute=measured,
+    figures={"measured": measured_figure},
+    report=measured_lines,
+    numbers=measured_numbers,
+)

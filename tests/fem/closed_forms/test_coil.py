@@ -1,0 +1,60 @@
+"""Field of a round coil: against loops over its cross-section, its own curl, and the dipole that it is far off."""
+
+import numpy as np
+import pytest
+from scipy.special import ellipe, ellipk
+
+from spinlev.fem.closed_forms.coil import CoilField
+from spinlev.geometry.common import MU_0
+from spinlev.geometry.scene.contents import Coil
+
+COIL = Coil(np.array([0.01, -0.02, 0.005]), 0.041, 0.028, 0.052, 960.0, 1.0)
+FIELD = CoilField([COIL])
+PLACES = {
+    "over a turn": (0.03, 0.0298),
+    "at an edge": (0.0549, 0.03),
+    "near the axis": (0.001, 0.04),
+    "far": (0.2, 0.3),
+}
+
+
+def at(rho, z):
+    return COIL.center + np.array([rho, 0.0, z])
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_potential_is_that_of_its_loops(name):
+    rho, z = PLACES[name]
+    nodes, weights = np.polynomial.legendre.leggauss(300)
+    a, b = COIL.radius + COIL.width / 2 * nodes[:, None], COIL.height / 2 * nodes
+    k = 4 * a * rho / ((a + rho) ** 2 + (z - b) ** 2)
+    loops = MU_0 / np.pi * np.sqrt(a / rho / k) * ((1 - k / 2) * ellipk(k) - ellipe(k))
+    expected = COIL.turns * weights @ loops @ weights / 4
+    found = FIELD.vector_potential(at(rho, z))[0]
+    assert found[1] == pytest.approx(expected, rel=1e-10 if rho > 0.01 else 1e-8)  # loops cancel near the axis
+    assert found[[0, 2]] == pytest.approx(0.0, abs=1e-20)
+
+
+@pytest.mark.parametrize("place", [*PLACES.values(), (0.041, 0.01), (0.028, 0.0)])  # also in the winding
+def test_flux_density_is_the_curl(place):
+    point, step = at(*place), 2e-4
+    slopes = np.empty((3, 3))  # of component i along j
+    for j, axis in enumerate(np.eye(3)):
+        ends = FIELD.vector_potential([point + s * step * axis for s in (2, 1, -1, -2)])
+        slopes[:, j] = np.array([-1, 8, -8, 1]) @ ends / (12 * step)
+    curl = [slopes[2, 1] - slopes[1, 2], slopes[0, 2] - slopes[2, 0], slopes[1, 0] - slopes[0, 1]]
+    size = np.linalg.norm(FIELD.flux_density(point))
+    assert FIELD.flux_density(point)[0] == pytest.approx(curl, abs=1e-7 * size)
+
+
+def test_on_the_axis_far_off_it_is_a_dipole():
+    moment = COIL.turns * np.pi * (COIL.radius**2 + COIL.width**2 / 12)
+    field = FIELD.flux_density(at(0.0, 3.0))[0]
+    assert field[2] == pytest.approx(MU_0 * moment / (2 * np.pi * 3.0**3), rel=1e-3)
+    assert field[:2] == pytest.approx(0.0, abs=1e-20)
+
+
+def test_shares_are_currents():
+    other, place = Coil(np.array([0.0, 0.0, -0.1]), 0.05, 0.01, 0.02, 10.0, 1.0), at(0.02, 0.05)
+    both = CoilField([COIL, other], [2.0, -3.0]).flux_density(place)
+    assert both == pytest.approx(2 * FIELD.flux_density(place) - 3 * CoilField([other]).flux_density(place))
