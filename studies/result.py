@@ -350,8 +350,8 @@ def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
     data["stability"] = xr.Variable(("equilibrium",), kinds, {"long_name": "stable, marginal or unstable"})
     if any(e.kind for e in rows):
         data["kind"] = xr.Variable(("equilibrium",), np.array([e.kind for e in rows], dtype=str), {"long_name": "kind"})
-    growing = [e.efolding_s or np.inf for e in rows]
-    data["efolding"] = variable(("equilibrium",), growing, "s", "e-folding time of the least stable mode")
+    growing = np.array([e.efolding_s or np.nan for e in rows], float)
+    data["efolding"] = variable(("equilibrium",), growing, "s", "e-folding time of the least stable mode, if it grows")
     modes = [{mode.name: (mode.growth_per_s, mode.frequency_hz) for mode in e.modes} for e in rows]
     names = (*MODES, LIBRATION) if any(LIBRATION in each for each in modes) else MODES
     known = np.array([[each.get(name, (np.nan, np.nan)) for name in names] for each in modes], float)
