@@ -20,7 +20,7 @@ from ..motion.floater_effects import FloaterShape
 from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
-from .balance import CONVERGED_STEP, EVERY, Balance, solve, tangent_basis
+from .balance import CONVERGED_STEP, DUPLICATE_DISTANCE, EVERY, Balance, solve, tangent_basis
 from .curves import FARTHEST, SearchRange, fixed_points
 from .equilibrium import AVERAGED, LOCKED, Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey, modes
 from .locked import TURNS, locked_equilibrium, locked_poses, without_twins
@@ -158,10 +158,12 @@ def _survey_of_any_body(
         seeds = remembered(lambda: _search(round_scene, exactly, about, farthest, watch), AVERAGED)
         exact = replace(about, rates=Rates(exactly))
         place, moment, step = solve(exact, seeds.points[:, :3], seeds.points[:, 3:], EVERY)
-        free = [s < CONVERGED_STEP and rotor_gap(scene, p * scales.length, scene.floater.axes(m)) > 0
-                for p, m, s in zip(place, moment, step, strict=True)]  # fmt: skip
-        points = np.column_stack([place, moment])[free]
-        known = survey_of(round_scene, exact, FixedPoints.at(exact, points, seeds.doubts[free], seeds.curves))
+        points = np.column_stack([place, moment])[step < CONVERGED_STEP]  # two may have become one
+        points = points[np.sort(np.unique(np.round(points / DUPLICATE_DISTANCE), axis=0, return_index=True)[1])]
+        here, doubts = field_doubts(table, points[:, :3] * scales.length)
+        free = [rotor_gap(scene, p[:3] * scales.length, scene.floater.axes(p[3:])) > 0 for p in points[here]]
+        points, doubts = points[here][free], doubts[free]
+        known = survey_of(round_scene, exact, FixedPoints.at(exact, points, doubts, seeds.curves))
         found, curves = [replace(one, kind=AVERAGED) for one in known.equilibria], known.curves
     if scene.frequency and not np.any(scene.gravity[:2]):
         still = Balance(quick, values, ratio, still=True)
