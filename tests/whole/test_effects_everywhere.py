@@ -86,10 +86,10 @@ def ensemble(text, asked):
 
 
 def sweep(text, asked):
-    """Over frequencies, whose equilibria are those of one map."""
+    """Over frequencies, whose equilibria are those of one map; the first, as other shapes have others beside."""
     chosen = {"model": asked.model, "rtol": asked.rtol, "interaction": asked.interaction}
     scene, over = sl.parse_scene(text), {"frequency_hz": [129.0, 130.0]}
-    return sl.sweep(scene, over, "equilibria", plate_model=asked.plate_model, **chosen).growth.values
+    return sl.sweep(scene, over, "equilibria", plate_model=asked.plate_model, **chosen).growth.values[:, 0]
 
 
 def live_motion(text, asked):
