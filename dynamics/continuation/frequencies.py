@@ -317,7 +317,11 @@ def way_out(
     The `scene` has these `equilibria` in the field, and with the effects, of `table`, and the plate's currents, if they
     are modelled (`memory`).
     """
-    kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (e-folding time {1 / e.growth_per_s:.2g} s)" for e in equilibria)
+    rates = [e.growth_per_s for e in equilibria]
+    times = [f"{1 / g:.2g} s" if g < 10 else f"{1e3 / g:.2g} ms" for g in rates]
+    kinds = dict.fromkeys(
+        f"{1e3 * e.distance:.2f} mm (e-folding time {time})" for e, time in zip(equilibria, times, strict=True)
+    )
     found = f"only unstable ones: {', '.join(kinds)}" if kinds else "nor an unstable one below the rotor"
     if not scene.floater.round:
         scene, _, table = mean_over_turns(scene, table)

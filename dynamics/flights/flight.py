@@ -571,10 +571,11 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
     """Where a trajectory begins, or, where none may, the equilibrium whose modes grow least; None without any.
 
-    Of those that are stable along the axis, if there are some: others attract the floater or let it fall, and belong to
-    other branches. A brake destabilises those near the rotor the most.
+    Of those below the rotor that are stable along the axis, if there are some: others attract the floater or let it
+    fall, and belong to other branches. A brake destabilises those near the rotor the most.
     """
-    along = [e for e in equilibria if any(m.name == AXIAL and m.growth_per_s <= SLOWLY for m in e.modes)]
+    below = [e for e in equilibria if np.hypot(*e.position[:2]) < abs(e.position[2])]
+    along = [e for e in below if any(m.name == AXIAL and m.growth_per_s <= SLOWLY for m in e.modes)]
     return starting_point(equilibria) or min(along or equilibria, key=lambda e: e.growth_per_s, default=None)
 
 
