@@ -13,8 +13,11 @@ from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.studies.cli.options import Models
+from spinlev.geometry.scene.files import load_scene
+from spinlev.studies.cli.options import Models, default_scene
 from spinlev.studies.levitation import Levitation
+from spinlev.studies.page.state import first_state
+from spinlev.studies.page.work import preview
 
 PEER = "least squares + magpylib, no stability"
 MODELS = ["dipole", "cuboid", "fem"]
@@ -81,6 +84,17 @@ def test_one_equilibrium(benchmark, model):
     step, motion = benchmark(found)
     assert step[0] < 1e-8
     assert motion.stable
+
+
+@pytest.mark.benchmark(
+    group="a slider of the live page moves: point dipole, and finite elements with mutual magnetisation"
+)
+def test_slider(benchmark):
+    """Equilibria and stability by both models from those of a scene nearby, and what the page shows of them."""
+    state = first_state(load_scene(default_scene()))
+    near = preview(state, patient=True).places  # the tables are in the cache from here on
+    found = benchmark.pedantic(preview, (state.changed("rotor.angle_deg", 10.2), near), rounds=10, warmup_rounds=1)
+    assert [one.stability for one in found.models] == ["stable", "stable"]
 
 
 @pytest.mark.benchmark(group=MAP)
