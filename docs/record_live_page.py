@@ -45,7 +45,7 @@ def main() -> None:
                 time.sleep(PACE)
 
         tab.until("document.getElementById('map_says') !== null")
-        ready = "/Click to go/.test(at('map_says').textContent) && /^All/.test(at('sign').textContent)"
+        ready = "/there\\.$/.test(at('map_says').textContent) && /^All/.test(at('sign').textContent)"
         while not run(ready):
             time.sleep(1)
         tab.picture(PICTURES / "explore.png")

@@ -211,7 +211,7 @@ class Page:
         name = work.MODEL_WORDS[found.model]
         says = f"Blue: stable levitation without the plate, by {name}"
         says += "; grey line: point dipole. " if found.model != "dipole" else ". "
-        says += "Click to go there." if last else "Finite elements follow ..."
+        says += "Click to go there." if last else "Click to go there. Finite elements follow ..."
         self.tell(regions=vars(found), map_says=says)
 
     def _download(self, kind: str) -> None:

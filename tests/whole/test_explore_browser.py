@@ -144,7 +144,7 @@ def test_everything_that_can_be_done(server, browser, tmp_path):
     assert state["rotor.angle_deg"] == ["10.9"]
     assert state["token"] == parse_qs(urlsplit(server.address).query)["token"]
 
-    wait(tab, "/Click to go/.test(text('map_says'))")
+    wait(tab, "/^Blue/.test(text('map_says'))")  # by the dipole at first: it can be clicked from then on
     assert said(tab, "at('map').querySelectorAll('circle title').length") == 9  # tilts that the article tried
     click(tab, "map")
     wait(tab, "Math.abs(+at('frequency_hz').value - 160) < 30 && Math.abs(+at('rotor.angle_deg').value - 22) < 8")
