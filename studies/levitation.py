@@ -11,7 +11,7 @@ import numpy as np
 
 from ..dynamics.continuation.branch import BranchPoint, follow_branch
 from ..dynamics.continuation.frequencies import branch_through, by_frequency, on_branch
-from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, Equilibrium, EquilibriumError, Survey
+from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, PAST_TABLE, Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
 from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
@@ -57,6 +57,7 @@ from .plan import (
 )
 
 AHEAD = 1.0  # of a trajectory, s, that is looked at beforehand
+ANEW = 2  # tables at most that are made anew for an equilibrium that leaves the one about where it was without plate
 PLACES = 50  # on a trajectory, at which the error by a slab's missing edges is looked at
 
 
@@ -271,7 +272,18 @@ class Levitation:
         found = self.without_plate
         if self.plate is None:
             return free_of_bodies(self.still, found)
-        return with_plate(self.still, self.interaction, found, self.plate, self.rates)
+        over = with_plate(self.still, self.interaction, found, self.plate, self.rates)
+        first = most_like_levitation(found.equilibria)
+        for _ in range(ANEW):
+            # one that currents beside it push out of their table needs one about where it goes
+            past = [e.known for e in over.left_out if e.why == PAST_TABLE and (e.known.without or e.known) is first]
+            if not past:
+                break
+            way = past[0].laboratory_turn.position
+            place = np.array([np.hypot(*way.T[:2]).max(), 0.0, way[:, 2].mean()])
+            self.plate = self.plate_about(place, plate_plan(self.scene, self.models, place))
+            over = with_plate(self.still, self.interaction, found, self.plate, self.rates)
+        return over
 
     @property
     def equilibria(self) -> tuple[Equilibrium, ...]:

@@ -162,7 +162,11 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = u
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
         number = 30 if len(magnets) == 1 else 120 // len(magnets)
         places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, number, 2)])
-        near = places_around(magnets, floater.radius, NEAR_GAPS, 180 // len(magnets), 3) if len(magnets) > 1 else places[:0]
+        near = (
+            places_around(magnets, floater.radius, NEAR_GAPS, 180 // len(magnets), 3)
+            if len(magnets) > 1
+            else places[:0]
+        )
         both = np.concatenate([places, near])
         grids, pairs = sphere_fit(grids, images, both, sphere_samples(rotor, floater, both, watch))
         if rotor.permeable:

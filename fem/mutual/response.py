@@ -88,10 +88,13 @@ class RotorResponse(Protocol):
         """
 
 
-def closed_field(magnets: Sequence[Magnet], ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) about the ball's centre of the remanence alone, as if every μ were 1."""
-    magnetized = tuple(magnet for magnet in magnets if magnet.polarization.any())
-    table = RotorTable("cuboid", tuple(magnets), magnetized)
+def closed_form(magnets: Sequence[Magnet]) -> RotorTable:
+    """The field of the remanence alone, as if every μ were 1."""
+    return RotorTable("cuboid", tuple(magnets), tuple(magnet for magnet in magnets if magnet.polarization.any()))
+
+
+def coefficients_of(table: RotorTable, ball: Ball, degree: int) -> Coefficients:
+    """Coefficients a_lm (T) of a table's field about the ball's centre."""
     return interior_coefficients(lambda points: table.evaluate(points)[0], ball, degree)
 
 
@@ -117,25 +120,26 @@ class ChargeResponse:
         means = [
             m.recoil_permeability if m.isotropic else float(np.trace(m.permeability_in_rotor)) / 3 for m in magnets
         ]
-        self.magnets = magnets
+        self.magnets, self._closed = magnets, closed_form(magnets)
         self.permeable = any(magnet.contrast for magnet in magnets)
         self._shares = np.array([1 / (1 + (mean - 1) / 2) for mean in means])  # c/χ
         if self.permeable:
             self.charges = SurfaceCharges([isotropic(*each) for each in zip(magnets, means, strict=True)], count)
             along = [isotropic(magnet, magnet.recoil_permeability) for magnet in magnets]
-            self._carriers = tuple(carrier(magnet) for magnet in along)
+            carriers = tuple(carrier(magnet) for magnet in along)
+            self._closed = closed_form(carriers)
             alone = SurfaceCharges(along, own or count)
-            self._own = alone.places, alone.areas * alone.beyond(self._carriers)
+            self._own = alone.places, alone.areas * alone.beyond(carriers)
             # what two permeabilities add to that along the easy axis, to first order
             rest = [m.permeability_in_rotor - m.recoil_permeability * np.eye(3) for m in magnets]
-            self._across = closed_dipoles(self._carriers, rest, ACROSS)
+            self._across = closed_dipoles(carriers, rest, ACROSS)
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""
-        if not self.permeable:
-            return closed_field(self.magnets, ball, degree)
-        found = closed_field(self._carriers, ball, degree) + from_charges(*self._own, ball, degree)
-        return found + from_magnetization(*self._across, ball, degree)
+        found = coefficients_of(self._closed, ball, degree)
+        if self.permeable:
+            found += from_charges(*self._own, ball, degree) + from_magnetization(*self._across, ball, degree)
+        return found
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""

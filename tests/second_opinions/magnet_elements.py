@@ -25,7 +25,7 @@ from spinlev.fem.elements.magnetostatics import BOUNDARY_DEGREE, stiffness_of
 from spinlev.fem.elements.spaces import volume_points
 from spinlev.fem.harmonics.interior import Ball, from_magnetization
 from spinlev.fem.harmonics.solid import Coefficients, derivative, outer_sums
-from spinlev.fem.mutual.response import closed_dipoles, closed_field, direct_rule
+from spinlev.fem.mutual.response import closed_dipoles, closed_form, coefficients_of, direct_rule
 from spinlev.geometry.common import Array
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.magnets import MagnetMesh, mesh_magnets
@@ -127,7 +127,8 @@ class ElementResponse:
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""
-        return closed_field(self.magnets, ball, degree) + from_magnetization(*self.remanent_dipoles, ball, degree)
+        own = coefficients_of(closed_form(self.magnets), ball, degree)
+        return own + from_magnetization(*self.remanent_dipoles, ball, degree)
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""

@@ -8,9 +8,9 @@ import pytest
 from spinlev.dynamics.continuation.frequencies import reference_state, stable_range
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.studies.catalogue.article import rotor_scene
+from spinlev.studies.catalogue.article import over_plate, rotor_scene
 from spinlev.studies.catalogue.entries import CATALOGUE
-from spinlev.studies.catalogue.plates import ROTORS, PlateCase, cases, plate_damping
+from spinlev.studies.catalogue.plates import ROTORS, RTOL, PlateCase, cases, plate_damping, without_plate
 
 STUDY = CATALOGUE["plate-damping"]
 WEAK = 2e4
@@ -67,3 +67,15 @@ def test_the_sentence_and_figure_come_from_the_dataset_alone(weak):
 def test_every_rotor_that_levitated_has_a_plate_below_and_beside():
     found = [(case.sweep, case.configuration, case.measure) for case in cases(quick=False) if case.sweep in ROTORS]
     assert len(set(found)) == len(found) == 24
+
+
+def test_an_equilibrium_that_a_plate_beside_pushes_far_is_known():
+    """Out of the table about where it was without the plate, by more than three millimetres in the laboratory."""
+    case = PlateCase(ROTORS[1], 12.0, upright=True, part=0.5, configuration="vertical", measure=12.0)
+    alone, start = without_plate(case.configuration, case.measure, case.part, case.complete)
+    there, found, error = over_plate(alone, start, case.plate(start.position), "slab", RTOL)
+    assert there.plate is not None
+    assert np.all(there.plate.in_range(found.laboratory_turn.position, np.zeros(1)))
+    moved = found.laboratory_turn.position.mean(axis=0) - start.laboratory_turn.position.mean(axis=0)
+    assert np.linalg.norm(moved) > 3e-3
+    assert error < 2 * RTOL
