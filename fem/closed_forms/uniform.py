@@ -160,7 +160,7 @@ def _box_kernel(order: int) -> Any:
     return hy.cfunc(outputs, variables, fast_math=True)
 
 
-def cuboid_derivatives(points: Array, half_edges: Array, polarization: Array, order: int) -> Array:
+def _cuboid_derivatives(points: Array, half_edges: Array, polarization: Array, order: int) -> Array:
     """B and its derivatives up to `order` - 1, by their `entries` (n, k), at points (n, 3) m; see `cuboid_field`."""
     given = np.empty((6, len(points)))
     given[:3], given[3:] = points.T, half_edges[:, None]
@@ -302,7 +302,7 @@ class UniformField:
             assert isinstance(body, Box | Cylinder)
             local = body.to_body(points[~far])
             if isinstance(body, Box):
-                near = cuboid_derivatives(local, body.half_edges, polarization, order)
+                near = _cuboid_derivatives(local, body.half_edges, polarization, order)
             else:
                 near = segments_derivatives(local, body, polarization, order)
             turned = not np.array_equal(body.rotation, np.eye(3))

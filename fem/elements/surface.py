@@ -108,7 +108,7 @@ def face_rows(places: Array, normals: Array, halves: Array, counts: tuple[int, i
     return result.reshape(len(places), first * second) / FOUR_PI
 
 
-def far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Array:
+def _far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Array:
     """As `face_rows`, by the rule of the nodes alone: `sources` (n, 3) with `areas` (n,)."""
     sizes = np.sum(places**2, axis=1)[:, None] + np.sum(sources**2, axis=1)
     square = sizes - 2 * places @ sources.T
@@ -165,7 +165,7 @@ class Surface:
         return self.places, self.areas * charges
 
 
-class BoxSurface(Surface):
+class _BoxSurface(Surface):
     """Of a cuboid, face by face: on those at -x, x, -y, y, -z and z, with more nodes along longer edges."""
 
     def __init__(self, body: Box, count: int) -> None:
@@ -262,7 +262,7 @@ class BoxSurface(Surface):
             rows = face_rows(seen[near & off], normals[near & off][:, order], halves, counts)
             result[np.ix_(near & off, mine)] = rows
             result[np.ix_(near & ~off, mine)] = 0.0
-            apart = far_rows(places[~near], normals[~near], self.places[mine], self.areas[mine])
+            apart = _far_rows(places[~near], normals[~near], self.places[mine], self.areas[mine])
             result[np.ix_(~near, mine)] = apart
             on = near & ~off & (beyond[:, :2] == 0).all(axis=1)  # of a body that touches: the charges' own jump
             along, across = (_lagrange(seen[on, i] / halves[i], counts[i]) for i in range(2))
@@ -271,7 +271,7 @@ class BoxSurface(Surface):
         return result
 
 
-class RoundSurface(Surface):
+class _RoundSurface(Surface):
     """Of a cylinder or ring: n nodes along each line of its section, 2 n around."""
 
     def __init__(self, body: Cylinder, count: int, rule: tuple[Array, Array] | None = None) -> None:
@@ -304,13 +304,13 @@ class RoundSurface(Surface):
 
     @cached_property
     def coarse(self) -> tuple[Array, Array, Array]:
-        few = RoundSurface(self.body, COARSE, gauss_legendre(COARSE))
+        few = _RoundSurface(self.body, COARSE, gauss_legendre(COARSE))
         along = scipy.linalg.block_diag(*[_from_gauss(graded(self.count)[0])] * len(self.lines))
         return few.places, few.normals, np.kron(along, _around(np.pi * np.arange(2 * self.count) / self.count, COARSE))
 
     def rows_nearby(self, places: Array, normals: Array) -> Array:
         """As of `Surface`: the nodes' own rule, and the charges' own jump on flat faces that touch."""
-        result = far_rows(places, normals, self.places, self.areas)
+        result = _far_rows(places, normals, self.places, self.areas)
         radius = np.hypot(places[:, 0], places[:, 1])
         around, size = _around(np.arctan2(places[:, 1], places[:, 0]), self.count), 2 * self.count**2
         for number, (middle, way, normal) in enumerate(self.lines):
@@ -363,7 +363,7 @@ class RoundSurface(Surface):
         return np.array(result)
 
 
-class SphereSurface(Surface):
+class _SphereSurface(Surface):
     """Of a sphere, on which K of a harmonic of degree l is half of it by 2 l + 1."""
 
     def __init__(self, body: Sphere, count: int) -> None:
@@ -385,9 +385,9 @@ class SphereSurface(Surface):
 
 def _surface(body: Solid, count: int) -> Surface:
     if isinstance(body, Box):
-        return BoxSurface(body, count)
+        return _BoxSurface(body, count)
     assert isinstance(body, Cylinder | Sphere)
-    return RoundSurface(body, count) if isinstance(body, Cylinder) else SphereSurface(body, count)
+    return _RoundSurface(body, count) if isinstance(body, Cylinder) else _SphereSurface(body, count)
 
 
 def bears_charges(magnet: Magnet) -> bool:
@@ -463,7 +463,7 @@ class SurfaceCharges:
         at = np.flatnonzero(~self._far[number, self.owner] & (self.owner != number))
         mine, rows = self.owner == number, np.zeros((len(at), len(surface.places)))
         close = magnet.body.distance(self.places[at]) < surface.reach
-        rows[~close] = far_rows(self.places[at[~close]], self.normals[at[~close]], self.places[mine], self.areas[mine])
+        rows[~close] = _far_rows(self.places[at[~close]], self.normals[at[~close]], self.places[mine], self.areas[mine])
         if close.any():
             local = magnet.body.to_body(self.places[at[close]])
             rows[close] = surface.rows_nearby(local, self.normals[at[close]] @ magnet.body.rotation)
@@ -484,7 +484,7 @@ class SurfaceCharges:
         result = np.zeros((len(places), len(places)))
         for k in range(len(self.magnets)):
             far, mine = self._far[k, owner], owner == k
-            result[np.ix_(far, mine)] = far_rows(places[far], normals[far], places[mine], np.ones(mine.sum()))
+            result[np.ix_(far, mine)] = _far_rows(places[far], normals[far], places[mine], np.ones(mine.sum()))
         return result
 
     def normal_field(self, charges: Array) -> Array:

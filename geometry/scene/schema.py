@@ -90,7 +90,7 @@ def solid_of(table: Table) -> Solid:
     return Box(np.array([given["edge_mm"]] * 3 if shape == "cube" else given["size_mm"]) * MILLI, *pose)
 
 
-def placed_part(part: Part, center_mm: list[float], rotation_deg: list[float]) -> Part:
+def _placed_part(part: Part, center_mm: list[float], rotation_deg: list[float]) -> Part:
     """The solid of a file with the file's origin in a place, turned about it."""
     turn = rotation_matrix(rotation_deg)
     return replace(part, center=MILLI * np.array(center_mm) - turn @ part.origin, rotation=turn)
@@ -136,7 +136,7 @@ class MagnetTable(_Placed):
         polarization = np.array(self.polarization_T)
         if part is None:
             return Magnet(solid_of(self), polarization, *material)
-        part = placed_part(part, self.center_mm, self.rotation_deg)
+        part = _placed_part(part, self.center_mm, self.rotation_deg)
         body = known_shape(part) or part
         return Magnet(body, polarization if body is part else body.rotation.T @ part.rotation @ polarization, *material)
 
@@ -323,7 +323,7 @@ class PlateTable(_Placed):
         lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
         if part is None:
             return Plate(solid_of(self), self.conductivity_S_m, lowering)
-        body = placed_part(part, self.center_mm, self.rotation_deg)
+        body = _placed_part(part, self.center_mm, self.rotation_deg)
         return Plate(known_shape(body) or body, self.conductivity_S_m, lowering)
 
 

@@ -177,7 +177,7 @@ def force_curve(point: Point) -> xr.Dataset:
     else:
         shared = article.levitation_of(article.rotor_scene(*rotor, frequencies[0]), point["model"])
         rows = np.array([_along_curve(shared.elsewhere(frequency=float(f)), grid) for f in frequencies])
-    marks = np.array([balance_points(grid, row[0] + row[1], row[3]) for row in rows])
+    marks = np.array([_balance_points(grid, row[0] + row[1], row[3]) for row in rows])
     frequency = variable(ONE, frequencies, "Hz", "frequency of the rotor")
     distance = variable(("distance",), grid, "m", "distance along the axis")
     axes = {"frequency": frequency, "distance": distance}
@@ -196,7 +196,7 @@ def _along_curve(levitation: Levitation, grid: Array) -> Array:
     return np.asarray(CubicSpline(-curve.position[order, 2], found[:, order], axis=1, extrapolate=False)(grid))
 
 
-def balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[float, float, float, float, float]:
+def _balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[float, float, float, float, float]:
     """Stable point, far and near tipping points (m), and θ at the near and at the stable one; NaN where there is none.
 
     At the near one the force has done as much work up to the far one as is needed to come to rest there.

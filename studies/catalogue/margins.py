@@ -200,7 +200,7 @@ def band(part: xr.Dataset, quantity: str) -> Array:
 
 
 @showing.drawn
-def contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figure:
+def _contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figure:
     """What one standard deviation of each parameter does to distance or lowest frequency; with errors."""
     figure, rotors = showing.rotor_panels(result, 3.6, words, "", sharex=True)
     without = {"gravity", "frequency"} if quantity == "lowest" else {"gravity"}  # known, or of no influence
@@ -216,7 +216,7 @@ def contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figur
 
 
 @showing.drawn
-def bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> Figure:
+def _bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> Figure:
     """Quantities of the rotors within all tolerances together."""
     figure, rows = showing.configuration_panels(result, 2.6, ylabel=words)
     for axes, configuration, part in rows:
@@ -258,11 +258,11 @@ SENSITIVITY = Study(
     points=sensitivity_points,
     compute=sensitivity,
     figures={
-        "sensitivity-distance": partial(contributions_figure, quantity=MIDDLE, words=f"change (mm){ONE}"),
-        "sensitivity-frequency": partial(contributions_figure, quantity="lowest", words=f"change (Hz){ONE}"),
-        "sensitivity-distance-band": partial(bands_figure, quantities=[MIDDLE], words="distance in mid-range (mm)"),
+        "sensitivity-distance": partial(_contributions_figure, quantity=MIDDLE, words=f"change (mm){ONE}"),
+        "sensitivity-frequency": partial(_contributions_figure, quantity="lowest", words=f"change (Hz){ONE}"),
+        "sensitivity-distance-band": partial(_bands_figure, quantities=[MIDDLE], words="distance in mid-range (mm)"),
         "sensitivity-frequency-band": partial(
-            bands_figure, quantities=["lowest", "highest"], words="stable frequencies (Hz)"
+            _bands_figure, quantities=["lowest", "highest"], words="stable frequencies (Hz)"
         ),
     },
     report=sensitivity_lines,

@@ -21,7 +21,6 @@ from matplotlib.figure import Figure
 from scipy.special import iv, kv
 
 from ...dynamics.flights.conductor import (
-    ConductorMotion,
     Supply,
     conductor_motion,
     heights_over,
@@ -97,7 +96,7 @@ def in_phase(scene: Scene, phase: float) -> Scene:
     return replace(scene, coils=tuple(replace(coil, phase=phase) for coil in scene.coils))
 
 
-def sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple[str, float]]:
+def _sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple[str, float]]:
     """What changes of one thing do to the height at rest, m; those that need other modes if not `quick`.
 
     The modes of a conductor have other rates at another conductivity, and the same fluxes.
@@ -143,11 +142,6 @@ def sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple
     return [*found, *zip(variants, (a - b for a, b in zip(rests, before, strict=True)), strict=True)]
 
 
-def height_error(motion: ConductorMotion, half: float, time: Array, measured: Array) -> float:
-    """Root mean square (m) of the lower face's computed height less the measured."""
-    return float(np.sqrt(np.mean((np.interp(time, motion.time, motion.height) - half - measured) ** 2)))
-
-
 def swing(time: Array, height: Array) -> tuple[float, float]:
     """Period (s) and decay rate (1/s) of an oscillation about its last mean, by its upper turning points."""
     rest = float(height[time > SETTLED].mean())
@@ -171,21 +165,21 @@ def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     rest, computed = float(measured[time > SETTLED].mean()), resting_height(scene, modes)
     phases = np.linspace(0.0, np.pi, 2 if quick else PHASES, endpoint=False)
     motions = [conductor_motion(in_phase(scene, float(phase)), modes, DURATION) for phase in phases]
-    errors = [height_error(motion, half, time, measured) for motion in motions]
+    below = [np.interp(time, motion.time, motion.height) - half for motion in motions]  # heights of the lower face
+    errors = [float(np.sqrt(np.mean((heights - measured) ** 2))) for heights in below]
     best = int(np.argmin(errors))
-    sampled = np.interp(time, motions[best].time, motions[best].height) - half
-    (period, decay), (our_period, our_decay) = swing(time, measured), swing(time, sampled)
+    (period, decay), (our_period, our_decay) = swing(time, measured), swing(time, below[best])
     sensitivity = abs(computed * modes.error)
     rows: list[Row] = [
         ("TEAM 28: height at rest", "measurement", rest, computed, sensitivity, "m"),
         ("TEAM 28: period", "measurement", period, our_period, our_period * modes.error, "s"),
         ("TEAM 28: decay rate", "measurement", decay, our_decay, our_decay * modes.error, "1/s"),
     ]
-    changes, shifts = zip(*sensitivities(scene, modes, quick), strict=True)
+    changes, shifts = zip(*_sensitivities(scene, modes, quick), strict=True)
     data = {
         "change": list(changes), "shift": np.array(shifts), "missing": rest - computed,
-        "time": time, "measured_height": measured, "computed_height": sampled, "phase": phases, "rms": np.array(errors),
-        "height": computed, "energy_error": max(motion.energy_error for motion in motions),
+        "time": time, "measured_height": measured, "computed_height": below[best], "phase": phases,
+        "rms": np.array(errors), "height": computed, "energy_error": max(motion.energy_error for motion in motions),
         "seconds": max(motion.seconds for motion in motions),
     }  # fmt: skip
     return rows, data

@@ -128,13 +128,13 @@ def triangles(body: Solid) -> Surface:
         return corners, np.arange(len(corners)).reshape(-1, 3)
     if isinstance(body, Sphere):
         polar = np.linspace(np.pi, 0, SIDES // 2 + 1)
-        return revolved(body.radius * np.column_stack([np.sin(polar), np.cos(polar)]), body.center)
+        return _revolved(body.radius * np.column_stack([np.sin(polar), np.cos(polar)]), body.center)
     half, inner = body.height / 2, body.inner_radius
     profile = [(inner, -half), (body.radius, -half), (body.radius, half), (inner, half), (inner, -half)]
-    return revolved(np.array(profile), body.center, body.rotation[:, 2])
+    return _revolved(np.array(profile), body.center, body.rotation[:, 2])
 
 
-def revolved(profile: Array, center: Array, axis: Array | Sequence[float] = (0.0, 0.0, 1.0)) -> Surface:
+def _revolved(profile: Array, center: Array, axis: Array | Sequence[float] = (0.0, 0.0, 1.0)) -> Surface:
     """A surface of revolution about `axis` (3,) as `triangles`; the profile (n, 2) has radius and height from below."""
     side = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
     side /= np.linalg.norm(side)
@@ -150,7 +150,7 @@ def revolved(profile: Array, center: Array, axis: Array | Sequence[float] = (0.0
 def arrow(center: Array, direction: Array, half: float) -> Surface:
     """An arrow through a centre along a unit vector (3,), `half` of its length to each side, as of `triangles`."""
     profile = np.array([(0, -1), (0.07, -1), (0.07, 0.45), (0.2, 0.45), (0, 1)])
-    return revolved(half * profile, center, direction)
+    return _revolved(half * profile, center, direction)
 
 
 def near_plate(plate: Solid, reach: float) -> Solid:
