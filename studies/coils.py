@@ -54,7 +54,13 @@ def motion_dataset(scene: Scene, motion: ConductorMotion) -> xr.Dataset:
 
 
 def coils_summary(scene: Scene, duration: float, modes: FloatingModes) -> tuple[xr.Dataset, dict[str, Any]]:
-    """The trajectory of a scene with coils for a duration (s), and its numbers for JSON."""
+    """The trajectory of a scene with coils, and its numbers for JSON.
+
+    Parameters
+    ----------
+    scene, modes : as of `conductor_motion`
+    duration : s
+    """
     motion = conductor_motion(scene, modes, duration)
     still = [coil for coil in scene.coils if not isinstance(coil.current, float)]
     mean = float("nan")
@@ -75,7 +81,19 @@ def coils_summary(scene: Scene, duration: float, modes: FloatingModes) -> tuple[
 
 
 def coils_job(scene: Scene, duration: float, rtol: float, out: Path) -> Answer:
-    """`simulate` of a scene with coils; writes trajectory.nc and its figure."""
+    """`simulate` of a scene with coils; writes trajectory.nc and its figure.
+
+    Parameters
+    ----------
+    scene : without rotor and plate
+    duration : s
+    rtol : relative accuracy asked of the mean force
+    out : folder of the files
+
+    Raises
+    ------
+    InputError : as of `heights_over`
+    """
     modes, cached = modes_of(scene, rtol)
     result, values = coils_summary(scene, duration, modes)
     path = out / "trajectory.nc"

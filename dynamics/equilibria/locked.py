@@ -58,7 +58,17 @@ def locked_poses(rates: Rates, values: Array, points: Array, axes: Array) -> tup
 def locked_equilibrium(
     scales: Scales, rates: Rates, values: Array, position: Array, quaternion: Array, doubt: Array
 ) -> Equilibrium:
-    """That in a scaled position (3,) with a quaternion (4,), whose field is unsure by a `doubt` (2,), T and T/m."""
+    """The equilibrium in a pose of `locked_poses`, with its modes.
+
+    Parameters
+    ----------
+    scales : of the scene
+    rates : of a body that is not round
+    values : (p,) of the parameters
+    position : (3,) scaled
+    quaternion : (4,)
+    doubt : (2,) error of the field there, T, and of its gradient, T/m
+    """
     rate = float(values[Parameter.RATE])
     axes = matrices_of(quaternion)
     velocity = rate * np.array([-position[1], position[0], 0.0])

@@ -132,7 +132,14 @@ def heights_over(scene: Scene) -> tuple[float, float]:
 
 
 def levitation_height(modes: FloatingModes, supply: Supply, weight: float) -> float:
-    """Height (m) of the centre where the mean force carries a weight (N) and falls; NaN where there is none."""
+    """Height (m) of the centre where the mean force carries a weight and falls with height; NaN where there is none.
+
+    Parameters
+    ----------
+    modes : of the conductor over the coils
+    supply : of the coils, whose currents are sinusoidal
+    weight : N
+    """
     leaders = supply.leaders
     phasors = np.array([coil.current * np.exp(1j * (coil.phase - np.pi / 2)) for coil in leaders])
     frequencies = np.array([coil.frequency for coil in leaders])
@@ -147,7 +154,15 @@ def levitation_height(modes: FloatingModes, supply: Supply, weight: float) -> fl
 
 
 def conductor_motion(scene: Scene, modes: FloatingModes, duration: float, samples: int = 1000) -> ConductorMotion:
-    """Simulate a conductor over the coils of a `scene` for a duration (s), with `samples` a second."""
+    """Simulate a conductor over the coils of a scene, from its start until contact, loss or the end.
+
+    Parameters
+    ----------
+    scene : with an absolute start, within the heights of the modes
+    modes : of its floater over its coils
+    duration : s
+    samples : in a second; times at which a current has a corner are added
+    """
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)
     supply = Supply(scene.coils, sources_of(scene.coils))

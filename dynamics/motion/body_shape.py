@@ -214,7 +214,13 @@ class BodyShape:
     def wrench(self, field: DerivedField, position: Array, axes: Array) -> tuple[Array, Array]:
         """Force and torque (n, 6), N and N m, beside the dipole's, and their derivatives (n, 6, 6).
 
-        At positions (n, 3) m of a body with axes (n, 3, 3); by a change of place and by a turn about the rotor's axes.
+        The latter by a change of place, m, and by a small turn about the rotor's axes.
+
+        Parameters
+        ----------
+        field : the rotor's, with its derivatives
+        position : (n, 3) of the centre, m, rotor's frame
+        axes : (n, 3, 3) whose columns are the body's axes
         """
         own = slopes_of(FloaterSources.dipole(self.floater.dipole), field, position, axes)
         whole = slopes_of(self.sources, field, position, axes)

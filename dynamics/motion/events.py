@@ -26,7 +26,14 @@ Events = list[tuple[hy.expression, str]]
 
 
 def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events:
-    """Contact with the bodies of a scene and loss, at a scaled position."""
+    """Contact with the bodies of a scene, and loss.
+
+    Parameters
+    ----------
+    scene : the rotor's magnets, the plate if there is one, and the floater
+    position : three scaled expressions, rotor's frame
+    turn : of the rotor; of a drive `DRIVEN`
+    """
     length = hy.par[Parameter.LENGTH]
     metres = [length * p for p in position]
     gaps = [_excess(body, metres) for body in scene.turning_bodies]
@@ -38,7 +45,13 @@ def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events
 
 
 def range_events(memory: PlateMemory, position: Vector, turn: Turn = STEADY) -> Events:
-    """Where a scaled position leaves the range of a plate's table."""
+    """Where the floater leaves the range of a plate's table, by the six faces of it in pairs.
+
+    Parameters
+    ----------
+    memory : of the plate
+    position, turn : as of `flight_events`
+    """
     region = memory.table.region
     away = [x - float(c) for x, c in zip(seen_by_plate(memory.plate, position, turn), region.center, strict=True)]
     half = (region.upper - region.lower) / 2

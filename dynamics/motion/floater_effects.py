@@ -200,7 +200,18 @@ class FloaterShape:
         return Added(force, turn, energy=energy)
 
     def missed(self, table: FieldTable, position: Array, moment: Array) -> Array:
-        """(n, 2) what the dipoles miss of torque, T, and force, T/m, at `position` (n, 3) m and `moment` (n, 3)."""
+        """(n, 2) what the dipoles miss of torque, T, and of force, T/m, by the floater's moment.
+
+        Parameters
+        ----------
+        table : the rotor's field
+        position : (n, 3) of the centre, m, rotor's frame
+        moment : (n, 3) its direction
+
+        Raises
+        ------
+        RangeError : as of `force_and_torque`
+        """
         axes = np.array([self.floater.axes(m) for m in moment])
         force, torque = force_and_torque(self.sources, table, position, axes)
         for height, dipole in zip(self.heights, self.dipoles + (self.heights == 0), strict=True):

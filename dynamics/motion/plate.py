@@ -81,10 +81,16 @@ class PlateMemory:
 
 
 def plate_numbers(memory: PlateMemory, values: Array, driven: bool = False) -> Array:
-    """Runtime parameters of a plate, from those of `parameters`.
+    """Runtime parameters of a plate.
 
     They are -λT of each state, then for each harmonic of the rotor's share what its currents q - r are in each
     multipole, and, of a plate that goes down, the harmonics of q of each state, or, with a drive, those of r.
+
+    Parameters
+    ----------
+    memory : of the plate
+    values : as of `parameters`
+    driven : whether the scene has a drive
     """
     table = memory.table
     velocity = ENDLESS if driven else float(values[Parameter.RATE]) / float(values[Parameter.TIME])

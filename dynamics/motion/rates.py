@@ -91,7 +91,13 @@ class Rates:
     ) -> tuple[Array, Array]:
         """What has to vanish at rest in the rotor's frame (n, 5), and its derivatives (n, 5, 5), see `balances`.
 
-        At scaled positions and moments (n, 3) with their tangents (n, 2, 3) and body spins (n,); `values` as above.
+        Parameters
+        ----------
+        position, moment : (n, 3), scaled, and the direction of the moment
+        tangents : (n, 2, 3) of the moment, along which it is turned
+        spin : (n,) body spins
+        values : of the parameters, (p,) for all or (n, p)
+        still : whether the body is at rest in the rotor's frame: its spin is then that given times cos θ
         """
         given = np.empty((13, len(position)))
         given[:3], given[3:6], given[12] = position.T, moment.T, spin

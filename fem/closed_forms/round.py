@@ -210,7 +210,14 @@ def segments_field(
 
 
 def segments_derivatives(points: Array, body: Cylinder, polarization: Array, order: int) -> Array:
-    """B and its derivatives up to `order` - 1, by their `entries` (n, k), at points (n, 3) m; see `segments_field`."""
+    """B and its derivatives up to `order` - 1, by their `entries` (n, k), in the body's own axes.
+
+    Parameters
+    ----------
+    points : (n, 3) m, from the centre along the body axes
+    body, polarization : as of `segments_field`
+    order : 1 for B alone
+    """
     rows = _segments(body, polarization).T
     found = np.empty((len(points), order * (order + 2)))
     for start in range(0, len(points), TOGETHER):

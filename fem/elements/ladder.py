@@ -286,11 +286,17 @@ def in_ball(solution: RotorSolution, points: Array) -> NDArray[np.bool_]:
 
 
 def potential_slopes(solution: RotorSolution, points: Array, beside: Array) -> tuple[Array, Array]:
-    """∇ψ (n, 3) T and its slope ∂_i ∂_j ψ (n, 3, 3) T/m at points (n, 3) m in the ball, rotor's frame.
+    """∇ψ (n, 3) T and its slope ∂_i ∂_j ψ (n, 3, 3) T/m in the ball of the elements, rotor's frame.
 
     ∇ψ converges as h^p, its slope one order slower. Next to a face, nearer than some 1e-4 of an element, the mesh may
-    find a point on the wrong side: where the material is not that of the place `beside` (n, 3) m, which lies farther
-    from the face on the same side, ∇ψ is continued from there by its slope.
+    find a point on the wrong side: where the material is not that of the place `beside`, ∇ψ is continued from there by
+    its slope.
+
+    Parameters
+    ----------
+    solution : of the rotor
+    points : (n, 3) m in the ball
+    beside : (n, 3) m, for each point a place farther from the face on the same side
     """
     mesh, planes, axes = solution.mesh, solution.symmetry.planes, solution.symmetry.axes
     places, others = _in_mesh(solution, points), _in_mesh(solution, beside)

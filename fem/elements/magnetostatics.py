@@ -73,7 +73,21 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
 def stiffness_of(
     mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int, way_out: str
 ) -> tuple[Any, Any]:
-    """The space H1 and ∫ ∇v·μ∇ψ on it, condensed, with the Robin term of the sphere `outer`."""
+    """The space H1 and ∫ ∇v·μ∇ψ on it, condensed, with the Robin term of the sphere `outer`.
+
+    Parameters
+    ----------
+    mesh : of NGSolve, with the boundary `outer`
+    permeability : (3, 3) μ/μ0 by the name of a region; 1 in the others
+    ball_radius : of that sphere, in the unit of the mesh
+    order : of the elements
+    way_out : what to do where memory is short, for the message
+
+    Raises
+    ------
+    MeshError : layers of elements do not match
+    TooLargeError : the memory does not hold the system
+    """
     space = ng.H1(mesh, order=order)
     require_memory(space, space.FreeDofs(True), way_out)
     trial, test = space.TnT()

@@ -138,7 +138,14 @@ class CompiledField:
 def differentiated(
     known: Mapping[Entry, hy.expression], variables: Sequence[hy.expression], last: int
 ) -> list[hy.expression]:
-    """Derivatives of a harmonic function by their `entries`, from those `known` of one degree up to the `last` one."""
+    """Derivatives of a harmonic function by their `entries`, of all degrees beyond the known ones.
+
+    Parameters
+    ----------
+    known : derivatives of one degree, by their entries
+    variables : x, y and z
+    last : highest degree
+    """
     found: list[hy.expression] = []
     for degree in range(len(next(iter(known))) + 1, last + 1):
         slopes = hy.diff_tensors(list(known.values()), diff_args=list(variables), diff_order=1).jacobian

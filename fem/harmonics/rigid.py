@@ -95,6 +95,14 @@ def _clean(values: Array) -> Array:
 def field_coefficients(
     evaluate: Callable[[Array], Array], center: Array, reach: float, degree: int, unit: float
 ) -> Array:
-    """A (K,) T m, lengths in a `unit` (m), of a field, points (n, 3) m -> B (n, 3) T, known within `reach` (m)."""
+    """Coefficients A (K,) T m of a field, lengths in a unit.
+
+    Parameters
+    ----------
+    evaluate : B (n, 3) T at points (n, 3) m
+    center, reach : (3,) m and m, of the ball in which the field is known
+    degree : highest
+    unit : of lengths, m
+    """
     found = real_weights(interior_coefficients(evaluate, Ball(center, reach), degree))
     return np.asarray(found * reach * (unit / reach) ** shells(degree))

@@ -94,7 +94,14 @@ def closed_form(magnets: Sequence[Magnet]) -> RotorTable:
 
 
 def coefficients_of(table: RotorTable, ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) of a table's field about the ball's centre."""
+    """Coefficients a_lm (T) of a table's field about the ball's centre.
+
+    Parameters
+    ----------
+    table : of a rotor, which knows its field in the ball
+    ball : free of the sources
+    degree : highest of the coefficients
+    """
     return interior_coefficients(lambda points: table.evaluate(points)[0], ball, degree)
 
 
@@ -167,9 +174,13 @@ class ChargeResponse:
 
 
 def direct_rule(magnets: Sequence[Magnet], nearest: float, shares: ArrayLike = 1.0) -> tuple[Array, Array]:
-    """Points (n, 3) m and (μ - 1) dV (n, 3, 3) m³ for fields with sources no nearer to the magnets than so many m.
+    """Points (n, 3) m and (μ - 1) dV (n, 3, 3) m³ in magnets, for integrals of fields over them.
 
-    With `shares` (k,) of each magnet of which μ - 1 is taken.
+    Parameters
+    ----------
+    magnets : k of them
+    nearest : distance of the fields' sources from the magnets at least, m
+    shares : (k,) or one for all, part of each magnet's μ - 1 that is taken
     """
     points, tensors = [], []
     for magnet, share in zip(magnets, np.broadcast_to(shares, len(magnets)), strict=True):

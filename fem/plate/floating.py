@@ -43,7 +43,14 @@ class AxialPotential:
 
     @classmethod
     def of(cls, field: CoilField, radius: float, heights: tuple[float, float]) -> "AxialPotential":
-        """Of coils whose axis is z."""
+        """Potential of coils whose axis is z.
+
+        Parameters
+        ----------
+        field : of the coils
+        radius : of the cylinder, m
+        heights : lowest and highest of the cylinder in the coils' frame, m
+        """
         low, high = heights
         squares = (1 + _nodes(RADII)) / 2 * radius**2
         places = np.stack(np.meshgrid(np.sqrt(squares), (low + high) / 2 + (high - low) / 2 * _nodes(HEIGHTS)), -1)
@@ -118,7 +125,14 @@ class FloatingModes:
         return flux, slope
 
     def mean_force(self, height: float, amplitudes: Array, frequencies: Array) -> float:
-        """Force (N) upwards at rest, in the mean of a period, of sources with complex amplitudes (A) of e^{iωt}."""
+        """Force (N) upwards at rest, in the mean of a period.
+
+        Parameters
+        ----------
+        height : of the centre, m, within `heights`
+        amplitudes : (sources,) complex, of the currents' e^{iωt}, A
+        frequencies : (sources,) of the currents, Hz; sources of different ones do not act together in the mean
+        """
         flux, slope = self.flux(height)
         total = 0.0
         for frequency in np.unique(frequencies):
@@ -199,7 +213,13 @@ def cached_floating_modes(
     rtol: float,
     report: Callable[[str], None],
 ) -> tuple[FloatingModes, bool]:
-    """`floating_modes` from the cache if they are there, and whether they were; `report` gets messages."""
+    """`floating_modes` from the cache if they are there, and whether they were.
+
+    Parameters
+    ----------
+    body, conductivity, coils, shares, heights, frequency, rtol : as of `floating_modes`
+    report : gets messages
+    """
     windings = [(coil.center, coil.radius, coil.width, coil.height, coil.turns) for coil in coils]
     inputs = (
         body.shape_numbers,

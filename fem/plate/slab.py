@@ -191,10 +191,16 @@ def slab_modes(slab: Slab, wave_numbers: Array, count: int) -> SlabModes:
 
 
 def modes_needed(slab: Slab, wave_number: float, frequency: float, tolerance: float) -> int:
-    """Modes that leave out less than `tolerance` of the reflection up to `wave_number` (1/m) and `frequency` (Hz).
+    """Number of modes that leave out less than a tolerance of the reflection.
 
     What N modes leave out is 4 k κ² t³ / (3 π⁴ N³), κ² = ωμ0σ, of a reflection near 1, and 16 (kt)³ / (3 π⁴ N³) of one
     in the limit of slow changes; in between the sum is enough.
+
+    Parameters
+    ----------
+    slab : its thickness t and conductivity σ
+    wave_number, frequency : the highest, 1/m and Hz
+    tolerance : of the reflection, whose largest value is 1
     """
     kt, squared = wave_number * slab.thickness, 2 * np.pi * frequency * MU_0 * slab.conductivity * slab.thickness**2
     return int(np.ceil(np.cbrt(4 * kt * (squared + 4 * kt * kt) / (3 * np.pi**4 * tolerance)))) + 4

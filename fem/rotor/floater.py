@@ -181,6 +181,11 @@ def shares(floater: Floater, sources: FloaterSources, highest: int) -> Array:
 
     By that of its magnets' moments taken together, the mean over directions: what is left out with a degree. The part
     of degree 1 is what the floater's dipole misses.
+
+    Parameters
+    ----------
+    floater, sources : the floater, and dipoles and charges in its place
+    highest : degree of the multipoles
     """
     radius, degrees = floater.radius, multipole_degrees(highest + 1)
     own = np.zeros(len(degrees))

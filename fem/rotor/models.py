@@ -287,7 +287,14 @@ SOME = 5  # every so many places are looked at from step to step
 
 
 def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
-    """Why charges on their surfaces do not describe the magnets at points (n, 3) m; empty where they do."""
+    """Why charges on their surfaces do not describe the magnets; empty where they do.
+
+    Parameters
+    ----------
+    magnets : of the rotor
+    accuracy : asked of the table
+    points : (n, 3) m at which it is to hold, as of `error_points`
+    """
     permeable = [magnet for magnet in magnets if magnet.contrast]
     if any(isinstance(magnet.body, Part) for magnet in permeable):
         return "one is a part from a STEP file"
@@ -309,7 +316,14 @@ def _ratios(magnets: Sequence[Magnet], points: Array) -> list[float]:
 
 
 def moment_error(magnets: Rotor, points: Array, scale: Array) -> float:
-    """What leaving out the permeability does to B at points (n, 3) m by the moments alone, by `scale` (n,) T."""
+    """What leaving out the permeability does to B by the moments alone, the largest over the points.
+
+    Parameters
+    ----------
+    magnets : of the rotor; those from STEP files are left out
+    points : (n, 3) m
+    scale : (n,) T that errors are relative to
+    """
     missing = np.zeros((len(points), 3))
     for magnet in magnets:
         if magnet.contrast and not isinstance(magnet.body, Part):

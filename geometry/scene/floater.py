@@ -75,9 +75,13 @@ class Floater:
         conductivity: float | None = None,
         moments_of_inertia: tuple[float, float, float] | None = None,
     ) -> Self:
-        """A floater of `pieces` in the scene file's frame, whose centre of mass may be anywhere.
+        """A floater of pieces whose centre of mass may be anywhere.
 
-        `moments_of_inertia` (kg m²) about the file's axes through it take the place of those of the pieces.
+        Parameters
+        ----------
+        pieces : in the scene file's frame
+        conductivity : S/m, as of `Floater`
+        moments_of_inertia : kg m² about the file's axes through the centre of mass, in place of those of the pieces
         """
         masses = np.array([piece.mass for piece in pieces])
         center = masses @ [centroid(piece.magnet.body) for piece in pieces] / masses.sum()

@@ -40,7 +40,14 @@ RULES = {
 
 
 class SceneError(InputError):
-    """A scene file that cannot be used; `faults` lists everything that is wrong with its `text`, if that is given."""
+    """A scene file that cannot be used.
+
+    Parameters
+    ----------
+    source : what messages call it
+    faults : everything that is wrong
+    text : of the file, if it is given, in which the lines of keys are found
+    """
 
     def __init__(self, source: str, faults: Sequence[str], text: str = "") -> None:
         self.faults = tuple(faults)

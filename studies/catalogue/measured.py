@@ -186,8 +186,16 @@ def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
 
 
 def tube_reaction(inner: float, outer: float, conductivity: float, frequency: float) -> complex:
-    """G_zz, T/(A m²), of an infinite tube at its axis: of each harmonic e^{ikz} of a dipole's A_φ, k K₁(kρ), C I₁(kρ)
-    comes back, with A and H continuous at both walls (m)."""
+    """G_zz, T/(A m²), of an infinite tube at its axis.
+
+    Of each harmonic e^{ikz} of a dipole's A_φ, k K₁(kρ), C I₁(kρ) comes back, with A and H continuous at both walls.
+
+    Parameters
+    ----------
+    inner, outer : radii, m
+    conductivity : S/m
+    frequency : Hz
+    """
     nodes, weights = np.polynomial.legendre.leggauss(400)
     k, dk = 20 / inner * (nodes + 1), 20 / inner * weights
     within = np.sqrt(k**2 + 2j * np.pi * frequency * MU_0 * conductivity)
