@@ -69,8 +69,13 @@ class Compared:
 def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:
     """Levitation distances (mm) by the point dipole, that of the true moment and the best model, without the plate.
 
-    Of the dipoles' equilibria those nearest to where the floater levitates by the best model, of this `name`, or else
-    where it does by the dipole; a model without any has None. None where neither has one.
+    Of the dipoles' equilibria those nearest to where the floater levitates by the best model, or else where it does by
+    the dipole; a model without any has None. None where neither has one.
+
+    Parameters
+    ----------
+    dipole, true_moment, best : equilibria of one scene by these models
+    name : of the best model
     """
     true = most_like_levitation(best.equilibria)
     rough = nearest_of(dipole.equilibria, true.position) if true else most_like_levitation(dipole.equilibria)
@@ -92,10 +97,15 @@ def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str
 
 
 def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compared]:
-    """A `scene` by dipole, dipole of the true moment, closed form, finite elements, and with mutual magnetisation.
+    """A scene by dipole, dipole of the true moment, closed form, finite elements, and with mutual magnetisation.
 
-    The plate's model and the tolerances are those `requested`; a scene with a field map has that in the place of the
-    finite elements. What mutual magnetisation cannot be computed for is left out with a message.
+    What mutual magnetisation cannot be computed for is left out with a message.
+
+    Parameters
+    ----------
+    scene : one with a field map has that in the place of the finite elements
+    requested : model of the plate and tolerances
+    spin : body spin
 
     Raises
     ------
@@ -296,7 +306,18 @@ def compare_figure(result: xr.Dataset) -> Figure:
 
 
 def compare_job(scene: Scene, requested: Models, spin: float, frequencies: Array | None, out: Path) -> Answer:
-    """Every model's results for a `scene`; writes compare.nc, compare.json and the figure to `out`."""
+    """Every model's results; writes compare.nc, compare.json and the figure.
+
+    Parameters
+    ----------
+    scene, requested, spin : as of `compared`
+    frequencies : (n,) Hz at which the distances are compared too, or None
+    out : folder of the files
+
+    Raises
+    ------
+    EquilibriumError : as of `compared`
+    """
     rows = compared(scene, requested, spin)
     best = rows[-1]
     result = compared_dataset(rows, frequencies)

@@ -147,7 +147,20 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
 def response(
     plate: Plate, place: Array, frequency: float, model: str, rtol: float
 ) -> tuple[str, ComplexArray, float, list[str]]:
-    """Model, tensor G (3, 3), T/(A m²), laboratory frame, its estimated relative error, and tables from the cache."""
+    """Model, tensor G (3, 3), T/(A m²), laboratory frame, its estimated relative error, and tables from the cache.
+
+    Parameters
+    ----------
+    plate : whose response it is
+    place : (3,) of the dipole, m, laboratory frame
+    frequency : Hz
+    model : "slab", "fem", "reduced" or "auto": the slab where its edges change no more than `rtol`, else "fem"
+    rtol : relative accuracy asked of G
+
+    Raises
+    ------
+    InputError : the place is not over one of the plate's two largest faces, with the slab
+    """
     body, size, turn = plate.box.to_body(place), plate.box.size, plate.box.rotation
     normal = int(np.argmin(size))
     height = abs(body[normal]) - size[normal] / 2

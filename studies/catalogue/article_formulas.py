@@ -33,7 +33,13 @@ class AxialForce:
 
 
 def field(configuration: str, value: float, distance: Array) -> tuple[Array, Array]:
-    """|B⊥| and B_z (T) on the axis at `distance` (m), by the formulas of the polar angle without a side mode."""
+    """|B⊥| and B_z (T) on the axis, by the formulas of the polar angle without a side mode.
+
+    Parameters
+    ----------
+    configuration, value : of the rotor, as of `force`
+    distance : (n,) m
+    """
     across, along, _, _ = PARTS[configuration](CONFIGURATIONS[configuration].scale * value, distance, 0 * distance)
     unit = INTERACTION / FLOATER.moment
     return np.abs(unit * across), unit * along
@@ -46,10 +52,15 @@ def side_radius(distance: ArrayLike, frequency: ArrayLike) -> Array:
 
 
 def force(configuration: str, value: float, distance: ArrayLike, frequency: float, simple: bool = False) -> AxialForce:
-    """Force on the floater at `distance` (m): the semi-analytic form, or the `simple` one for small angles.
+    """Force on the floater: the semi-analytic form, or the simple one for small angles.
 
-    The simple form (horizontal and tilt) has θ = m_f B⊥/(I ω²), and in the tilted case no side mode.  `value` is in the
-    configuration's unit.
+    Parameters
+    ----------
+    configuration : "horizontal", "vertical" or "tilt"
+    value : displacement, mm, or tilt, degrees
+    distance : (n,) m
+    frequency : Hz
+    simple : whether θ = m_f B⊥/(I ω²), and no side mode in the tilted case; not for the vertical one
     """
     d, parameter = np.asarray(distance, float), CONFIGURATIONS[configuration].scale * value
     scale, a = 3 * INTERACTION / d**4, side_radius(d, frequency)
@@ -94,9 +105,14 @@ PARTS = {"horizontal": _horizontal, "vertical": _vertical, "tilt": _tilt}
 
 
 def balanced(configuration: str, value: float, frequency: float, load: float) -> tuple[float, float]:
-    """Distances (m) of the stable and of the unstable point at which the semi-analytic force is `load` (N), else NaN.
+    """Distances (m) of the stable and of the unstable point at which the semi-analytic force is a load, else NaN.
 
     Unstable is the farthest place at which attraction falls below the load, stable the next nearer one.
+
+    Parameters
+    ----------
+    configuration, value, frequency : as of `force`
+    load : N
     """
     grid = np.geomspace(CONTACT, FARTHEST, 600)
 
@@ -112,7 +128,13 @@ def balanced(configuration: str, value: float, frequency: float, load: float) ->
 
 
 def analytic_distance(configuration: str, value: float, frequency: ArrayLike) -> Array:
-    """Distance without gravity and for small angles, m: equations 17 and 36 of the supplement; NaN for vertical."""
+    """Distance without gravity and for small angles, m: equations 17 and 36 of the supplement; NaN for vertical.
+
+    Parameters
+    ----------
+    configuration, value : as of `force`
+    frequency : (n,) Hz
+    """
     rate = 2 * np.pi * np.asarray(frequency, float)
     parameter = CONFIGURATIONS[configuration].scale * value
     angular, linear = INTERACTION / (FLOATER.inertia * rate**2), INTERACTION / (FLOATER.mass * rate**2)

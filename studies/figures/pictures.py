@@ -25,7 +25,13 @@ ANGLES = 8  # Of the rotor, from which the part of its field at the rotor's freq
 
 
 def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> View:
-    """The end of a trajectory (n, 3) along the rotor's axes at times (n,) s, with its path and the field."""
+    """The end of a trajectory with its path and the field.
+
+    Parameters
+    ----------
+    scene, time, motion : as of `seen_from`
+    table : the rotor's field
+    """
     view, field = seen_from(scene, time, motion), drawn_field(scene, table)
     depth = max(abs(1e3 * float(view.position[2])), 10.0)
     width = max(1.6 * depth, 30.0)
@@ -36,10 +42,16 @@ def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> Vi
 
 
 def seen_from(scene: Scene, time: Array, motion: State) -> View:
-    """The end of a trajectory (n, 3) along the rotor's axes at times (n,) s, with its path.
+    """The end of a trajectory with its path.
 
     A floater that gravity across the axis keeps on one side of it does not turn with the rotor: its path is that in the
     laboratory, and it stands where it is at an instant near the end at which the rotor's axes are the laboratory's.
+
+    Parameters
+    ----------
+    scene : that was simulated
+    time : (n,) s
+    motion : its vectors (n, 3) along the rotor's axes
     """
     frame, last = "rotor's frame", len(time) - 1
     if np.any(scene.gravity[:2]):
@@ -70,7 +82,12 @@ def drawn_field(scene: Scene, table: FieldTable) -> Callable[[Array], Array]:
 
 
 def flight_frames(scene: Scene, time: Array, motion: State) -> Frames:
-    """The frames of an animation of a trajectory (n, 3) along the rotor's axes at times (n,) s."""
+    """The frames of an animation of a trajectory, laboratory frame.
+
+    Parameters
+    ----------
+    scene, time, motion : as of `seen_from`
+    """
     instants = frame_times(scene, float(time[-1]))
     position, moment = (
         np.stack([np.interp(instants, time, component) for component in vectors.T], axis=-1)
@@ -86,12 +103,15 @@ def flight_frames(scene: Scene, time: Array, motion: State) -> Frames:
 def plate_currents(scene: Scene, plate: Plate, table: RotorTable, floater: State, points: Array) -> Array:
     """Current density (n, 3), A/m², laboratory frame, in a plate on which rotor and floater have long been turning.
 
+    The part at the rotor's frequency only; harmonics are left out.
+
     Parameters
     ----------
+    scene : its floater and frequency
+    plate : its plate
+    table : the rotor's field
     floater : along the rotor's axes, at the instant at which these are the laboratory's; its place is taken as fixed
     points : (n, 3) m inside the plate, laboratory frame
-
-    The part at the rotor's frequency only; harmonics are left out.
     """
     turning = np.array([[1, 1j, 0], [-1j, 1, 0], [0, 0, 0]]) @ floater.moment
     place = plate.box.to_body(floater.position[None])

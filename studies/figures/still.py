@@ -143,7 +143,16 @@ def _add_frame(plotter: pv.Plotter, frames: Frames, k: int) -> list[pv.Actor]:
 def add_floater(
     plotter: pv.Plotter, scene: Scene, position: Array, moment: Array, axes: Array | None = None
 ) -> list[pv.Actor]:
-    """Draw the floater's body, turned as its `axes` or else its moment say, and its moment; positions m."""
+    """Draw the floater's body and its moment.
+
+    Parameters
+    ----------
+    plotter : of PyVista, lengths in mm
+    scene : whose floater it is
+    position : (3,) m
+    moment : (3,) its direction, or zero
+    axes : (3, 3) whose columns are the body's axes; None: those that the moment gives
+    """
     floater = scene.floater
     direction = moment / (np.linalg.norm(moment) or 1.0)
     drawn = [
@@ -155,7 +164,14 @@ def add_floater(
 
 
 def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = None) -> None:
-    """Draw the part of the plate near the rotor, with its currents where they are given: the longest arrow is 12 mm."""
+    """Draw the part of the plate near the rotor, if there is one, with its currents: the longest arrow is 12 mm.
+
+    Parameters
+    ----------
+    plotter : of PyVista, lengths in mm
+    scene : whose plate it is
+    currents : in the plate, where they are to be seen
+    """
     if scene.plate is None:
         return
     _add_body(plotter, near_plate(scene.plate.body, SEEN), METAL, opacity=0.2)

@@ -112,7 +112,14 @@ class Shown:
 def become(
     state: PageState, method: str, arguments: tuple[Any, ...], near: Sequence[Any]
 ) -> tuple[PageState, Shown | str]:
-    """Another state, by a method of `PageState`, and its preview from places `near`, or why there is none."""
+    """Another state and its preview, or why there is none.
+
+    Parameters
+    ----------
+    state : the one before
+    method, arguments : of `PageState`, which gives the other
+    near : places, as of `preview`
+    """
     made: PageState = getattr(state, method)(*arguments)
     made.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
     try:
@@ -129,8 +136,14 @@ def compared(state: PageState) -> list[FieldModel]:
 def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -> Shown:
     """Equilibria without the plate's currents, while a slider moves.
 
-    They are those that Newton's method finds from places `near` (as of `Shown.places`), else from the point dipole's,
-    else all that a search finds. Finite elements that are not in the cache are left out unless one is `patient`.
+    They are those that Newton's method finds from places nearby, else from the point dipole's, else all that a search
+    finds.
+
+    Parameters
+    ----------
+    state : what the page shows
+    near : places to begin at, as of `Shown.places`
+    patient : whether finite elements are computed where they are not in the cache; else they are left out
     """
     known: dict[str, Levitation] = {}
     fresh: Sequence[Any] = ()  # places by the point dipole, the first of all
