@@ -174,12 +174,16 @@ class EquilibriumMap:
         return np.asarray(self.eigenvalues.real.max(axis=1))
 
     @property
+    def lasting(self) -> NDArray[np.bool_]:
+        """(k,) whether no mode grows faster than `MARGINAL`."""
+        return np.asarray(self.growth_per_s <= np.maximum(MARGINAL, self.errors))
+
+    @property
     def number(self) -> tuple[Indices, Indices]:
-        """Equilibria, and those at which no mode grows faster than `MARGINAL`: two of (frequencies, measures)."""
+        """Equilibria, and those that are `lasting`: two of (frequencies, measures)."""
         shape = len(self.frequencies), len(self.measures)
         place, size = self.row * shape[1] + self.column, shape[0] * shape[1]
-        lasting = self.growth_per_s <= np.maximum(MARGINAL, self.errors)
-        every, stable = np.bincount(place, minlength=size), np.bincount(place[lasting], minlength=size)
+        every, stable = np.bincount(place, minlength=size), np.bincount(place[self.lasting], minlength=size)
         return every.reshape(shape), stable.reshape(shape)
 
 

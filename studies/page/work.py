@@ -16,6 +16,7 @@ from ...dynamics.continuation.map import EquilibriumMap, equilibrium_map
 from ...dynamics.continuation.rotor_family import RotorFamily, rotor_family
 from ...dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
 from ...dynamics.equilibria.equilibrium import (
+    MARGINAL,
     MODE_NAMES,
     STABILITIES,
     Equilibrium,
@@ -357,7 +358,7 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
     ]  # fmt: skip
     if not pairs:
         return {}
-    which = {(int(found.row[k]), int(found.column[k])): k for k in np.flatnonzero(found.stable)[::-1]}
+    which = {(int(found.row[k]), int(found.column[k])): k for k in np.flatnonzero(found.lasting)[::-1]}
     first = np.array([which[one] for one, _ in pairs])
     position, moment = found.position[first] / family.scene.floater.radius, found.moment[first]
     axes = found.frequencies, found.measures
@@ -377,7 +378,8 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
             there.states(places[good], turned[good]),
             there.rates(there.states(places[good], turned[good]), there.values)[1],
         )
-        good = good[is_stable(eigenvalues, errors)]
+        slow = MARGINAL * Scales.of(family.scene).time
+        good = good[is_stable(eigenvalues, np.maximum(errors, slow))]
         position[good], moment[good], low[good] = places[good], turned[good], middle[good]
         high[np.setdiff1d(np.arange(len(pairs)), good)] = middle[np.setdiff1d(np.arange(len(pairs)), good)]
     return dict(zip(pairs, ((low + high) / 2).tolist(), strict=True))

@@ -87,7 +87,7 @@ def test_in_a_rings_hole_nobody_says_how_large_currents_in_it_would_be(monkeypat
         effects, "growth_by_rotor", lambda _, there, *rest: float(told.setdefault(there.position[2], -2.0))
     )
     for height in (-1e-5, -20e-3):
-        there = SimpleNamespace(position=np.array([0.0, 0.0, height]), without=None)
+        there = SimpleNamespace(position=np.array([0.0, 0.0, height]), without=None, kind="")
         listed = effects._rotor_currents(sl.Levitation(scene), there)
         assert (listed.growth_per_s is None) == ("so near" in listed.why) == (height > -10e-3)
     assert list(told) == [-20e-3]

@@ -175,7 +175,7 @@ def test_ends_of_flights_are_probabilities_that_add_to_one():
     """One that falls, one that grows by 9 e-folds of 6.4, and one without an equilibrium."""
     rest = np.full(3, 0.1)
     margin, fall, growth = np.array([0.1, 0.1, -0.1]), np.array([20.0, np.inf, 5.0]), np.array([3.0, 9.0, 0.0])
-    course = {"margin": margin, "fall": fall, "growth": growth, "doubt": rest, "shaken": np.full(3, np.inf)}
+    course = {"margin": margin, "fall": fall, "growth": growth, "doubt": rest, "perturbed": np.full(3, np.inf)}
     surrogate = Surrogate("single", np.zeros((1, 6), int), np.zeros((1, len(FITTED))), np.full(len(FITTED), 0.01), 1)
     found = ends(Models({"single": surrogate}), MIDDLE, course, {"motion": np.full(3, 5.0)})
     np.testing.assert_allclose(sum(found.values()), 1.0, atol=1e-12)

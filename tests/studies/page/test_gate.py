@@ -167,7 +167,7 @@ def test_what_is_too_large_is_not_waited_for(page, content):
 def test_a_page_for_other_machines_says_so(monkeypatch, caplog):
     caplog.set_level("INFO", "spinlev")
     monkeypatch.setattr("spinlev.studies.page.server.LivePage.run", lambda pages: pages.stop())
-    with cli.heard(), contextlib.redirect_stdout(io.StringIO()):
+    with cli.printing(), contextlib.redirect_stdout(io.StringIO()):
         for host in ("0.0.0.0", "::"):
             assert cli._status(["explore", str(OVER_PLATE), "--no-browser", "--host", host], io.StringIO()) == 0
             assert f"Other machines can open this page (--host {host})" in caplog.text

@@ -81,7 +81,7 @@ SHAPES = {
         ["rotor.displacement_mm", "rotor.diameter_mm", "rotor.height_mm", "floater.height_mm", "plate.center_mm.2"],
         "",
     ),
-    "cuboid floater": ("sphere", "cuboid", "", [f"floater.size_mm.{k}" for k in range(3)], "floater.shape must"),
+    "cuboid floater": ("sphere", "cuboid", "", [f"floater.size_mm.{k}" for k in range(3)], "averaged over"),
 }
 """Rotor, floater, plate, sliders that there must be, and a part of what the page says."""
 
