@@ -68,12 +68,12 @@ def _section(work, rows):
         return "\n".join([*lines, "Not run yet.", "", ""])
     better, table = [], []
     for case in work.cases:
-        ours = curves.get((case, OURS))
         found = [(peer, pairs) for (one, peer), pairs in curves.items() if one == case]
+        ours = sorted(pair for peer, pairs in found if peer.startswith(OURS) for pair in pairs)
         told = [(_ratio(ours, pairs), _line(work, case, peer, pairs, ours, rows)) for peer, pairs in found]
         for peer, pairs in found:
             error, ratio = best_for_them(ours, pairs) if ours else (np.nan, np.nan)
-            if peer != OURS and ratio < 1:
+            if not peer.startswith(OURS) and ratio < 1:
                 better.append(f"{peer} ({case}: {ratio:.2g} of our time at {error:.0e})")
         table += [line for _, line in sorted(told, key=lambda pair: pair[0])]
     first = f"Quicker than spinlev: {', '.join(better) or 'none at any error that was reached'}."
@@ -90,13 +90,13 @@ def _line(work, case, peer, pairs, ours, rows):
     mine = [row for row in _rows(work, rows) if row["case"] == case and row["peer"] == peer and "values" in row]
     runs = "; ".join(f"{e:.1e} in {seconds(t)}" for t, e in pairs)
     times = errors = ""
-    if peer != OURS and ours:
+    if not peer.startswith(OURS) and ours:
         times = "{1:.2g} at {0:.1e}".format(*at_equal_error(ours, pairs))
         time, finer = at_equal_time(ours, pairs)
         errors = {0.0: "ours takes longer", np.inf: "takes longer"}.get(finer, f"{finer:.2g} in {seconds(time)}")
     slope = exponent(pairs)
     memory = max(row["memory_MB"] for row in mine)
-    name = f"**{peer}**" if peer == OURS else peer
+    name = f"**{peer}**" if peer.startswith(OURS) else peer
     columns = (case, name, runs, times, errors, "" if np.isnan(slope) else f"{slope:.1f}")
     return f"| {' | '.join(columns)} | {_own_limit(work, case, peer, mine, rows)} | {memory} MB |"
 
