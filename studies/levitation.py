@@ -329,9 +329,10 @@ class Levitation:
         """The other equilibria that meet those of `branch` in its lowest fold, from there up to the first frequency."""
         if not self.branch or self.branch[0].kind != FOLD:
             return ()
-        below = [point for point in self.branch if point.parameter <= self.still.frequency]
+        mean = self.mean
+        below = [point for point in self.branch if point.parameter <= mean.still.frequency]
         near = max(below, key=lambda point: point.parameter)
-        family = by_frequency(self.still, self.rates, self.spin)
+        family = by_frequency(mean.still, mean.rates, self.spin)
         points = follow_branch(family, near.state, near.parameter, self.branch[0].parameter / 2)
         folds = [k for k, point in enumerate(points) if point.kind == FOLD]
         return tuple(points[folds[0] + 1 :]) if folds else ()

@@ -107,3 +107,19 @@ def test_python_takes_steps():
     assert float(found["rotor_frequency"][-1]) == pytest.approx(120.0)
     assert "[[drive]]" in found.attrs["scene"]
     assert "motor_torque" not in simulate(SCENE, 0.05, "dipole", "none")
+
+
+@pytest.mark.slow
+def test_beside_the_ramp_of_a_cube_are_the_equilibria_of_its_mean(tmp_path):
+    """Averaged over its own turn, through the fold to the other branch."""
+    text = """frequency_hz = 100.0
+    rotor = {configuration = "tilt", edge_mm = 10.0, angle_deg = 10.0, remanence_T = 1.3}
+    floater = {shape = "cuboid", size_mm = [10.0, 10.0, 10.0], remanence_T = 1.3, density_kg_m3 = 7500.0}
+    drive = [{to_hz = 99.0, in_s = 0.5}]"""
+    (tmp_path / "cube.toml").write_text(text)
+    levitation = Levitation(tmp_path / "cube.toml", Models("dipole", "none"))
+    fold, other = levitation.branch[0], levitation.beyond_fold
+    assert fold.parameter < 100.0
+    assert other[-1].parameter == pytest.approx(100.0)
+    here = min(levitation.branch, key=lambda point: abs(point.parameter - 100.0))
+    assert abs(other[-1].state[2] - here.state[2]) > 1.0  # radii
