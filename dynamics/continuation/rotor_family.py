@@ -23,7 +23,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import rotation_matrix
 from ...geometry.solids import moved
-from ..motion.effect import Added, Effect, Interaction, Motion, Placeable
+from ..motion.effect import Added, Effect, Interaction, Motion, Placeable, Poses
 from ..motion.effects import mutual_choice, with_effects
 from ..motion.equations import parameters
 from ..motion.floater_effects import check_floater_metal
@@ -132,20 +132,12 @@ class MovedEffect:
     def count(self) -> int:
         return self.effect.count
 
-    def numbers(
-        self,
-        field: DerivedField,
-        flux: Array,
-        position: Array,
-        moment: Array,
-        values: Array,
-        quaternion: Array | None = None,
-    ) -> Array:
-        """See `Placeable`; for `flux`, `position` and `moment` as seen from the part."""
-        measure, length = values[:, Parameter.MEASURE], values[:, [Parameter.LENGTH]]
-        place = np.transpose(self.move.place(list((position * length).T), measure)) / length
-        flux, moment = (np.transpose(self.move.into(list(vectors.T), measure)) for vectors in (flux, moment))
-        return self.effect.numbers(field, flux, place, moment, values)
+    def numbers(self, field: DerivedField, poses: Poses) -> Array:
+        """See `Placeable`; for poses as seen from the part."""
+        measure, length = poses.values[:, Parameter.MEASURE], poses.values[:, [Parameter.LENGTH]]
+        place = np.transpose(self.move.place(list(poses.places.T), measure)) / length
+        flux, moment = (np.transpose(self.move.into(list(v.T), measure)) for v in (poses.flux, poses.moment))
+        return self.effect.numbers(field, replace(poses, position=place, moment=moment, flux=flux, quaternion=None))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,8 @@ each other are one.
 import numpy as np
 
 from ...geometry.common import Array
-from ..motion.quaternions import left_product, matrices_of, quaternions_of
 from ..motion.rates import Rates
-from ..motion.state import Parameter, Scales
+from ..motion.state import Parameter, Scales, left_product, matrices_of, quaternions_of
 from .balance import CONVERGED_STEP, DUPLICATE_DISTANCE
 from .equilibrium import LOCKED, Equilibrium, eigenmodes
 

@@ -297,9 +297,8 @@ def with_plate(
         round_scene, exactly, _ = mean_over_turns(scene, table)
         means = [e for e in known.equilibria if e.kind == AVERAGED]
         over = with_plate(round_scene, exactly, replace(known, equilibria=tuple(means)), memory)
-        rest = [
-            e for e in known.equilibria if e.kind != AVERAGED
-        ]  # frequency-locked ones are reported without the plate
+        # frequency-locked ones are reported without the plate
+        rest = [e for e in known.equilibria if e.kind != AVERAGED]
         return _survey([*(replace(e, kind=AVERAGED) for e in over.equilibria), *rest], known.curves, over.left_out)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
     return _forced(ForcedMotion(scene, rates or Rates(with_effects(scene, table)), values, memory), known)

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import heyoka as hy
 
-from .quaternions import rotation_of
-from .state import Parameter, Vector, cross, dot, subtract, turned
+from .state import Parameter, Vector, cross, dot, rotation_of, subtract, turned
 
 Matrix = list[list[hy.expression]]
 ROUND_NAMES = tuple(f"{vector}_{axis}" for vector in ("moment", "spin") for axis in "xyz")

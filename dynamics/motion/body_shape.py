@@ -24,16 +24,14 @@ from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable, RangeErro
 from ...geometry.common import Array
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Solid
-from .effect import Added, Motion
+from .effect import Added, Motion, Poses
 from .floater_effects import FLOATER_SHAPE
-from .quaternions import matrices_of
-from .state import Parameter, State, Vector, cross, dot, dotted
+from .state import Parameter, State, Vector, cross, dot, dotted, matrices_of
 
 HIGHEST = 7  # degree of the multipoles in a trajectory
 WAY = 3  # degree of what they feel, in a place within a ball
-KEPT = (
-    5e-3  # of the dipole's force, one radius off the body: shells of multipoles with less are left out of simulations
-)
+# Of the dipole's force, one radius off the body: shells of multipoles with less are left out of simulations
+KEPT = 5e-3
 # Size of the multipoles' states by those of the dipole: they act so much less. A step must not be short for their sake.
 LITTLE = 0.02
 ALLOWED = 2e-4  # error of the force in a ball by that of the dipole
@@ -190,26 +188,19 @@ class BodyShape:
             2.0 * (-a * z - b * y + c * x + d * w),
         ]
 
-    def numbers(
-        self,
-        field: DerivedField,
-        flux: Array,
-        position: Array,
-        moment: Array,
-        values: Array,
-        quaternion: Array | None = None,
-    ) -> Array:
+    def numbers(self, field: DerivedField, poses: Poses) -> Array:
         """See `Placeable`."""
-        length, inertia, share = (values[:, [p]] for p in (Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE))
-        if quaternion is None:
-            axes, turn = np.array([self.floater.axes(m) for m in moment]), np.pad(moment, ((0, 0), (0, 1)))
+        which = (Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE)
+        length, inertia, share = (poses.values[:, [p]] for p in which)
+        if poses.quaternion is None:
+            axes, turn = np.array([self.floater.axes(m) for m in poses.moment]), np.pad(poses.moment, ((0, 0), (0, 1)))
         else:
-            axes, turn = matrices_of(quaternion), quaternion
-        wrench, slopes = self.wrench(field, position * length, axes)
+            axes, turn = matrices_of(poses.quaternion), poses.quaternion
+        wrench, slopes = self.wrench(field, poses.places, axes)
         units = np.concatenate([np.repeat(share**2 * length, 3, 1), np.repeat(share**2 / inertia, 3, 1)], axis=1)
-        steps = np.concatenate([np.repeat(length, 3, 1), np.ones_like(moment)], axis=1)
+        steps = np.concatenate([np.repeat(length, 3, 1), np.ones_like(poses.moment)], axis=1)
         scaled = units[:, :, None] * slopes * steps[:, None]
-        return np.concatenate([position, turn, units * wrench, scaled.reshape(len(position), 36)], axis=1)
+        return np.concatenate([poses.position, turn, units * wrench, scaled.reshape(-1, 36)], axis=1)
 
     def wrench(self, field: DerivedField, position: Array, axes: Array) -> tuple[Array, Array]:
         """Force and torque (n, 6), N and N m, beside the dipole's, and their derivatives (n, 6, 6).

@@ -67,6 +67,22 @@ class Effect(Protocol):
         """Its part of the equations of motion; it may use every runtime `Parameter`."""
 
 
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Many poses of the floater, scaled, with what is there."""
+
+    position: Array  # (n, 3)
+    moment: Array  # (n, 3) direction
+    flux: Array  # (n, 3) T, the rotor's B
+    values: Array  # (n, p) runtime parameters
+    quaternion: Array | None = None  # (n, 4) of a body that is not round
+
+    @property
+    def places(self) -> Array:
+        """(n, 3) m."""
+        return self.position * self.values[:, [Parameter.LENGTH]]
+
+
 @runtime_checkable
 class Placeable(Effect, Protocol):
     """An effect of so long expressions that `Rates` has it at one pose, by numbers among the runtime parameters."""
@@ -78,19 +94,8 @@ class Placeable(Effect, Protocol):
     def placed(self, first: int) -> Placeable:
         """The same with numbers from runtime parameter `first` on; it and its first derivatives hold at one pose."""
 
-    def numbers(
-        self,
-        field: DerivedField,
-        flux: Array,
-        position: Array,
-        moment: Array,
-        values: Array,
-        quaternion: Array | None = None,
-    ) -> Array:
-        """(n, count) at scaled positions and moments (n, 3), for runtime parameters `values` (n, p).
-
-        `field` is the rotor's, and `flux` (n, 3) T its B there; `quaternion` (n, 4) that of a body that is not round.
-        """
+    def numbers(self, field: DerivedField, poses: Poses) -> Array:
+        """(n, count) in the rotor's field."""
 
 
 @runtime_checkable

@@ -34,8 +34,7 @@ from ...geometry.scene.contents import Scene
 from .attitude import ROUND_NAMES, TURNING_NAMES, round_attitude, turning_attitude
 from .effect import Motion, interaction_of
 from .plate import PlateMemory, memory_terms
-from .quaternions import left_product, rotation_of
-from .state import DRIVEN, STEADY, Parameter, Scales, Vector, cross, dot, subtract, turned
+from .state import DRIVEN, STEADY, Parameter, Scales, Vector, cross, dot, left_product, rotation_of, subtract, turned
 
 CENTRE = tuple(f"{vector}_{axis}" for vector in ("position", "velocity") for axis in "xyz")
 NAMES = (*CENTRE, *ROUND_NAMES)

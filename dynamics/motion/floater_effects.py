@@ -57,7 +57,7 @@ from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AIR_VISCOSITY, Scene
 from ...geometry.scene.floater import Floater
-from .effect import ZERO, Added, Effect, Motion, dissipative
+from .effect import ZERO, Added, Effect, Motion, Poses, dissipative
 from .state import Parameter, Vector, cross, dot
 
 REAL_AIR = "air beyond Stokes"
@@ -166,19 +166,11 @@ class FloaterShape:
         numbers = range(len(self.heights) - 1)
         return replace(self, fields=tuple(LocalField(first + k * LocalField.count) for k in numbers))
 
-    def numbers(
-        self,
-        field: DerivedField,
-        flux: Array,
-        position: Array,
-        moment: Array,
-        values: Array,
-        quaternion: Array | None = None,
-    ) -> Array:
+    def numbers(self, field: DerivedField, poses: Poses) -> Array:
         """See `Placeable`."""
         found = []
         for height in self.heights[1:]:
-            places = position * values[:, [Parameter.LENGTH]] + height * moment
+            places = poses.places + height * poses.moment
             found += [places, field.derivatives(places, LocalField.ORDER)]
         return np.concatenate(found, axis=1)
 

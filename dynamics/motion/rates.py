@@ -20,10 +20,9 @@ from ...fem.harmonics.expressions import CompiledField
 from ...fem.harmonics.interior import LocalField
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import Array
-from .effect import Effect, Interaction, Placeable, interaction_of
+from .effect import Effect, Interaction, Placeable, Poses, interaction_of
 from .equations import Equations, balances, equations_of_motion, locked_balances, still_balances
-from .quaternions import matrices_of
-from .state import Parameter
+from .state import Parameter, matrices_of
 
 
 class Rates:
@@ -139,7 +138,8 @@ class Rates:
         if self._rough:
             parts += [np.zeros((count, part.count)) for part in self._placed]
         else:
-            parts += [part.numbers(field, slopes[:, :3], position, moment, rows, quaternion) for part in self._placed]
+            poses = Poses(position, moment, slopes[:, :3], rows, quaternion)
+            parts += [part.numbers(field, poses) for part in self._placed]
         return np.ascontiguousarray(np.concatenate([part.T for part in parts]))
 
     @cached_property

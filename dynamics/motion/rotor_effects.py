@@ -37,7 +37,7 @@ from ...geometry.common import MU_0, Array, even_directions
 from ...geometry.magnets import Magnet, polarizability
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.floater import Floater
-from .effect import Added, Motion, conservative, dissipative
+from .effect import Added, Motion, Poses, conservative, dissipative
 from .state import Parameter, Scales, State, Vector, cross, dot, dotted, subtract
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
@@ -163,26 +163,19 @@ class Mutual(_Near):
         strength, share = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.PLATE_SHARE]
         return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
 
-    def numbers(
-        self,
-        field: DerivedField,
-        flux: Array,
-        position: Array,
-        moment: Array,
-        values: Array,
-        quaternion: Array | None = None,
-    ) -> Array:
+    def numbers(self, field: DerivedField, poses: Poses) -> Array:
         """See `Placeable`."""
-        length, strength, share = values[:, WHICH].T[:, :, None]
-        place = position * length
-        whole = strength * moment + self.table.polarizability * share * flux
-        energy, slope, second = self.table.derivatives(place, whole / share)
+        length, strength, share = poses.values[:, WHICH].T[:, :, None]
+        whole = strength * poses.moment + self.table.polarizability * share * poses.flux
+        energy, slope, second = self.table.derivatives(poses.places, whole / share)
         units = np.repeat(np.concatenate([length, np.ones_like(length)], axis=1), 3, axis=1)
         slope, second = slope * units, second * units[:, :, None] * units[:, None, :]
         quadratic = np.stack([second[:, a, b] / _twice(a, b) for a, b in PAIRS], axis=1)
-        linear = np.concatenate([slope[:, 3:, None], second[:, 3:, :3]], axis=2).reshape(len(place), 12)
+        linear = np.concatenate([slope[:, 3:, None], second[:, 3:, :3]], axis=2).reshape(-1, 12)
         constant = np.stack([second[:, 3 + a, 3 + b] for a, b in PAIRS], axis=1)
-        return np.concatenate([position, whole, energy[:, None], slope[:, :3], quadratic, linear, constant], axis=1)
+        return np.concatenate(
+            [poses.position, whole, energy[:, None], slope[:, :3], quadratic, linear, constant], axis=1
+        )
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
         """See `Fittable`; what is missed of the energy is taken to change as fast as a cubic."""
@@ -303,17 +296,9 @@ class RotorCurrents(_Near):
         known = dict(zip(ENTRIES, entries, strict=True))
         return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
 
-    def numbers(
-        self,
-        field: DerivedField,
-        flux: Array,
-        position: Array,
-        moment: Array,
-        values: Array,
-        quaternion: Array | None = None,
-    ) -> Array:
+    def numbers(self, field: DerivedField, poses: Poses) -> Array:
         """See `Placeable`."""
-        return self._entries(position * values[:, Parameter.LENGTH, None]).T
+        return self._entries(poses.places).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
         parts = self._entries(ball.center + ball.radius * nodes())

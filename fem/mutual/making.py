@@ -13,6 +13,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Part, places_off
 from ..cache import TableKind
+from ..closed_forms.potentials import unit_dipole_fields
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
 from .response import COARSE, FINE, OF_MANY, OWN, ChargeResponse, enough_degree, two_body
@@ -25,7 +26,6 @@ from .samples import (
     response_products,
     returned_samples,
     sphere_samples,
-    unit_dipole_fields,
 )
 from .table import (
     OF_RETURN,

@@ -9,6 +9,7 @@ from ...geometry.common import MU_0, Array, Watch, watched
 from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import places_off
+from ..closed_forms.potentials import unit_dipole_fields, unit_dipole_potentials
 from ..harmonics.interior import Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
 from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums
 from .response import ChargeResponse, enough_degree
@@ -60,20 +61,6 @@ def _clear(magnets: Sequence[Magnet], places: Array, distance: float) -> Array:
     """Those of the places (n, 3) m that are no nearer to any magnet than a distance, m."""
     nearest = np.min([magnet.body.distance(places) for magnet in magnets], axis=0)
     return np.asarray(places[nearest >= distance * (1 - 1e-6)])
-
-
-def unit_dipole_fields(points: Array, places: Array) -> Array:
-    """Fields (3 p, n, 3) T at points (n, 3) m of unit moments along x, y, z at each of the places (p, 3) m."""
-    d = points - places[:, None]
-    distance = np.linalg.norm(d, axis=2)[..., None]
-    fields = [3 * d * d[..., a : a + 1] / distance**5 - np.eye(3)[a] / distance**3 for a in range(3)]
-    return np.asarray(MU_0 / FOUR_PI * np.stack(fields, axis=1).reshape(-1, len(points), 3))
-
-
-def unit_dipole_potentials(points: Array, places: Array) -> Array:
-    """Potentials ψ (n, 3 p) T m, b = -∇ψ, of the fields of `unit_dipole_fields` at points (n, 3) m."""
-    d = points[:, None] - places
-    return np.asarray((MU_0 / FOUR_PI * d / np.sum(d * d, axis=2)[..., None] ** 1.5).reshape(len(points), -1))
 
 
 def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Array]:

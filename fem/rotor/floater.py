@@ -10,7 +10,6 @@ which have these multipoles because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s), and n
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Self
 
 import numpy as np
@@ -20,6 +19,7 @@ from ...geometry.common import MU_0, Array, even_directions
 from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import rotation_matrix
+from ..closed_forms.potentials import unit_dipole_fields
 from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
 from ..harmonics.interior import sphere
 from ..harmonics.rigid import field_coefficients, harmonics, matrices, shells as multipole_degrees
@@ -194,10 +194,9 @@ def shares(floater: Floater, sources: FloaterSources, highest: int) -> Array:
     own[1:4] -= FloaterSources.dipole(floater.dipole).multipoles(1, radius)[1:4]
     slopes, forces = matrices(highest + 1)[0], np.zeros(highest + 1)
     for place in 2 * radius * even_directions(DIRECTIONS):
-        for pole in np.eye(3):
-            field = field_coefficients(
-                partial(_dipole_field, place, pole), np.zeros(3), radius / 2, highest + 1, radius
-            )
+        for pole in range(3):
+            of_pole = lambda points, at=place[None], k=pole: unit_dipole_fields(points, at)[k]  # noqa: E731
+            field = field_coefficients(of_pole, np.zeros(3), radius / 2, highest + 1, radius)
             pulls = np.einsum("akl,k,l->al", slopes, field, own) / radius
             plain = np.linalg.norm(np.einsum("akl,k->al", slopes, field)[:, 1:4]) / radius**2
             sizes = [np.linalg.norm(pulls[:, degrees == l].sum(axis=1)) for l in range(highest + 1)]
@@ -208,13 +207,6 @@ def shares(floater: Floater, sources: FloaterSources, highest: int) -> Array:
 def strength(floater: Floater) -> float:
     """A m², the moments of a floater's magnets together, whatever their directions; 1 without any."""
     return sum(float(np.linalg.norm(magnet.moment)) for magnet in floater.magnets) or 1.0
-
-
-def _dipole_field(place: Array, moment: Array, points: Array) -> Array:
-    """B (n, 3) T at points (n, 3) m of a `moment` (3,) A m² in a `place` (3,) m."""
-    away = points - place
-    distance = np.linalg.norm(away, axis=1, keepdims=True)
-    return np.asarray(MU_0 / (4 * np.pi) * (3 * (away @ moment)[:, None] * away / distance**5 - moment / distance**3))
 
 
 TOGETHER = 200_000  # points at which a field is looked at at once

@@ -16,8 +16,7 @@ from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.events import rotor_gap
-from spinlev.dynamics.motion.quaternions import matrices_of, quaternions_of
-from spinlev.dynamics.motion.state import Parameter, Scales, State
+from spinlev.dynamics.motion.state import Parameter, Scales, State, matrices_of, quaternions_of
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.rotor import tilt
 from spinlev.geometry.scene.contents import AbsoluteStart
