@@ -17,7 +17,7 @@ from ..dynamics.equilibria.search import free_of_bodies
 from ..dynamics.flights.flight import starting_point
 from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
 from ..fem.cache import program_digest
-from ..fem.closed_forms.eddy_sphere import ComplexArray
+from ..fem.closed_forms.eddy_bodies import ComplexArray
 from ..fem.files import write_whole
 from ..fem.plate.eddy import plate_reaction
 from ..fem.plate.slab import Slab, edge_error, reaction_tensor

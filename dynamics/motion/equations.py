@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import heyoka as hy
 import numpy as np
 
-from ...fem.closed_forms.eddy_sphere import thin_field_torque
+from ...fem.closed_forms.eddy_bodies import thin_field_torque
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene

@@ -49,7 +49,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...fem.closed_forms.eddy_sphere import skin_number
+from ...fem.closed_forms.eddy_bodies import skin_number
 from ...fem.harmonics.interior import LocalField
 from ...fem.rotor.floater import FloaterSources, force_and_torque
 from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable

@@ -29,7 +29,7 @@ from ...geometry.meshes.plate import PLANES, MeshRule
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box
 from ..cache import TableKind
-from ..closed_forms.eddy_sphere import ComplexArray
+from ..closed_forms.eddy_bodies import ComplexArray
 from ..elements.spaces import Parity
 from .eddy import CHUNK, MESH_SHARE, EddySpace, Ladder, ShiftedSystem, Source, source_images
 from .table import Region

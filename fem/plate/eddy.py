@@ -26,7 +26,7 @@ from ...geometry.common import MU_0, Array, Watch, unwatched
 from ...geometry.meshes.plate import MILLIMETRE, PLANES, ConductorMesh, MeshRule, plate_mesh, skin_depth
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box
-from ..closed_forms.eddy_sphere import ComplexArray
+from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import HomogeneousField, unit_dipoles
 from ..elements.condensed import require_memory, solve_condensed
 from ..elements.spaces import Parity, edge_vertices, region_edges, tree_edges, value_matrix

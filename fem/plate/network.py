@@ -24,7 +24,7 @@ import scipy
 
 from ...geometry.common import Array, Watch
 from ...geometry.scene.contents import Plate
-from ..closed_forms.eddy_sphere import ComplexArray
+from ..closed_forms.eddy_bodies import ComplexArray
 from .currents import STRICT, OtherSources, PlateSolution, grid_counts, probe_places, space_couplings, unit_power
 from .eddy import Source
 from .multipoles import Multipoles, fit_multipoles, real_kinds

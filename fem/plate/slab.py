@@ -30,7 +30,7 @@ from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import rotation_matrix
 from ..cache import TableKind
-from ..closed_forms.eddy_sphere import ComplexArray
+from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import unit_dipoles
 from ..harmonics.solid import gauss_legendre
 from ..rotor.table import RotorTable

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import Array, frozen_array, millimetres
-from ..closed_forms.eddy_sphere import ComplexArray
+from ..closed_forms.eddy_bodies import ComplexArray
 from ..rotor.models import AccuracyError
 from ..rotor.table import RangeError
 from .multipoles import Multipoles

@@ -21,7 +21,7 @@ import numpy as np
 
 from ...geometry.common import MU_0, Array, Watch
 from ...geometry.scene.contents import Plate
-from ..closed_forms.eddy_sphere import ComplexArray
+from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import Dipole, PolarizedCuboid
 from ..harmonics.expansion import MultipoleExpansion, without_noise
 from ..harmonics.solid import Coefficients, rotated_harmonics

@@ -27,7 +27,7 @@ from ...dynamics.flights.conductor import (
     levitation_height,
     sources_of,
 )
-from ...fem.closed_forms.eddy_sphere import polarizability
+from ...fem.closed_forms.eddy_bodies import polarizability
 from ...fem.closed_forms.potentials import Dipole, HomogeneousField
 from ...fem.plate.eddy import plate_reaction, solve_eddy
 from ...fem.plate.floating import FloatingModes, floating_modes

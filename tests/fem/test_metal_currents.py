@@ -7,7 +7,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from spinlev.fem.closed_forms.eddy_sphere import thin_field_torque
+from spinlev.fem.closed_forms.eddy_bodies import thin_field_torque
 from spinlev.fem.rotor_metal import (
     CUBE,
     ball_losses,

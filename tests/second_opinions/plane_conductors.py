@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from spinlev.fem.closed_forms.eddy_sphere import ComplexArray
+from spinlev.fem.closed_forms.eddy_bodies import ComplexArray
 from spinlev.fem.plate.slab import Slab, checked, wave_numbers
 from spinlev.geometry.common import MU_0
 

@@ -14,7 +14,7 @@ from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.floater_effects import SLOW_ENOUGH, FloaterCurrents, slow_error
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales, State
-from spinlev.fem.closed_forms.eddy_sphere import thin_field_torque
+from spinlev.fem.closed_forms.eddy_bodies import thin_field_torque
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.fem.rotor_metal import CUBE, ball_losses

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import spherical_in
 
-from spinlev.fem.closed_forms.eddy_sphere import SERIES, polarizability, thin_field_torque
+from spinlev.fem.closed_forms.eddy_bodies import SERIES, polarizability, thin_field_torque
 from spinlev.geometry.common import MU_0
 
 RADIUS, CONDUCTIVITY = 6.35e-3, 6.7e5

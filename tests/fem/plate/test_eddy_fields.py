@@ -10,7 +10,7 @@ from ngsolve import SetNumThreads
 from second_opinions.phasor import mean_loss
 from second_opinions.solids import Conductor, occ_mesh
 
-from spinlev.fem.closed_forms.eddy_sphere import polarizability
+from spinlev.fem.closed_forms.eddy_bodies import polarizability
 from spinlev.fem.closed_forms.potentials import HomogeneousField, unit_dipoles
 from spinlev.fem.plate.eddy import EddySpace, current_density, solve_eddy
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh

@@ -10,7 +10,7 @@ from netgen.occ import WorkPlane
 from ngsolve import SetNumThreads
 from scipy.special import iv, kv
 
-from spinlev.fem.closed_forms.eddy_sphere import polarizability
+from spinlev.fem.closed_forms.eddy_bodies import polarizability
 from spinlev.fem.closed_forms.potentials import HomogeneousField
 from spinlev.fem.plate.eddy import plate_reaction, solve_eddy
 from spinlev.fem.plate.table import Region
