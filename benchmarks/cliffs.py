@@ -83,16 +83,11 @@ def any_rotor(generator):
     return found, float(generator.uniform(3, 25)), float(generator.uniform(60, 220))
 
 
-def value(one):
-    """A number, a list or a text as TOML writes it."""
-    return json.dumps(one)
-
-
 def scene(magnets, diameter, frequency=110.0):
     """The text of a scene file."""
     lines = [f"frequency_hz = {frequency}"]
     for magnet in magnets:
-        lines += ["[[rotor.magnets]]", *(f"{key} = {value(part)}" for key, part in magnet.items())]
+        lines += ["[[rotor.magnets]]", *(f"{key} = {json.dumps(part)}" for key, part in magnet.items())]
     lines += ["[floater]", f"diameter_mm = {diameter}", f"remanence_T = {REMANENCE}", "recoil_permeability = 1.05"]
     return "\n".join([*lines, "density_kg_m3 = 7500.0", ""])
 
@@ -102,10 +97,10 @@ def cost(text, *options):
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scene.toml"
         file.write_text(text)
-        told = Path(folder) / "told"
+        answered = Path(folder) / "answered"
         command = [Path(sys.executable).with_name("spinlev"), "equilibria", file, "--plate-model", "none", "--json"]
         environment = {**os.environ, "XDG_CACHE_HOME": folder, "OPENBLAS_NUM_THREADS": "1"}
-        with told.open("w") as output:
+        with answered.open("w") as output:
             process = subprocess.Popen([*command, *options], stdout=output, stderr=subprocess.PIPE, env=environment)
             last = started = time.monotonic()
             silent = 0.0
@@ -125,7 +120,7 @@ def cost(text, *options):
             silent = max(silent, time.monotonic() - last)
         spent, memory = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 2**20
         status = os.waitstatus_to_exitcode(status)
-        answer = json.loads(told.read_text()) if status == 0 else said.decode().strip().rsplit("\n", 1)[-1]
+        answer = json.loads(answered.read_text()) if status == 0 else said.decode().strip().rsplit("\n", 1)[-1]
         return spent, memory, silent, status, answer
 
 
@@ -143,6 +138,7 @@ def rows(name, count):
 
 
 def main():
+    """The table, and its figure."""
     name, count = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else None
     found = []
     print(f"| {name} | processor time (s) | memory (GB) | longest silence (s) | equilibria, models |")

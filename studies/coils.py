@@ -44,7 +44,6 @@ def modes_of(scene: Scene, rtol: float = 1e-3) -> tuple[FloatingModes, bool]:
 def motion_dataset(scene: Scene, motion: ConductorMotion) -> xr.Dataset:
     """A trajectory over `time`, SI units."""
     along = np.array([0.0, 0.0, 1.0])
-    assert not isinstance(scene.start, type(None))
     place = np.array([*scene.coils[0].center[:2], 0.0]) + motion.height[:, None] * along
     currents = np.stack([coil.amperes(motion.time) for coil in scene.coils], axis=1)
     found = columns(COLUMNS, (place, motion.speed[:, None] * along, motion.heat, currents))
@@ -62,9 +61,8 @@ def coils_summary(scene: Scene, duration: float, modes: FloatingModes) -> tuple[
     duration : s
     """
     motion = conductor_motion(scene, modes, duration)
-    still = [coil for coil in scene.coils if not isinstance(coil.current, float)]
     mean = float("nan")
-    if not still:
+    if all(isinstance(coil.current, float) for coil in scene.coils):  # no table of time
         supply = Supply(scene.coils, sources_of(scene.coils))
         mean = levitation_height(modes, supply, -scene.floater.mass * float(scene.gravity[2]))
     levitated = float(motion.time[-1])

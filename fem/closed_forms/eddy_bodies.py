@@ -1,4 +1,4 @@
-"""Eddy currents of a conducting sphere, in closed form: the floater's own.
+"""Eddy currents of a conducting sphere in closed form, the floater's own, and of a tube as a series.
 
 In a uniform field B e^{iωt} a non-magnetic sphere takes the moment (W. R. Smythe, Static and Dynamic Electricity,
 3rd ed., section 10.06; L. D. Landau, E. M. Lifshitz, Electrodynamics of Continuous Media, section 59)
@@ -11,8 +11,10 @@ it feels the torque -Im α B⊥² along the turn, and loses the power ω times t
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import iv, kv
 
 from ...geometry.common import MU_0
+from ..harmonics.solid import gauss_legendre
 
 ComplexArray = NDArray[np.complex128]
 # |x²| below which four terms of the series are used: there they and the closed form are both good to 3e-11
@@ -59,3 +61,28 @@ def thin_field_torque(radius: float, conductivity: float) -> float:
 def skin_number(radius: float, conductivity: float, frequency: float) -> float:
     """ωμ0σR² of a `radius` (m), `conductivity` (S/m) and `frequency` (Hz): twice the square of radius by skin depth."""
     return float(2 * np.pi * frequency * MU_0 * conductivity * radius**2)
+
+
+def tube_reaction(inner: float, outer: float, conductivity: float, frequency: float) -> complex:
+    """G_zz, T/(A m²), of an infinite tube at its axis.
+
+    Of each harmonic e^{ikz} of a dipole's A_φ, k K₁(kρ), C I₁(kρ) comes back, with A and H continuous at both walls.
+
+    Parameters
+    ----------
+    inner, outer : radii, m
+    conductivity : S/m
+    frequency : Hz
+    """
+    nodes, weights = gauss_legendre(400)
+    k, dk = 20 / inner * (nodes + 1), 20 / inner * weights
+    within = np.sqrt(k**2 + 2j * np.pi * frequency * MU_0 * conductivity)
+    rows = np.zeros((len(k), 4, 4), complex)
+    for row, radius, outside, at in ((0, inner, iv, 0), (2, outer, kv, 3)):
+        x, y, sign = k * radius, within * radius, 1.0 if at == 0 else -1.0
+        rows[:, row, at], rows[:, row, 1], rows[:, row, 2] = outside(1, x), -iv(1, y), -kv(1, y)
+        rows[:, row + 1, at] = sign * k * outside(0, x)
+        rows[:, row + 1, 1], rows[:, row + 1, 2] = -within * iv(0, y), within * kv(0, y)
+    source = np.stack([-kv(1, k * inner), k * kv(0, k * inner), 0 * k, 0 * k], axis=1)
+    back = np.linalg.solve(rows, source[:, :, None])[:, 0, 0]
+    return complex(MU_0 / (2 * np.pi**2) * np.sum(dk * k**2 * back))

@@ -117,7 +117,7 @@ def _explain(axes: Axes, result: xr.Dataset, models: dict[str, str]) -> None:
     showing.explain(axes, places | models)
 
 
-def components_lines(result: xr.Dataset) -> list[str]:
+def _components_lines(result: xr.Dataset) -> list[str]:
     """The components by finite elements at both ends of each distance, and how far others deviate, as text."""
     rows = []
     for configuration, part in showing.by_configuration(result):
@@ -137,7 +137,7 @@ FIELD_COMPONENTS = Study(
     points=field_points,
     compute=field_components,
     figures={"field-components": components_figure, "field-components-differences": differences_figure},
-    report=components_lines,
+    report=_components_lines,
 )
 
 
@@ -287,7 +287,7 @@ def _mark(axes: Axes, found: xr.Dataset, color: str) -> None:
         axes.plot(1e3 * float(found[name]), 0.0, symbol, color=color, ms=5)
 
 
-def force_lines(result: xr.Dataset) -> list[str]:
+def _force_lines(result: xr.Dataset) -> list[str]:
     """Equilibria and polar angles of each model at every frequency, as text."""
     rows = []
     for k, frequency in enumerate(result["frequency"].values):
@@ -307,7 +307,7 @@ FORCE_CURVE = Study(
     points=force_points,
     compute=force_curve,
     figures={"force-curve-parts": parts_figure, "force-curve-net": net_figure},
-    report=force_lines,
+    report=_force_lines,
 )
 
 
@@ -408,7 +408,7 @@ def radius_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def side_lines(result: xr.Dataset) -> list[str]:
+def _side_lines(result: xr.Dataset) -> list[str]:
     lines, rows = [], []
     for simulated in (case_with(result, model=model, **ROTOR) for model in article.MODELS):
         radius = 1e3 * np.hypot(simulated["flight_x"].values, simulated["flight_y"].values)
@@ -434,5 +434,5 @@ SIDE_MODE = Study(
     points=side_points,
     compute=side_mode,
     figures={"side-mode-orbit": orbit_figure, "side-mode-radius": radius_figure},
-    report=side_lines,
+    report=_side_lines,
 )

@@ -178,7 +178,7 @@ def _branch(rotor: xr.Dataset, model: str) -> tuple[Array, Array, NDArray[np.boo
     return frequency, distance, stable.astype(bool)
 
 
-def distance_lines(result: xr.Dataset) -> list[str]:
+def _distance_lines(result: xr.Dataset) -> list[str]:
     rows, lines = [], []
     for label, rotor in by_rotor(result):
         frequency, near, stable = _side(rotor, "dipole", "near")
@@ -218,7 +218,7 @@ LEVITATION_DISTANCE = Study(
     points=distance_points,
     compute=levitation_distance,
     figures={"levitation-distance-models": models_figure, "levitation-distance-formulas": formulas_figure},
-    report=distance_lines,
+    report=_distance_lines,
 )
 
 
@@ -326,7 +326,7 @@ def flight_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def flight_lines(result: xr.Dataset) -> list[str]:
+def _flight_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for rotor in each_case(result):
         for k, frequency in enumerate(rotor["frequency"].values):
@@ -350,5 +350,5 @@ TRAJECTORIES = Study(
     points=flight_points,
     compute=trajectories,
     figures={"trajectories": flight_figure},
-    report=flight_lines,
+    report=_flight_lines,
 )

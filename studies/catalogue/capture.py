@@ -293,7 +293,7 @@ def place_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def capture_lines(result: xr.Dataset) -> list[str]:
+def _capture_lines(result: xr.Dataset) -> list[str]:
     found, rows = each_place(result), []
     for label, one in found:
         after = f"{int(one['stayed'])} of {int(one['settled'])}" if one["settled"] else ""
@@ -360,6 +360,6 @@ STUDY = Study(
     points=capture_points,
     compute=capture,
     figures={"capture": share_figure, "capture-from-where": place_figure},
-    report=capture_lines,
+    report=_capture_lines,
     numbers=capture_numbers,
 )

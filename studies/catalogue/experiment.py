@@ -391,7 +391,7 @@ def facts_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def experiment_lines(result: xr.Dataset) -> list[str]:
+def _experiment_lines(result: xr.Dataset) -> list[str]:
     if "variant" not in result.dims:
         return [f"{int(result['design_rotors'])} rotors of the designs, and no posterior."]
     one = result.isel(variant=0)
@@ -474,6 +474,6 @@ STUDY = Study(
     compute=experiment,
     gather=gather_experiment,
     figures={"experiment": unknowns_figure, "experiment-corner": corner_figure, "experiment-facts": facts_figure},
-    report=experiment_lines,
+    report=_experiment_lines,
     numbers=experiment_numbers,
 )

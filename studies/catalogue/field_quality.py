@@ -98,7 +98,7 @@ def models(magnets: tuple[Magnet, ...], factor: float) -> dict[str, RotorTable]:
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)
 
 
-def validity_lines(result: xr.Dataset) -> list[str]:
+def _validity_lines(result: xr.Dataset) -> list[str]:
     distance, rows = 1e3 * result["distance"].values, []
 
     def reach(error: Array, level: float) -> str:
@@ -139,7 +139,7 @@ DIPOLE_VALIDITY = study_of_one(
     summary="where the dipole and each further model are good to 10, 1, 0.1 and 0.01 %",
     compute=dipole_validity,
     figures={"dipole-validity": validity_figure},
-    report=validity_lines,
+    report=_validity_lines,
 )
 
 

@@ -184,7 +184,7 @@ def ranges_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def dipole_lines(result: xr.Dataset) -> list[str]:
+def _dipole_lines(result: xr.Dataset) -> list[str]:
     causes = [*CAUSES.items(), ("all together", TOTAL)]
     rows = [
         (f"{configuration}: {cause}", *_changes(part, models))
@@ -236,7 +236,7 @@ DIPOLE_VS_FEM = Study(
         "dipole-vs-fem-causes": causes_figure,
         "dipole-vs-fem-ranges": ranges_figure,
     },
-    report=dipole_lines,
+    report=_dipole_lines,
 )
 
 

@@ -99,7 +99,7 @@ def shape_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def shape_lines(result: xr.Dataset) -> list[str]:
+def _shape_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for label, rotor in showing.by_rotor(result):
         for one in each_case(rotor):
@@ -124,6 +124,6 @@ STUDY = Study(
     points=shape_points,
     compute=limits,
     figures={"floater-shape": shape_figure},
-    report=shape_lines,
+    report=_shape_lines,
     numbers=shape_numbers,
 )

@@ -228,7 +228,7 @@ def _bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> 
     return figure
 
 
-def sensitivity_lines(result: xr.Dataset) -> list[str]:
+def _sensitivity_lines(result: xr.Dataset) -> list[str]:
     rotors = [(head, rotor.isel(case=0)) for head, rotor in showing.by_rotor(result)]
     names = [known.words for known in PARAMETERS.values()]
     slopes, bands, leading, leans = [], [], [], []
@@ -265,7 +265,7 @@ SENSITIVITY = Study(
             _bands_figure, quantities=["lowest", "highest"], words="stable frequencies (Hz)"
         ),
     },
-    report=sensitivity_lines,
+    report=_sensitivity_lines,
 )
 
 
@@ -456,7 +456,7 @@ def design_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def design_lines(result: xr.Dataset) -> list[str]:
+def _design_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for wish, answers in wishes(result):
         for one in each_case(answers):
@@ -484,5 +484,5 @@ DESIGN = Study(
     points=design_points,
     compute=design,
     figures={"design": design_figure},
-    report=design_lines,
+    report=_design_lines,
 )

@@ -258,7 +258,7 @@ def part_of(result: xr.Dataset, sweep: str) -> xr.Dataset:
     return part if sweep in ROTORS else part.sortby("value")
 
 
-def damping_lines(result: xr.Dataset) -> list[str]:
+def _damping_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for sweep in (*PLACES, *(place + REAL_PLATE for place in PLACES), "frequency", *ROTORS):
         for one in each_case(part_of(result, sweep)):
@@ -311,7 +311,7 @@ PLATE_DAMPING = Study(
         "plate-damping-rotors": rotors_figure,
         "plate-damping-means": means_figure,
     },
-    report=damping_lines,
+    report=_damping_lines,
 )
 
 

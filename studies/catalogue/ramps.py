@@ -73,7 +73,7 @@ def ramps_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def ramps_lines(result: xr.Dataset) -> list[str]:
+def _ramps_lines(result: xr.Dataset) -> list[str]:
     """A table, and how far beyond the steady limits floaters are lost."""
     rates, rows = result["rate"].values, []
     for label, rotor in showing.by_rotor(result):
@@ -115,6 +115,6 @@ STUDY = Study(
     points=ramp_points,
     compute=ramps,
     figures={"ramps": ramps_figure},
-    report=ramps_lines,
+    report=_ramps_lines,
     numbers=ramps_numbers,
 )

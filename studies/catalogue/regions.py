@@ -187,7 +187,7 @@ def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
                     showing.explain(axes, {words: marker}, mfc="white", ms=4)
 
 
-def map_lines(result: xr.Dataset) -> list[str]:
+def _map_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for label, rotor in showing.by_rotor(result):
         for one in each_case(rotor):
@@ -215,7 +215,7 @@ STABILITY_MAP = Study(
     points=map_points,
     compute=stability_map,
     figures={"stability-map": map_figure},
-    report=map_lines,
+    report=_map_lines,
 )
 
 
@@ -308,7 +308,7 @@ def limit_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-def limit_lines(result: xr.Dataset) -> list[str]:
+def _limit_lines(result: xr.Dataset) -> list[str]:
     rows, lines = [], []
     for label, rotor in showing.by_rotor(result):
         for one in each_case(rotor):
@@ -343,6 +343,6 @@ UPPER_LIMIT = Study(
     points=limit_points,
     compute=upper_limit,
     figures={"upper-limit": limit_figure},
-    report=limit_lines,
+    report=_limit_lines,
     numbers=limit_numbers,
 )

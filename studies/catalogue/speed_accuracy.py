@@ -287,7 +287,7 @@ def _largest(values: Array, truth: Array, rank: int) -> Array:
     return np.asarray((np.linalg.norm(values - truth, axis=axes) / np.linalg.norm(truth, axis=axes)).max(axis=1))
 
 
-def speed_lines(result: xr.Dataset) -> list[str]:
+def _speed_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for name in result["approach"].values:
         row = result.sel(approach=name)
@@ -333,6 +333,6 @@ STUDY = study_of_one(
     summary="error of B and of its gradient against time, unknowns and memory, for every way to the rotor's field",
     compute=speed_accuracy,
     figures={"speed-accuracy": speed_figure},
-    report=speed_lines,
+    report=_speed_lines,
     timed=True,
 )

@@ -63,7 +63,7 @@ class Page:
         self.flying, self.ended = False, False
         self.drawn: tuple[str, str] = ("", "")
         self.lines: list[Array] = []
-        self.hears: dict[str, Callable[..., None]] = {
+        self.does: dict[str, Callable[..., None]] = {
             "move": lambda name, value: self._become("changed", name, round(float(value), 9)),
             "choose": lambda name, value: self._become("with_query", {name: value}),
             "open": self._opened,

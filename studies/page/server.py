@@ -272,7 +272,7 @@ class _Line(_Answer, WebSocketHandler):
     def on_message(self, message: str | bytes) -> None:
         if self.page is not None:
             verb, *values = json.loads(message)
-            self.page.hears[verb](*values)
+            self.page.does[verb](*values)
 
     def on_close(self) -> None:
         if self.page is not None:

@@ -11,14 +11,15 @@ from second_opinions.magnet_elements import element_response
 
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center
 from spinlev.fem.mutual.making import MUTUAL, cached_mutual_table, mutual_table
-from spinlev.fem.mutual.response import enough_degree, two_body
-from spinlev.fem.mutual.samples import places_around
+from spinlev.fem.mutual.response import ChargeResponse, enough_degree, two_body
+from spinlev.fem.mutual.samples import places_around, response_products
 from spinlev.fem.mutual.table import image_weights, reflection, response_to_charge
+from spinlev.fem.rotor.table import canonical
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
 from spinlev.geometry.rotor import horizontal, tilt, vertical
-from spinlev.geometry.shapes import Box, rotation_matrix
+from spinlev.geometry.shapes import Box, Cylinder, rotation_matrix
 
 FINER = MeshSettings(magnet_size=0.6)
 
@@ -91,6 +92,45 @@ def test_from_a_millimetre_off_contact_on_cubes_are_met_to_a_thousandth(rotor):
         worst = np.max([missed(table, fine, place, direction) for place, direction in each], axis=0)
         print(f"\n{1e3 * gap:g} mm off contact: misses {worst[0]:.1e} of the added force, {worst[1]:.1e} of the torque")
         assert max(worst) < 1e-3
+
+
+def test_few_nodes_do_at_any_distance():
+    """What a cube responds to a dipole, by 10 nodes along an edge and by 28: 7e-4 of it at most, near a face."""
+    (cube,) = canonical(MAGNETS)
+    rotors = [ChargeResponse((cube,), nodes) for nodes in (10, 28)]
+    for off in (7.4e-3, 4e-3, 2e-3, 1e-3):
+        place = np.array([[5e-3 + off, 1e-3, -0.5e-3]])
+        few, many = (sum(response_products(rotor, place)) for rotor in rotors)
+        apart = np.abs(few - many).max() / np.abs(many).max()
+        print(f"\n{1e3 * off:g} mm off a face: {apart:.1e}")
+        assert apart < 8e-4
+
+
+def stated_by(rotor):
+    """The most by which force and torque of a rotor's table miss finite elements, by what the table states."""
+    made = mutual_table(rotor, PERMEABLE)
+    fine = element_response(mesh_magnets(rotor, FINER), 3)
+    found = []
+    for gap in (0.16, 0.5):
+        for place, direction in zip(*poses(gap, 2, 33, rotor), strict=True):
+            apart, stated = missed(made, fine, place, direction), made.relative_error(place)
+            found += [float(part / of[0]) for part, of in zip(apart, stated, strict=True)]
+    return max(found)
+
+
+@pytest.mark.slow
+def test_two_permeabilities_are_met_as_stated():
+    """The charges have their mean."""
+    cube = replace(MAGNETS[0], recoil_permeability=1.05, transverse_permeability=1.15)
+    assert 0.01 < stated_by((cube,)) < 1
+
+
+@pytest.mark.slow
+def test_discs_that_touch_are_met_as_stated():
+    """Of unlike diameters: nodes of one lie on the other's face."""
+    along, sizes = np.array([0.0, 0.0, 1.3]), ((6e-3, 2.5e-3), (9e-3, -2.5e-3))
+    discs = [Magnet(Cylinder(r, 5e-3, np.array([0.0, 0.0, z])), along, 1.05) for r, z in sizes]
+    assert 0.01 < stated_by(tuple(discs)) < 1
 
 
 def test_written_out_and_by_points_the_energy_is_one(table):

@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 from netgen.occ import WorkPlane
 from ngsolve import SetNumThreads
-from scipy.special import iv, kv
 
-from spinlev.fem.closed_forms.eddy_bodies import polarizability
+from spinlev.fem.closed_forms.eddy_bodies import polarizability, tube_reaction
 from spinlev.fem.closed_forms.potentials import HomogeneousField
 from spinlev.fem.plate.eddy import plate_reaction, solve_eddy
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import plate_table
-from spinlev.geometry.common import MU_0
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.meshes.solids import solid_of, step_text
 from spinlev.geometry.scene.contents import Plate
@@ -46,36 +44,12 @@ def test_disc_in_a_weak_axial_field():
     assert found.imag == pytest.approx(-2 * np.pi * frequency * SIGMA * np.pi * radius**4 * height / 8, rel=1e-6)
 
 
-def tube_reaction(inner, outer, frequency):
-    """G_zz of an infinite tube for a dipole on its axis, T/(A m²): harmonics e^{ikz} of A_φ, and continuity of A and H.
-
-    Of the dipole's A_φ = (μ0/2π²) ∫₀^∞ k K₁(kρ) cos kz dk each k makes C I₁(kρ) within the tube, whose B_z is kC on
-    the axis; (1/ρ) d/dρ [ρ I₁(kρ)] is k I₀, that of K₁ is -k K₀.
-    """
-
-    nodes, weights = np.polynomial.legendre.leggauss(400)
-    k, dk = 20 / inner * (nodes + 1), 20 / inner * weights
-    kappa = np.sqrt(k**2 + 2j * np.pi * frequency * MU_0 * SIGMA)
-    total = 0.0
-    for each, inside, weight in zip(k, kappa, dk, strict=True):
-        a, b = each * inner, each * outer
-        rows = np.array([
-            [iv(1, a), -iv(1, inside * inner), -kv(1, inside * inner), 0],
-            [each * iv(0, a), -inside * iv(0, inside * inner), inside * kv(0, inside * inner), 0],
-            [0, iv(1, inside * outer), kv(1, inside * outer), -kv(1, b)],
-            [0, inside * iv(0, inside * outer), -inside * kv(0, inside * outer), each * kv(0, b)],
-        ])  # fmt: skip
-        source = np.array([-kv(1, a), each * kv(0, a), 0, 0])
-        total += weight * each**2 * np.linalg.solve(rows, source)[0]
-    return MU_0 / (2 * np.pi**2) * total
-
-
 @pytest.mark.parametrize("frequency", [50.0, 500.0])
 def test_tube_against_its_series(frequency):
     """Of a tube of fourteen inner radii a dipole in its middle sees no ends: they are 1e-4 of the reaction."""
     inner, outer = 0.01, 0.0125
     found = plate_reaction(Plate(ring(outer, inner, 14 * inner), SIGMA), [[0.0, 0.0, 0.0]], frequency, 1e-3)
-    assert found.tensors[0, 2, 2] == pytest.approx(tube_reaction(inner, outer, frequency), rel=1e-3)
+    assert found.tensors[0, 2, 2] == pytest.approx(tube_reaction(inner, outer, SIGMA, frequency), rel=1e-3)
     assert found.error_estimate[0] < 1e-3
 
 
