@@ -21,6 +21,7 @@ from scipy.special import elliprd, elliprf, elliprj
 
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Coil
+from ..harmonics.solid import gauss_legendre
 
 NODES, CROWD = 24, 3  # Gauss points on either side of a point's radius, and the power by which they crowd there
 NEAR_AXIS = 0.05  # h² below which the integral of the sheet is a sum over equidistant angles: 1/h² would cancel
@@ -73,7 +74,7 @@ def _summed(coil: Coil, end: Callable[[Array, Array, Array], Array], rho: Array,
     Crowding nodes meet the kink of a sheet's field at its own radius; points there are moved off it by round-off.
     """
     inner, outer = coil.radius - coil.width / 2, coil.radius + coil.width / 2
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = gauss_legendre(NODES)
     along, weights = ((nodes + 1) / 2) ** CROWD, weights / 2 * CROWD * ((nodes + 1) / 2) ** (CROWD - 1)
     middle = np.clip(rho, inner, outer)
     total = np.zeros(len(rho))
