@@ -42,13 +42,10 @@ class Page:
     Parameters
     ----------
     tell : sends the page what it shall show, each by its name in page.js
-    state, preview : where it begins, and its preview if that is known
-    asked : the keys of its address
+    state : where it begins
     """
 
-    def __init__(
-        self, tell: Callable[..., None], state: PageState, preview: Shown | None, asked: Mapping[str, str]
-    ) -> None:
+    def __init__(self, tell: Callable[..., None], state: PageState) -> None:
         self.tell, self.state = tell, state
         self.quick = Worker("Reading this scene", QUICK, self._failed)
         self.slow = Worker("The result of the chosen models", LONG, self._failed, PATIENCE)
@@ -76,10 +73,13 @@ class Page:
             "reset": self._land,
         }
         """What the page's reader can do, by its name in page.js."""
+
+    def begin(self, preview: Shown | None, asked: Mapping[str, str]) -> None:
+        """Show the state with its preview, if that is known, or another with what is `asked` in the page's address."""
         if not asked:
             self._begin()
         if not asked and preview is not None:
-            self._became(False, (state, preview))
+            self._became(False, (self.state, preview))
         else:
             self._become("with_query", dict(asked))
 

@@ -266,8 +266,9 @@ class _Line(_Answer, WebSocketHandler):
             return
         given = self.request.arguments.items()
         asked = {key: values[-1].decode(errors="replace") for key, values in given if key != "token" and values}
-        self.page = Page(self._tell, self.application.begin, self.application.preview, asked)
-        opened.add(self.page)
+        self.page = Page(self._tell, self.application.begin)
+        opened.add(self.page)  # before it tells anything: who hears it finds it here
+        self.page.begin(self.application.preview, asked)
 
     def on_message(self, message: str | bytes) -> None:
         if self.page is not None:
