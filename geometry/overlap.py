@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .common import Array
 from .magnets import Magnet
 from .shapes import Box, Cylinder, Sphere, rotation_matrix
-from .solids import Part, Solid, moved
+from .solids import Part, Solid, Solids, moved
 
 # Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance.
 TOUCHING = 1e-9
@@ -114,7 +114,7 @@ def body_overlap(first: Solid, second: Solid) -> float:
     return -separation(first, second)[0]
 
 
-def sphere_overlap(center: ArrayLike, radius: float, body: Solid) -> float:
+def sphere_overlap(center: ArrayLike, radius: float, body: Solids) -> float:
     """Penetration depth of a sphere about `center` (3,) of a `radius` (m) into a `body`, m; negative if apart."""
     return radius - float(body.distance(center))
 

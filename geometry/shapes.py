@@ -135,6 +135,16 @@ class Body:
         return Box(self.size, self.center, self.rotation)
 
     @property
+    def placed(self) -> "tuple[Any, ...]":
+        """The solids that it is made of, where they are: itself."""
+        return (self,)
+
+    @property
+    def blocks(self) -> list[tuple[Array, Array]]:
+        """Centre and half edges (3,) m of the box about each of these, along the body axes from the centre."""
+        return [(np.zeros(3), self.half_edges)]
+
+    @property
     def corners(self) -> Array:
         """(8, 3) corners of the box about it, m."""
         signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)

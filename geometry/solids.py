@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import permutations
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -178,7 +178,94 @@ def _plane(a: Array, b: Array, c: Array) -> Array:
     return np.where(over, np.abs(height), np.inf)
 
 
+@dataclass(frozen=True, eq=False)
+class Compound(Body):
+    """Solids that are apart from each other, in the frame of the first.
+
+    `size` holds all of them about the first one's centre; `box` is that of the first alone, and `blocks` those of all.
+    """
+
+    bodies: tuple["Solid", ...]  # along the body axes, from the centre
+    center: Array = field(default_factory=at_origin, metadata=METRES)
+    rotation: Array = field(default_factory=unturned)
+    kind: ClassVar[str] = "several"
+
+    @classmethod
+    def of(cls, bodies: Sequence["Solid"]) -> "Compound":
+        """Of solids where they are."""
+        first = bodies[0]
+        local = (moved(body, first.to_body(body.center), first.rotation.T @ body.rotation) for body in bodies)
+        return cls(tuple(local), first.center, first.rotation)
+
+    @property
+    def placed(self) -> "tuple[Solid, ...]":
+        turn = self.rotation
+        return tuple(moved(body, self.center + turn @ body.center, turn @ body.rotation) for body in self.bodies)
+
+    @cached_property
+    def size(self) -> Array:
+        return 2 * self.reach(self.rotation.T)
+
+    @cached_property
+    def box(self) -> Box:
+        return Box(self.bodies[0].size, self.center, self.rotation)
+
+    @cached_property
+    def blocks(self) -> list[tuple[Array, Array]]:
+        return [(body.center, body.reach(np.eye(3))) for body in self.bodies]
+
+    @property
+    def volume(self) -> float:
+        return sum(body.volume for body in self.bodies)
+
+    @property
+    def area(self) -> float:
+        return sum(body.area for body in self.bodies)
+
+    @property
+    def mirrors(self) -> tuple[int, ...]:
+        def mirrored(body: "Solid", axis: int) -> bool:
+            along = np.flatnonzero(np.abs(body.rotation[axis]) > 1 - STRAIGHT)
+            return bool(body.center[axis] == 0 and len(along) and along[0] in body.mirrors)
+
+        return tuple(axis for axis in range(3) if all(mirrored(body, axis) for body in self.bodies))
+
+    @property
+    def circumradius(self) -> float:
+        return max(body.farthest(np.zeros(3)) for body in self.bodies)
+
+    @property
+    def shape_numbers(self) -> Array:
+        each = [(body.shape_numbers, body.center, body.rotation.ravel()) for body in self.bodies]
+        return np.concatenate([numbers for three in each for numbers in three])
+
+    @property
+    def described_size(self) -> str:
+        return " and ".join(body.described_size for body in self.bodies)
+
+    @property
+    def keys(self) -> dict[str, Any]:
+        raise NotImplementedError("several plates have keys of their own")
+
+    def reach(self, directions: Array) -> Array:
+        return np.maximum(self.support(directions), self.support(-directions))
+
+    def support(self, directions: Array) -> Array:
+        local = directions @ self.rotation
+        return np.asarray(np.max([local @ body.center + body.support(local) for body in self.bodies], axis=0))
+
+    def distance(self, points: ArrayLike) -> Array:
+        local = self.to_body(points)
+        return np.asarray(np.min([body.distance(local) for body in self.bodies], axis=0))
+
+    def edge_distance(self, points: ArrayLike) -> Array:
+        local = self.to_body(points)
+        return np.asarray(np.min([body.edge_distance(local) for body in self.bodies], axis=0))
+
+
 Solid = Box | Cylinder | Part | Sphere  # A body's shape and pose
+Solids = Solid | Compound  # One or several
+Some = TypeVar("Some", bound=Body)
 
 
 def places_off(body: Solid, directions: Array, distance: float) -> Array:
@@ -200,9 +287,9 @@ def places_off(body: Solid, directions: Array, distance: float) -> Array:
     return np.asarray(body.center + middle[:, None] * directions)
 
 
-def moved(body: Solid, center: Array, rotation: Array | None = None) -> Solid:
+def moved(body: Some, center: Array, rotation: Array | None = None) -> Some:
     """The `body` with its `center` (3,) m elsewhere, and with other body axes, a `rotation` (3, 3), if it is given."""
-    return replace(body, center=center, rotation=body.rotation if rotation is None else rotation)
+    return replace(body, center=center, rotation=body.rotation if rotation is None else rotation)  # type: ignore[type-var]
 
 
 def known_shape(part: Part) -> Solid | None:

@@ -114,14 +114,14 @@ def export_job(scene: Scene, requested: Models, path: Path) -> Answer:
     parts = [(about, cells, _fields(levitation, state, about))]
     if scene.plate is not None and scene.frequency and state is not None:
         note("Currents in the plate ...")
-        box = scene.plate.box
-        # A little inside the faces, where the current is known from within.
-        edges = [np.linspace(-0.499, 0.499, n) * size for n, size in zip(PLATE_STEPS, box.size, strict=True)]
-        body, cells = _lattice(edges)
-        inside = box.center + body @ box.rotation.T
-        current = plate_currents(scene, scene.plate, sources(levitation.table), state, inside)
-        data = _fields(levitation, state, inside)
-        parts.append((inside, cells, {**data, "J": current, "body": np.full(len(inside), PLATE)}))
+        for box in (body.box for body in scene.plate.body.placed):
+            # A little inside the faces, where the current is known from within.
+            edges = [np.linspace(-0.499, 0.499, n) * size for n, size in zip(PLATE_STEPS, box.size, strict=True)]
+            body, cells = _lattice(edges)
+            inside = box.center + body @ box.rotation.T
+            current = plate_currents(scene, scene.plate, sources(levitation.table), state, inside)
+            data = _fields(levitation, state, inside)
+            parts.append((inside, cells, {**data, "J": current, "body": np.full(len(inside), PLATE)}))
     points = np.concatenate([points for points, _, _ in parts])
     starts = np.cumsum([0, *(len(points) for points, _, _ in parts)])
     joined = np.concatenate([part + start for start, (_, part, _) in zip(starts, parts, strict=False)])

@@ -165,7 +165,7 @@ def response(
     normal = int(np.argmin(size))
     height = abs(body[normal]) - size[normal] / 2
     if model == "auto":  # the infinite slab where the edges are too far to matter
-        model = "slab" if height > 0 and edge_error(plate, place) <= rtol else "fem"
+        model = "slab" if height > 0 and not plate.each and edge_error(plate, place) <= rtol else "fem"
     if model == "fem":
         note("Eddy currents by finite elements ...")
         found = plate_reaction(plate, place, frequency, rtol)
@@ -177,6 +177,8 @@ def response(
         table, cached = cached_plate_table(plate, Region(body - reach, body + reach), frequencies, rtol, note)
         tensor = turn @ table.reaction_tensor(body, frequency)[0] @ turn.T
         return model, tensor, table.errors.total, ["plate"] if cached else []
+    if plate.each:
+        raise InputError("Input --model must be fem, reduced or auto of several plates; instead received slab.")
     if height <= 0:
         raise InputError(
             "Input --at must be over one of the plate's two largest faces for --model slab; instead it is beside them. "

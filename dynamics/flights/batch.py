@@ -408,6 +408,8 @@ def _obstacles(scene: Scene, memory: PlateMemory, position: Vector) -> list[hy.e
     """
     box, length = memory.plate.box, hy.par[Parameter.LENGTH]
     normal = int(np.argmin(box.size))
+    if memory.plate.each:
+        raise InputError("Input plate must be one for many trajectories at once; instead there are several.")
     if abs(abs(box.rotation[2, normal]) - 1) > FLAT:
         raise InputError("Input plate must lie flat under the rotor; instead it is turned. Leave out rotation_deg.")
     face = float(box.center[2] + box.size[normal] / 2)

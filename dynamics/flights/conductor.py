@@ -23,7 +23,7 @@ from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AbsoluteStart, Coil, Scene
 
 FAST = 40.0  # Rate over the highest angular frequency of a current from which a mode follows at once
-TOLERANCE = 1e-10  # Of the integration
+TOLERANCE = 1e-8  # Of the integration: heights are then right to 1e-13 m
 SMALL = 1e-3  # Height and its rate that absolute errors are relative to, in the height over the coils
 LEAST, FARTHEST = 0.5, 8.0  # Range of heights over the coils that is precomputed, in the one where a motion begins
 RASTER = 1e-4  # Ends of that range are multiples of this, m, so that motions that begin alike share it
@@ -184,15 +184,17 @@ def conductor_motion(scene: Scene, modes: FloatingModes, duration: float, sample
         functions = supply.functions(begin)
 
         def slope(time: float, u: Array, functions: list[Callable[[float], tuple[float, float]]] = functions) -> Array:
-            flux, steeper = modes.flux(min(max(u[0], low), high))
             now, change = np.array([f(time) for f in functions]).T
-            own = -(flux @ change + steeper @ now * u[1]) / rates
-            own[kept] = u[2:-2] - flux[kept] @ now
+            flux, steeper, driven = modes.driven(min(max(u[0], low), high), now, change)
+            own = np.where(kept, 0.0, -(driven + steeper * u[1]) / rates)
+            own[kept] = u[2:-2] - flux[kept]
             decay = rates * own
-            force = own @ (steeper @ now) - brake * u[1]
-            heat = float(decay @ own)
-            spent = heat + brake * u[1] ** 2 + own @ (flux @ change)
-            return np.concatenate([[u[1], force / mass - gravity], -decay[kept], [heat, spent]])
+            found = np.empty(len(u))
+            found[0], found[1] = u[1], (own @ steeper - brake * u[1]) / mass - gravity
+            found[2:-2] = -decay[kept]
+            found[-2] = decay @ own
+            found[-1] = found[-2] + brake * u[1] ** 2 + own @ driven
+            return found
 
         def contact(time: float, u: Array, *more: object) -> float:
             return float(u[0] - low)

@@ -38,7 +38,8 @@ def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events
     metres = [length * p for p in position]
     gaps = [_excess(body, metres) for body in scene.turning_bodies]
     if scene.plate is not None:
-        gaps.append(_excess(scene.plate.body, raised(position, turn)))
+        seen = raised(position, turn)
+        gaps += [_excess(body, seen) for body in scene.plate.body.placed]
     within = (scene.floater.inner_radius / scene.floater.radius) ** 2  # its own contact is found at the samples
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
     return [*((gap / (length * length) - within, CONTACT) for gap in gaps), (reach, LOST)]
@@ -102,7 +103,8 @@ def _own_gap(scene: Scene, time: float, position: Array, orientation: Array) -> 
         turn = scene.angle(time)
         seen = turned_about_z(position, turn) + plate_depth(scene.plate, np.array([time])) * [0.0, 0.0, 1.0]
         axes = turned_about_z(scene.floater.axes(orientation).T, turn).T
-        gaps += [-body_overlap(scene.plate.body, part) for part in scene.floater.placed(seen, axes)]
+        floater = scene.floater.placed(seen, axes)
+        gaps += [-body_overlap(body, part) for body in scene.plate.body.placed for part in floater]
     return min(gaps)
 
 

@@ -65,6 +65,8 @@ def resolve_plate_model(
         return PlateChoice("none", "there is no equilibrium around which to make a table")
     if model == "fem":
         return PlateChoice("reduced", "the finite elements enter the motion by their reduced network")
+    if model == "slab" and plate.each:
+        raise InputError("Input plate_model must be fem, reduced or none of several plates; instead received slab.")
     if model != "auto":
         return PlateChoice(model, "as requested", edge_error(plate, place) if model == "slab" else 0.0)
     gap = float(plate.body.distance(place))
@@ -74,6 +76,8 @@ def resolve_plate_model(
         return PlateChoice(
             "none", f"at {gap * 1e3:.3g} mm the plate pushes with less than {NEGLIGIBLE:.0e} of the weight"
         )
+    if plate.each:
+        return PlateChoice("reduced", "the currents of several plates act on each other")
     body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
     if abs(body[normal]) > plate.box.half_edges[normal]:
         error = edge_error(plate, place)
@@ -169,25 +173,32 @@ def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, rad
     center, half_edges : (3,) m, box along the laboratory's axes, where the floater may be
     radius : of the floater, m
     """
-    center, half = np.asarray(center, float), plate.box.half_edges
+    center = np.asarray(center, float)
     ends = plate.box.to_body(np.array([center, center - plate.way * DOWN]))
-    beyond = np.min(np.abs(ends) - half, axis=0)
-    axis = int(np.argmax(beyond))
-    if beyond[axis] <= radius or ends[0, axis] * ends[1, axis] < 0:
-        raise InputError(
-            f"Input center_mm must be farther than {radius * 1e3:.4g} mm from the plate's faces on all of its way; "
-            f"instead received {np.round(center * 1e3, 6).tolist()}, {max(beyond[axis], 0) * 1e3:.4g} mm from them. "
-            "Move the plate away."
-        )
     signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3, indexing="ij"), -1).reshape(8, 3)
     corners = center + np.asarray(half_edges, float) * signs
     body = plate.box.to_body(np.concatenate([corners, corners - plate.way * DOWN]))
     lower, upper = body.min(axis=0), body.max(axis=0)
-    if ends[0, axis] > 0:
-        lower[axis] = max(lower[axis], half[axis] + radius)
-    else:
-        upper[axis] = min(upper[axis], -half[axis] - radius)
+    for middle, half in plate.body.blocks:
+        apart = ends - middle
+        beyond = np.min(np.abs(apart) - half, axis=0)
+        axis = int(np.argmax(beyond))
+        if beyond[axis] <= radius or apart[0, axis] * apart[1, axis] < 0:
+            raise InputError(
+                f"Input center_mm must be farther than {radius * 1e3:.4g} mm from the plate's faces on all of its way; "
+                f"instead received {np.round(center * 1e3, 6).tolist()}, {max(beyond[axis], 0) * 1e3:.4g} mm from "
+                "them. Move the plate away."
+            )
+        _cut(lower, upper, axis, middle[axis], half[axis] + radius)
     return Region(lower, upper)
+
+
+def _cut(lower: Array, upper: Array, axis: int, middle: float, clear: float) -> None:
+    """Move the bound (3,) m of a region that faces a plate's body away until it is `clear` (m) of its middle."""
+    if lower[axis] + upper[axis] > 2 * middle:
+        lower[axis] = max(lower[axis], middle + clear)
+    else:
+        upper[axis] = min(upper[axis], middle - clear)
 
 
 def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Region:
@@ -241,11 +252,8 @@ def _rastered(region: Region, plate: Plate, radius: float) -> Region:
     for axis in np.flatnonzero((lower < 0) & (upper > 0)):
         upper[axis] = max(-lower[axis], upper[axis])
         lower[axis] = -upper[axis]
-    lower, upper, half = lower * RASTER, upper * RASTER, plate.box.half_edges
-    facing = int(np.argmax(np.maximum(lower, -upper) - half))
-    near = half[facing] + SKIN * radius
-    if lower[facing] + upper[facing] > 0:
-        lower[facing] = max(lower[facing], near)
-    else:
-        upper[facing] = min(upper[facing], -near)
+    lower, upper = lower * RASTER, upper * RASTER
+    for middle, half in plate.body.blocks:
+        facing = int(np.argmax(np.maximum(lower - middle, middle - upper) - half))
+        _cut(lower, upper, facing, middle[facing], half[facing] + SKIN * radius)
     return Region(lower, upper)

@@ -28,6 +28,7 @@ from ...geometry.common import MU_0, Array, Watch, spread_points, unwatched, wat
 from ...geometry.meshes.plate import PLANES, MeshRule
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box
+from ...geometry.solids import Solids
 from ..cache import TableKind
 from ..closed_forms.eddy_bodies import ComplexArray
 from ..elements.spaces import Parity
@@ -131,9 +132,9 @@ def dipole_images(parity: Parity, points: Array, places: Array) -> Iterator[Arra
         yield images.reshape(len(flips), -1, len(points), 3)
 
 
-def grid_counts(region: Region, half_edges: Array) -> tuple[int, int, int]:
+def grid_counts(region: Region, body: Solids) -> tuple[int, int, int]:
     """Places along each edge of a region: more where it is long against its distance from the plate."""
-    wanted = np.ceil(2 + PER_GAP * (region.upper - region.lower) / region.gap(half_edges))
+    wanted = np.ceil(2 + PER_GAP * (region.upper - region.lower) / region.gap(body))
     x, y, z = np.clip(wanted, FEWEST_PLACES, MOST_PLACES).astype(int)
     return int(x), int(y), int(z)
 
@@ -407,9 +408,9 @@ class PlateSolution:
     seconds: float = field(metadata={"units": "s"})
 
 
-def outer_box(box: Region, half_edges: Array) -> Region:
+def outer_box(box: Region, body: Solids) -> Region:
     """The box with its bounds moved outwards to the raster; at least 0.65 of its distance from the plate is left."""
-    gap = box.gap(half_edges)
+    gap = box.gap(body)
     if gap <= 0:
         return box
     step = 2.0 ** np.floor(np.log2(gap / STEPS))
@@ -454,7 +455,7 @@ def solve_currents(
     fold = plate.body.mirrors
     corners = np.concatenate([*(box.grid((2, 2, 2), fold) for box in boxes), others.places])
     ladder = Ladder(plate, corners, frequencies[1], rule, MESH_SHARE * rtol, growing=True, watch=watch)
-    grid = np.concatenate([box.grid(grid_counts(box, plate.box.half_edges), fold) for box in boxes])
+    grid = np.concatenate([box.grid(grid_counts(box, plate.body), fold) for box in boxes])
     probes = np.concatenate([probe_places(box, fold) for box in boxes])
     while True:
         if ladder.expected() <= HOPEFUL * ladder.allowed or ladder.order + 1 == ladder.highest:
@@ -530,6 +531,6 @@ def cached_currents(
 
     The same `plate`, `boxes`, `frequencies`, `rtol`, `rule` and `others`; `report` gets messages, `watch` progress.
     """
-    inputs = plate.body.shape_numbers, plate.conductivity, tuple(boxes), frequencies, rtol, rule, others
+    inputs = plate.body.shape_numbers, plate.metal, tuple(boxes), frequencies, rtol, rule, others
     make = partial(solve_currents, plate, boxes, frequencies, rtol, rule, others, watch)
     return CURRENTS.cached(inputs, make, report)[0]

@@ -333,7 +333,7 @@ class Ladder:
         growing: bool = False,
         watch: Watch = unwatched,
     ) -> None:
-        self.mesh = plate_mesh(plate.body, plate.conductivity, places, frequency, rule)
+        self.mesh = plate_mesh(plate.body, plate.metal, places, frequency, rule)
         cells = int(self.mesh.mesh.ne)
         bricks = isinstance(plate.body, Box)  # else tetrahedra, of which few meet in a face
         each = {p: 3 * p * (p + 2) + 2 * p + 1 if bricks else p * (p + 2) for p in range(3, HIGHEST_ORDER + 1)}
@@ -345,7 +345,7 @@ class Ladder:
             )
         self.highest = orders[-1]
         self.places, self.frequency, self.allowed, self.growing, self.watch = places, frequency, allowed, growing, watch
-        self.reach = rule.reach * float(plate.box.size.max())
+        self.reach = rule.reach * float(plate.body.size.max())
         self.order, self.unknowns, self.errors = 0, 0, np.full(len(places), np.inf)
         self.change = self.last = self.size = np.ones(len(places))
         self.truncation = np.zeros(len(places))

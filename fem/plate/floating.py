@@ -124,6 +124,11 @@ class FloatingModes:
         flux, slope = (waves @ self._both).reshape(2, len(self.rates), -1)
         return flux, slope
 
+    def driven(self, height: float, now: Array, change: Array) -> tuple[Array, Array, Array]:
+        """G I, (dG/dz) I and G dI/dt (states,) at a height (m), of currents (sources,) A and their rates, A/s."""
+        flux, slope = self.flux(height)
+        return flux @ now, slope @ now, flux @ change
+
     def mean_force(self, height: float, amplitudes: Array, frequencies: Array) -> float:
         """Force (N) upwards at rest, in the mean of a period.
 

@@ -24,6 +24,7 @@ import scipy
 
 from ...geometry.common import Array, Watch
 from ...geometry.scene.contents import Plate
+from ...geometry.solids import Solids
 from ..closed_forms.eddy_bodies import ComplexArray
 from .currents import STRICT, OtherSources, PlateSolution, grid_counts, probe_places, space_couplings, unit_power
 from .eddy import Source
@@ -204,7 +205,7 @@ def from_elements(
         return [np.concatenate([parts[number] for number in group], axis=1) for group in groups]
 
     probes = probe_places(region, plate.body.mirrors)
-    grid = region.grid(grid_counts(region, plate.box.half_edges), plate.body.mirrors)
+    grid = region.grid(grid_counts(region, plate.body), plate.body.mirrors)
     driving, testing = (
         [np.concatenate(pair) for pair in zip(space.dipole_couplings(places), space.couplings(more), strict=True)]
         for places, more in ((grid, others.training), (probes, others.probes))
@@ -273,7 +274,7 @@ def _functions(
     def worst(error: Array) -> float:
         return max(tensor_error(values, error, rates, omega) for omega in (low, middle, high))
 
-    choice = candidates(region, network.plate.box.half_edges, DEGREE if rtol >= STRICT else STRICT_DEGREE)
+    choice = candidates(region, network.plate.body, DEGREE if rtol >= STRICT else STRICT_DEGREE)
     fit = fit_multipoles(
         choice, points, values, state_scale, point_scale, rtol,
         lambda error: worst(error) <= FUNCTION_SHARE * rtol, watch=watch,
@@ -281,13 +282,19 @@ def _functions(
     return fit.multipoles, fit.weights, worst(fit.error)
 
 
-def candidates(region: Region, half_edges: Array, degree: int = DEGREE) -> Multipoles:
-    """Multipoles up to a `degree` to choose from, for a `region` beside a plate with `half_edges` (3,) m, its frame.
+def candidates(region: Region, body: Solids, degree: int = DEGREE) -> Multipoles:
+    """Multipoles up to a `degree` to choose from, for a `region` beside a plate's `body`, in its frame.
 
-    They lie behind the plate's surface, on lines away from the region. Raises ValueError: the region touches the plate.
+    They lie behind its surface, of several bodies behind each one's. Raises ValueError: the region touches the plate.
     """
+    centers = [_behind(region.moved(-center), half) + center for center, half in body.blocks]
+    return Multipoles.at(np.concatenate(centers), real_kinds(0, degree), region.gap(body))
+
+
+def _behind(region: Region, half_edges: Array) -> Array:
+    """Centres (n, 3) m on lines away from the region, behind the face of a body with `half_edges` (3,) m."""
     of_region, of_plate = region.nearest(half_edges)
-    gap = region.gap(half_edges)
+    gap = float(np.linalg.norm(of_plate - of_region))
     if gap < 1e-9:
         raise ValueError(
             f"Input region must be apart from the plate; instead received {region.lower.tolist()} to "
@@ -302,5 +309,4 @@ def candidates(region: Region, half_edges: Array, degree: int = DEGREE) -> Multi
         lines.append(region.center[a] + max(reach, 0.0) * np.linspace(-1, 1, count) * (count > 1))
     lines[axis] = of_plate[[axis]]
     starts = np.array(list(product(*lines)))
-    centers = np.concatenate([starts + depth * gap * away for depth in DEPTHS])
-    return Multipoles.at(centers, real_kinds(0, degree), gap)
+    return np.concatenate([starts + depth * gap * away for depth in DEPTHS])

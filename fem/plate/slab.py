@@ -278,7 +278,7 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
     for seen, shift in ((body[:1], LOW), *([(body, frequency)] if frequency else [])):
         with_edges, endless = (
             solve_shifted(
-                EddySpace(plate_mesh(plate.body, plate.conductivity, seen, shift, RULE, without), ORDER),
+                EddySpace(plate_mesh(plate.body, plate.metal, seen, shift, RULE, without), ORDER),
                 2 * np.pi * shift,
                 unit_dipoles(seen),
             ).couplings[:3]

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import Array, frozen_array, millimetres
+from ...geometry.solids import Solids
 from ..closed_forms.eddy_bodies import ComplexArray
 from ..rotor.models import AccuracyError
 from ..rotor.table import RangeError
@@ -64,15 +65,20 @@ class Region:
         extent = self.upper - self.lower
         return tuple(int(a) for a in np.flatnonzero(np.abs(self.lower + self.upper) <= SYMMETRIC * extent))
 
+    def moved(self, shift: Array) -> Region:
+        """The region displaced by (3,) m."""
+        return Region(self.lower + shift, self.upper + shift)
+
     def nearest(self, half_edges: Array) -> tuple[Array, Array]:
         """Nearest points (3,) of the region and of a plate with these half edges, m; equal if they touch."""
         of_plate = np.clip(self.center, -half_edges, half_edges)
         of_region = np.clip(of_plate, self.lower, self.upper)
         return of_region, np.clip(of_region, -half_edges, half_edges)
 
-    def gap(self, half_edges: Array) -> float:
-        """Distance (m) from a plate with these half edges."""
-        return float(np.linalg.norm(np.subtract(*self.nearest(half_edges))))
+    def gap(self, body: Solids) -> float:
+        """Distance (m) from the boxes about a plate's bodies."""
+        apart = [np.subtract(*self.moved(-center).nearest(half)) for center, half in body.blocks]
+        return float(np.linalg.norm(apart, axis=1).min())
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of `points` (n, 3) lie in the region, bounds included: (n,)."""

@@ -84,8 +84,7 @@ def plate_and_rotor_table(
     stand for gets its own.
     """
     others = turning_rotor(plate, rotor)
-    half = plate.box.half_edges
-    boxes = [outer_box(region, half), outer_box(rotor_box(plate, rotor), half)]
+    boxes = [outer_box(region, plate.body), outer_box(rotor_box(plate, rotor), plate.body)]
     outer = outer_frequencies(frequencies)
     solution = solve(plate, boxes, outer, rtol, rule)
     watch("reduced plate model", 0.0)
@@ -158,7 +157,7 @@ def cached_plate_table(
 
     `report` gets messages.
     """
-    inputs = plate.body.shape_numbers, plate.conductivity, region, frequencies, rtol
+    inputs = plate.body.shape_numbers, plate.metal, region, frequencies, rtol
     return PLATE.cached(inputs, lambda: plate_table(plate, region, frequencies, rtol), report)
 
 
@@ -166,4 +165,4 @@ def deciding(
     plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float], rtol: float
 ) -> tuple[Any, ...]:
     """What decides `plate_and_rotor_table` (`region`, `frequencies`, `rtol`); of a lowering its way alone."""
-    return plate.body, plate.conductivity, plate.way, rotor.uniform, rotor.expansions, region, frequencies, rtol
+    return plate.body, plate.metal, plate.way, rotor.uniform, rotor.expansions, region, frequencies, rtol

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..common import MU_0, Array, frozen_array
 from ..shapes import Box
-from ..solids import Solid, moved
+from ..solids import Solids, moved
 from .solids import occ_solid
 
 MILLIMETRE = 1e-3  # Length unit of all meshes, m
@@ -148,8 +148,8 @@ def skin_depth(conductivity: float, frequency: float) -> float:
 
 
 def plate_mesh(
-    body: Solid,
-    conductivity: float,
+    body: Solids,
+    conductivity: float | Sequence[float],
     positions: ArrayLike,
     frequency: float,
     rule: MeshRule | None = None,
@@ -160,7 +160,7 @@ def plate_mesh(
     Parameters
     ----------
     body : the plate
-    conductivity, frequency : S/m and Hz, of which the skin depth follows
+    conductivity, frequency : S/m, of several bodies of each, and Hz, of which the skin depth follows
     rule : how fine the mesh is
     endless : on the same cells, the plate reaches to the end of the air along its two longer edges: of a cuboid only
 
@@ -176,10 +176,11 @@ def plate_mesh(
         raise ValueError(
             f"Input positions_m must lie outside the plate; instead received {places[inside][0].tolist()} in its frame."
         )
+    metal = np.atleast_1d(conductivity).tolist()
+    depth = skin_depth(max(metal), frequency)
     if not isinstance(body, Box):
-        return _solid_mesh(body, conductivity, places, skin_depth(conductivity, frequency), rule)
+        return _solid_mesh(body, metal, places, depth, rule)
     places = np.abs(places)
-    depth = skin_depth(conductivity, frequency)
     far = rule.reach * 2 * half.max()
     lines = []
     for axis in range(3):
@@ -187,7 +188,7 @@ def plate_mesh(
         lines.append(graded_partition([0.0, half[axis], far], size_along) / MILLIMETRE)
     ends = np.where(np.arange(3) == np.argmin(half), half, far) if endless else half
     mesh = hex_mesh(lines, [Block("plate", np.full(3, -1.0), ends / MILLIMETRE)], mirrors=(0, 1, 2))
-    return ConductorMesh(mesh, {"plate": conductivity}, mirrors=(0, 1, 2))
+    return ConductorMesh(mesh, {"plate": metal[0]}, mirrors=(0, 1, 2))
 
 
 def _cell_size(coordinate: Array, axis: int, half: Array, places: Array, depth: float, rule: MeshRule) -> Array:
@@ -209,20 +210,25 @@ FLAT = 1e-5  # How far from a mirror plane a face on it may reach, mm
 LOOKS = 2  # Meshes whose points ask for the sizes of the next
 
 
-def _solid_mesh(body: Solid, conductivity: float, places: Array, depth: float, rule: MeshRule) -> ConductorMesh:
-    """`plate_mesh` of a solid of any shape in a ball of air, of which planes that mirror it leave a part."""
+def _solid_mesh(body: Solids, metal: Sequence[float], places: Array, depth: float, rule: MeshRule) -> ConductorMesh:
+    """`plate_mesh` of solids of any shape in a ball of air, of which planes that mirror them leave a part."""
     at_home = moved(body, np.zeros(3), np.eye(3))
-    mirrors, solid = body.mirrors, occ_solid(at_home, np.zeros(3), MILLIMETRE)
+    mirrors = body.mirrors
     far = rule.reach * float(body.size.max()) / MILLIMETRE
     kept = occ.Box(occ.Pnt(*(0.0 if a in mirrors else -2 * far for a in range(3))), occ.Pnt(2 * far, 2 * far, 2 * far))
     air = occ.Sphere(occ.Pnt(0, 0, 0), far)
     air.faces.name = "far"
-    solid, air = solid * kept, air * kept - solid
-    solid.mat("plate")
+    air, solids, conductivity = air * kept, [], {}
+    for k, (one, sigma) in enumerate(zip(at_home.placed, metal, strict=True)):
+        solid = occ_solid(one, np.zeros(3), MILLIMETRE) * kept
+        air, name = air - solid, f"plate{k or ''}"
+        solid.mat(name)
+        # a thin body's elements are flat: as wide as its thickness and the edge of a cube of its volume are in the mean
+        solid.maxh = min((one.size.min() * one.volume ** (1 / 3)) ** 0.5, one.half_edges.max()) / MILLIMETRE
+        solids.append(solid)
+        conductivity[name] = sigma
     air.mat("air")
-    # a thin body's elements are flat: as wide as its thickness and the edge of a cube of its volume are in the mean
-    solid.maxh = min((body.size.min() * body.volume ** (1 / 3)) ** 0.5, body.half_edges.max()) / MILLIMETRE
-    shape = occ.Glue([solid, air])
+    shape = occ.Glue([*solids, air])
     for face, axis in itertools.product(shape.faces, mirrors):
         if all(abs(corner[axis]) < FLAT for corner in face.bounding_box):
             face.name = PLANES[axis]
@@ -241,4 +247,4 @@ def _solid_mesh(body: Solid, conductivity: float, places: Array, depth: float, r
         mesh = geometry.GenerateMesh(sizes)
     found = ngsolve.Mesh(mesh)
     found.Curve(CURVED)
-    return ConductorMesh(found, {"plate": conductivity}, mirrors)
+    return ConductorMesh(found, conductivity, mirrors)

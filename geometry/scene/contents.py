@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from ..common import Array, frozen_array, html_table, listed, millimetres
 from ..magnets import Magnet
 from ..rotor import Conductor
 from ..shapes import Box
-from ..solids import Part, Solid
+from ..solids import Compound, Part, Solid, Solids
 from .floater import Floater
 
 AIR_VISCOSITY = 1.83e-5  # Dynamic viscosity of air at 20-25 °C, Pa s
@@ -36,14 +36,31 @@ class Lowering:
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """A conducting plate, fixed in the laboratory but for its lowering.
+    """A conducting plate, fixed in the laboratory but for its lowering, or several that are apart from each other.
 
-    Its thin side, faces and middle are those of the box about its body, whose middle planes are to mirror it.
+    Its thin side, faces and middle are those of the box about its body, whose middle planes are to mirror it; of
+    several those of the first, in whose frame all are.
     """
 
-    body: Solid
-    conductivity: float
+    body: Solids
+    conductivity: float  # S/m, of several the largest
     lowering: Lowering | None = None
+    each: tuple[float, ...] = ()  # of several the conductivity of each, S/m
+
+    @classmethod
+    def of(cls, plates: Sequence[Plate]) -> Plate:
+        """One or several as one; they are lowered as the first is."""
+        if len(plates) == 1:
+            return plates[0]
+        each = tuple(plate.conductivity for plate in plates)
+        return cls(
+            Compound.of([body for plate in plates for body in plate.body.placed]), max(each), plates[0].lowering, each
+        )
+
+    @property
+    def metal(self) -> float | tuple[float, ...]:
+        """Conductivity, S/m; of several that of each."""
+        return self.each or self.conductivity
 
     @property
     def box(self) -> Box:

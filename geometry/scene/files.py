@@ -212,7 +212,7 @@ def scene(
     frequency_hz: float,
     rotor: Mapping[str, Any],
     floater: Mapping[str, Any],
-    plate: Mapping[str, Any] | None = None,
+    plate: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     gravity_m_s2: Sequence[float] = (0.0, 0.0, -9.81),
     drag: Mapping[str, Any] | None = None,
     start: Mapping[str, Any] | None = None,
@@ -319,11 +319,13 @@ def scene_digest(scene: Scene) -> str:
 
     Comments do not count. Of a file that was read with the scene it is the content that was read.
     """
-    keys, bodies = canonical_keys(scene), [thing.body for thing in (*scene.rotor, scene.plate) if thing]
+    keys, metal = canonical_keys(scene), scene.plate.body.placed if scene.plate else ()
+    bodies = [*(magnet.body for magnet in scene.rotor), *metal]
     contents = {str(body.file): str(body.shape_numbers) for body in bodies if isinstance(body, Part)}
     contents |= {path: digest for path, digest in scene.files if digest}
     keys["rotor"]["field_map"] = map_digest(scene)
-    for table in (*keys["rotor"].get("magnets", ()), keys["plate"] or {}):
+    plates = keys["plate"] if isinstance(keys["plate"], list) else [keys["plate"] or {}]
+    for table in (*keys["rotor"].get("magnets", ()), *plates):
         if "file" in table:
             table["file"] = contents.get(table["file"])
     return hashlib.sha256(json.dumps(keys, sort_keys=True).encode()).hexdigest()
@@ -388,11 +390,15 @@ def _floater(scene: Scene) -> dict[str, Any]:
     return {"magnets": magnets, **({"bodies": bodies} if bodies else {}), **given}
 
 
-def _plate(scene: Scene) -> dict[str, Any] | None:
+def _plate(scene: Scene) -> dict[str, Any] | list[dict[str, Any]] | None:
     if (plate := scene.plate) is None:
         return None
     down = {"lowering": _said(schema.LoweringTable, plate.lowering)} if plate.lowering else {}
-    return {**shape_keys(plate.body), **pose_keys(plate.body), **_said(schema.PlateTable, plate), **down}
+    each = [
+        {**shape_keys(body), **pose_keys(body), "conductivity_S_m": _rounded(metal), **down}
+        for body, metal in zip(plate.body.placed, plate.each or [plate.conductivity], strict=True)
+    ]
+    return each[0] if len(each) == 1 else each
 
 
 def _drag(scene: Scene) -> dict[str, Any] | None:

@@ -67,8 +67,10 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     if field_map:
         own["rotor"]["field_map"] = str(field_map)
     for (owner, k), path in of_bodies.items():
-        tables = own[owner].get("magnets", []) + (own[owner].get("bodies", []) if owner == "floater" else [])
-        (own[owner] if k < 0 else tables[k])["file"] = str(path)
+        of_owner = own[owner]
+        if k >= 0 and owner != "plate":
+            of_owner = of_owner.get("magnets", []) + (of_owner.get("bodies", []) if owner == "floater" else [])
+        (of_owner if k < 0 else of_owner[k])["file"] = str(path)
     scene = replace(scene, files=tuple(files.items()), parts=tuple(parts.values()))
     return replace(scene, keys=(own, scene))
 
@@ -97,7 +99,7 @@ def _named_files(table: SceneTable, folder: Path, known: Scene | None) -> dict[t
     that which is `folder / name` or ends so. No disk is asked.
     """
     rotor, names = table.rotor, {MAP: table.rotor.field_map}
-    names |= {("plate", -1): table.plate.file if table.plate else None}
+    names |= {("plate", k): plate.file for k, plate in table.plates}
     if isinstance(rotor, ExplicitRotor):
         names |= {("rotor", k): magnet.file for k, magnet in enumerate(rotor.magnets)}
     names |= {("floater", k): name for k, name in table.floater.named.items()}
@@ -109,9 +111,10 @@ def _named_files(table: SceneTable, folder: Path, known: Scene | None) -> dict[t
         alike = [file for file in own if file and (file == path or file.parts[-len(end) :] == end)]
         if not alike:
             owner, k = key
-            place = "field_map" if key == MAP else "file" if k < 0 else f"magnets[{k}].file"
+            place = ".field_map" if key == MAP else ".file" if k < 0 else f".magnets[{k}].file"
+            place = f"[{k}].file" if owner == "plate" and k >= 0 else place
             raise InputError(
-                f"Input {owner}.{place} must be a file of the scene that was opened first; instead received "
+                f"Input {owner}{place} must be a file of the scene that was opened first; instead received "
                 f"{shown(name)}. Give the scene to the command line."
             )
         found[key] = path if path in alike else alike[0]

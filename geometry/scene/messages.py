@@ -11,8 +11,9 @@ from pydantic_core import ErrorDetails
 
 from ..common import InputError, printable, shown
 from ..overlap import TOUCHING, apart, body_overlap, deepest_overlap_in_a_turn
+from . import schema
 from .contents import AbsoluteStart, Scene
-from .schema import TABLES, ExplicitRotor
+from .schema import ExplicitRotor
 
 LONGEST = 60  # Characters of a key in a message
 LONGEST_SOURCE = 300  # Characters of a file's name in a message
@@ -23,6 +24,24 @@ HEADER, KEY = re.compile(r"\s*(\[\[?)\s*([\w.-]+)\s*\]"), re.compile(r"\s*([\w.-
 NAMED = re.compile(r"(?:unknown key `|Input )([\w.\[\]-]+)")
 COMMA = re.compile(r"[-+]?\d+,\d+")  # a number as many languages write it
 MOST = 20  # Faults of a scene that are listed; the rest are counted
+# By their keys; rotors by their configuration, but for that of `rotor.magnets`.
+TABLES: dict[str, type[schema.Table]] = {
+    "": schema.SceneTable,
+    "horizontal": schema.DisplacedRotor,
+    "vertical": schema.DisplacedRotor,
+    "tilt": schema.TiltRotor,
+    "magnets": schema.MagnetTable,
+    "conductors": schema.ConductorTable,
+    "floater": schema.FloaterTable,
+    "floater.magnets": schema.FloaterMagnetTable,
+    "bodies": schema.BallastTable,
+    "plate": schema.PlateTable,
+    "lowering": schema.LoweringTable,
+    "coils": schema.CoilTable,
+    "drag": schema.DragTable,
+    "start": schema.StartTable,
+    "drive": schema.DriveTable,
+}
 # The kinds of error of pydantic.
 RULES = {
     "greater_than": "greater than {gt:g}",
@@ -99,7 +118,7 @@ def described_faults(details: Sequence[ErrorDetails]) -> list[str]:
 
 def _described(detail: ErrorDetails) -> str:
     place, kind, received = list(detail["loc"]), detail["type"], detail["input"]
-    if place[0] == "rotor" and len(place) > 2:
+    if place[0] in ("rotor", "plate") and len(place) > 2:
         del place[1]  # the tag of its kind
     key = "".join(f"[{p}]" if isinstance(p, int) else f".{_named(p)}" for p in place).removeprefix(".")
     if kind == "extra_forbidden":
@@ -138,6 +157,8 @@ def _allowed(place: Sequence[Any]) -> list[str]:
     """The keys allowed beside the one at a place of pydantic's."""
     if len(place) == 3 and place[:2] == ("rotor", "magnets"):
         return list(ExplicitRotor.model_fields)
+    if place[0] == "plate":
+        return list(TABLES["lowering" if "lowering" in place[1:-1] else "plate"].model_fields)
     if len(place) == 4 and place[:2] == ("floater", "magnets"):
         return list(TABLES["floater.magnets"].model_fields)
     return list(TABLES[next((p for p in reversed(place[:-1]) if isinstance(p, str)), "")].model_fields)
@@ -159,9 +180,9 @@ def unusual(scene: Scene) -> str:
     said = [f"a remanence of {strongest:.4g} T (NdFeB has up to 1.5 T)"] if strongest > STRONGEST else []
     said += [f"a size of {1e3 * size:.4g} mm" for size in (min(sizes), max(sizes)) if not SIZES[0] < size < SIZES[1]]
     said += [f"a magnet {farthest:.4g} m from the rotor's origin"] if farthest > SIZES[1] else []
-    others = {"plate": scene.plate.body.center} if scene.plate else {}
-    others |= {"start": scene.start.position} if isinstance(scene.start, AbsoluteStart) else {}
-    for name, place in others.items():
+    others = [("plate", body.center) for body in scene.plate.body.placed] if scene.plate else []
+    others += [("start", scene.start.position)] if isinstance(scene.start, AbsoluteStart) else []
+    for name, place in others:
         said += [f"a {name} {apart:.4g} m from the rotor"] if (apart := float(np.linalg.norm(place))) > SIZES[1] else []
     return f"Unusual: {', '.join(dict.fromkeys(said))}. Is that meant? Every key names its unit." if said else ""
 
@@ -179,19 +200,26 @@ def overlap_faults(scene: Scene) -> list[str]:
         for (first, one), (second, other) in combinations(bodies, 2)
         if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING
     ]
-    for name, body in bodies if scene.plate else ():
-        assert scene.plate is not None
-        depth = deepest_overlap_in_a_turn(body, scene.plate.body)
-        if depth > TOUCHING:
-            faults.append(
-                f"Input plate must stay clear of the turning rotor; instead it overlaps {name} by "
-                f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
-            )
+    metal = scene.plate.body.placed if scene.plate else ()
+    plates = [("plate" if len(metal) == 1 else f"plate[{k}]", body) for k, body in enumerate(metal)]
+    faults += [
+        f"Input {plate} must stay clear of the turning rotor; instead it overlaps {name} by "
+        f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
+        for plate, fixed in plates
+        for name, body in bodies
+        if (depth := deepest_overlap_in_a_turn(body, fixed)) > TOUCHING
+    ]
+    faults += [
+        f"Input {second} must be apart from {first}, as currents of bodies that touch are not computed; instead "
+        f"they {f'overlap by {depth * 1e3:.4g} mm' if depth > TOUCHING else 'touch'}; give them as one file."
+        for (first, one), (second, other) in combinations(plates, 2)
+        if (depth := body_overlap(one, other)) > -TOUCHING
+    ]
     if isinstance(start := scene.start, AbsoluteStart):
         axes = scene.floater.axes(start.moment / np.linalg.norm(start.moment), start.body_x)
         floater = scene.floater.placed(start.position, axes)
         obstacles = [(f"rotor {name}", body) for name, body in bodies]
-        obstacles += [("the plate", scene.plate.body)] if scene.plate else []
+        obstacles += [("the plate" if len(plates) == 1 else name, body) for name, body in plates]
         place = ", ".join(f"{c * 1e3:g}" for c in start.position)
         faults += [
             f"Input start.position_mm must leave the floater clear of all bodies; instead received [{place}], where it "

@@ -409,11 +409,20 @@ class SceneTable(Table):
         Discriminator(_rotor_kind),
     ] = ExplicitRotor.model_construct(magnets=[])  # none, beside coils
     floater: FloaterTable
-    plate: PlateTable | None = None
+    plate: Annotated[
+        Annotated[PlateTable | None, Tag("one")]
+        | Annotated[Annotated[list[PlateTable], Field(min_length=1)], Tag("several")],
+        Discriminator(lambda plate: "several" if isinstance(plate, list) else "one"),
+    ] = None
     drag: DragTable | None = None
     start: StartTable | None = None
     drive: list[DriveTable] | None = None
     coils: list[CoilTable] | None = None
+
+    @property
+    def plates(self) -> list[tuple[int, PlateTable]]:
+        """The plates by their number, -1 of a single one."""
+        return list(enumerate(self.plate)) if isinstance(self.plate, list) else [(-1, self.plate)] if self.plate else []
 
     def scene(self, parts: Mapping[tuple[str, int], Part], field_map: Path | None) -> Scene:
         """The scene in SI units; `parts` by their tables' names and numbers, -1 that of a table in no list."""
@@ -426,7 +435,7 @@ class SceneTable(Table):
             gravity=np.array(self.gravity_m_s2),
             rotor=rotor.in_si(of_rotor),
             floater=floater,
-            plate=self.plate.plate(parts.get(("plate", -1))) if self.plate else None,
+            plate=Plate.of([table.plate(parts.get(("plate", k))) for k, table in self.plates]) if self.plate else None,
             drag=(self.drag or DragTable()).drag(floater),
             start=(self.start or StartTable()).start(),
             field_map=field_map,
@@ -435,26 +444,6 @@ class SceneTable(Table):
             drive=tuple(step.step() for step in self.drive or ()),
             coils=tuple(coil.coil() for coil in self.coils or ()),
         )
-
-
-# By their keys; rotors by their configuration, but for that of `rotor.magnets`.
-TABLES: dict[str, type[Table]] = {
-    "": SceneTable,
-    "horizontal": DisplacedRotor,
-    "vertical": DisplacedRotor,
-    "tilt": TiltRotor,
-    "magnets": MagnetTable,
-    "conductors": ConductorTable,
-    "floater": FloaterTable,
-    "floater.magnets": FloaterMagnetTable,
-    "bodies": BallastTable,
-    "plate": PlateTable,
-    "lowering": LoweringTable,
-    "coils": CoilTable,
-    "drag": DragTable,
-    "start": StartTable,
-    "drive": DriveTable,
-}
 
 
 def key_faults(table: SceneTable) -> list[str]:
@@ -493,7 +482,13 @@ def key_faults(table: SceneTable) -> list[str]:
         if isinstance(coil.current_A, list) and np.any(np.diff(np.array(coil.current_A)[:, 0]) <= 0):
             faults.append(f"Input coils[{k}].current_A must have increasing times; instead they are not.")
     faults += _floater_faults(floater)
-    faults += _shape_faults("plate", table.plate) if table.plate else []
+    for k, plate in table.plates:
+        faults += _shape_faults(f"plate[{k}]" if k >= 0 else "plate", plate)
+        if plate.lowering != table.plates[0][1].lowering:
+            faults.append(
+                f"Input plate[{k}].lowering must be that of plate[0], as all plates are lowered together; "
+                "instead it is another."
+            )
     sphere = floater.shape == "sphere" and not floater.composite
     if not sphere and floater.conductivity_S_m is not None and not table.coils:
         faults.append(

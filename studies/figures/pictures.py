@@ -121,7 +121,7 @@ def plate_currents(scene: Scene, plate: Plate, table: RotorTable, floater: State
     amplitudes = np.concatenate(
         [scene.floater.moment * (plate.box.rotation.T @ turning), 2 / ANGLES * np.exp(-1j * angles)]
     )
-    mesh = plate_mesh(plate.body, plate.conductivity, place, scene.frequency, MeshRule())
+    mesh = plate_mesh(plate.body, plate.metal, place, scene.frequency, MeshRule())
     response = solve_eddy(mesh, ORDER, scene.frequency, sources)
     body = plate.box.to_body(points)
     applied = np.tensordot(amplitudes, np.array([source.vector_potential(body) for source in sources]), axes=1)

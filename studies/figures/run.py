@@ -64,7 +64,8 @@ def scene_figure(scene: Scene) -> Figure:
     bodies += [(part.body, "0.5", "conductor of the rotor") for part in scene.conductors]
     reach = max(float(np.abs(1e3 * triangles(body)[0]).max()) for body, _, _ in bodies)
     if scene.plate:
-        bodies.insert(0, (near_plate(scene.plate.body, 2e-3 * reach), "0.7", "plate, or the part that is near"))
+        shown = near_plate(scene.plate.body, 2e-3 * reach).placed
+        bodies = [*((body, "0.7", "plate, or the part that is near") for body in shown), *bodies]
     for panel, (across, up) in ((side, (0, 2)), (top, (0, 1))):
         for body, color, name in bodies:
             corners = 1e3 * triangles(body)[0][:, [across, up]]

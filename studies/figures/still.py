@@ -18,7 +18,7 @@ from vtkmodules.vtkCommonCore import vtkLogger
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box, rotation_matrix
-from ...geometry.solids import Solid
+from ...geometry.solids import Solids
 from .view import FINE, SEEN, Currents, Frames, View, arrow, near_plate, triangles
 
 NORTH, METAL, DARK = "#D55E00", "#9AA5B1", "#4C566A"
@@ -45,7 +45,7 @@ def scene_picture(view: View) -> bytes:
     if scene.plate is not None:
         near = near_plate(scene.plate.body, SEEN)
         corners = 1e3 * near.corners
-        whole = np.allclose(near.size, scene.plate.box.size)
+        whole = np.allclose(near.size, scene.plate.body.size)
         names["plate" if whole else "part of the plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
     if path:
         names[f"path, {view.frame}"] = beside - np.array([0.0, 0.0, 0.8 * radius])
@@ -292,7 +292,7 @@ def _look(plotter: pv.Plotter, scene: Scene) -> None:
     plotter.reset_camera_clipping_range()
 
 
-def _add_body(plotter: pv.Plotter, body: Solid, color: str, **look: Any) -> list[pv.Actor]:
+def _add_body(plotter: pv.Plotter, body: Solids, color: str, **look: Any) -> list[pv.Actor]:
     """Draw a body, with its edges where it is a box."""
     corners, faces = triangles(body)
     mesh = pv.PolyData.from_regular_faces(1e3 * corners, faces)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box, Sphere
-from ...geometry.solids import Part, Solid
+from ...geometry.solids import Compound, Part, Solids
 
 FINE = 161  # Points of a plane of the field along each of its edges
 TURNS, FRAMES = 3, 16  # Turns of the rotor that an animation shows at once, and frames for each
@@ -101,8 +101,10 @@ class Sample:
         yield sample_picture()
 
 
-def current_places(box: Solid, floater: Array) -> Array:
-    """Places (n, 3) m just under that face of a plate which the floater (3,) m is before."""
+def current_places(box: Solids, floater: Array) -> Array:
+    """Places (n, 3) m just under that face of each plate which the floater (3,) m is before."""
+    if isinstance(box, Compound):
+        return np.concatenate([current_places(body, floater) for body in box.placed])
     axes = [np.linspace(-0.48, 0.48, max(3, int(size * 1e3 / 5))) * size for size in box.size]
     normal = int(np.argmin(box.size))
     side = np.sign(box.to_body(floater[None])[0, normal]) or 1.0
@@ -119,8 +121,13 @@ def frame_times(scene: Scene, duration: float) -> Array:
     return np.concatenate([begin + steps for begin in begins])
 
 
-def triangles(body: Solid) -> Surface:
+def triangles(body: Solids) -> Surface:
     """A body's surface: corners (n, 3) m and triangles (k, 3) of their numbers, seen from outside anticlockwise."""
+    if isinstance(body, Compound):
+        parts = [triangles(part) for part in body.placed]
+        firsts = np.cumsum([0, *(len(corners) for corners, _ in parts)])
+        faces = np.concatenate([faces + first for (_, faces), first in zip(parts, firsts, strict=False)])
+        return np.concatenate([corners for corners, _ in parts]), faces
     if isinstance(body, Box):
         return body.corners, SQUARES[:, [(0, 1, 2), (0, 2, 3)]].reshape(-1, 3)
     if isinstance(body, Part):
@@ -153,8 +160,10 @@ def arrow(center: Array, direction: Array, half: float) -> Surface:
     return _revolved(half * profile, center, direction)
 
 
-def near_plate(plate: Solid, reach: float) -> Solid:
+def near_plate(plate: Solids, reach: float) -> Solids:
     """The part of a plate that is shown: along its edges so far (m) from its point nearest to the rotor's origin."""
+    if isinstance(plate, Compound):
+        return Compound.of([near for body in plate.placed for near in near_plate(body, reach).placed])
     if not isinstance(plate, Box):
         return plate
     middle = np.clip(plate.to_body(np.zeros(3)), -plate.size / 2, plate.size / 2)

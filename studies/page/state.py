@@ -179,10 +179,11 @@ def controls(state: PageState) -> list[Control]:
     if scene.plate is not None:
         box = scene.plate.box
         axis = int(np.abs(box.rotation[:, int(np.argmin(box.size))]).argmax())  # along which it is thin
-        place = state.keys["plate"]["center_mm"][axis]
+        first, several = ("plate.0", True) if isinstance(state.keys["plate"], list) else ("plate", False)
+        place = (state.keys["plate"][0] if several else state.keys["plate"])["center_mm"][axis]
         near, far = sorted((0.4 * place, 2.5 * place)) if place else (-PLATE_REACH, PLATE_REACH)
         title = ("Plate, x (mm)", "Plate, y (mm)", "Plate's height (mm)")[axis]
-        rows.append((f"plate.center_mm.{axis}", title, place, near, far, 0.25))
+        rows.append((f"{first}.center_mm.{axis}", title, place, near, far, 0.25))
     found = []
     for key, title, value, low, high, step in rows:  # each range has room for its value
         start, end = np.floor(min(low, value) / step) * step, np.ceil(max(high, value) / step) * step

@@ -47,7 +47,7 @@ def space():
 
 @pytest.fixture(scope="module")
 def boxes():
-    return [outer_box(REGION, HALF), outer_box(rotor_box(PLATE, ROTORS[0]), HALF)]
+    return [outer_box(REGION, PLATE.body), outer_box(rotor_box(PLATE, ROTORS[0]), PLATE.body)]
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +144,7 @@ def test_boxes_grow_outwards_and_stay_off_the_plate():
     for _ in range(100):
         low = np.array([*rng.uniform(-0.02, 0.02, 2), HALF[2] + 10 ** rng.uniform(-3, -1)])
         box = Region(low, low + 10 ** rng.uniform(-3, -1.5, 3))
-        outer = outer_box(box, HALF)
+        outer = outer_box(box, PLATE.body)
         assert outer.contains([box.lower, box.upper]).all()
         assert outer.lower[2] - HALF[2] >= 0.65 * (box.lower[2] - HALF[2])
     assert outer_frequencies((0.5, 250.0)) == (0.5, 250.0)

@@ -8,9 +8,10 @@ from second_opinions.plate_tables import over_face
 
 from spinlev.fem.plate.multipoles import Multipoles, fit_multipoles
 from spinlev.fem.plate.network import candidates
+from spinlev.geometry.shapes import Box
 
 REGION = over_face((0.1, 0.1, 0.02), (0.015, 0.025), 0.004)
-CHOICE = candidates(REGION, np.array([0.05, 0.05, 0.01]))
+CHOICE = candidates(REGION, Box([0.1, 0.1, 0.02]))
 DIPOLE = np.array([[1, 0, 0], [1, 1, 0], [1, 1, 1]], float)
 POINTS = REGION.surface((6, 6, 6))
 
@@ -65,7 +66,7 @@ def test_a_higher_degree_reaches_off_axis_images():
     near = 1 / np.sqrt(np.sum(values**2, axis=(0, 2)))
     worst = []
     for degree in (4, 7):
-        choice = candidates(column, size / 2, degree)
+        choice = candidates(column, Box(size), degree)
         fit = fit_multipoles(choice, points, values, np.ones(len(values)), near, 0.0, lambda error: False)
         worst.append(np.sqrt(np.sum((fit.error * near[:, None]) ** 2, axis=(0, 2))).max())
     assert worst[0] > 1e-4

@@ -7,10 +7,10 @@ import pytest
 from article import BALL
 
 from spinlev.geometry.meshes.solids import solid_of, step_text
-from spinlev.geometry.scene.files import parse_scene, scene, scene_text
+from spinlev.geometry.scene.files import changed, parse_scene, scene, scene_digest, scene_text
 from spinlev.geometry.scene.making import magnets, tilt, vertical
 from spinlev.geometry.scene.messages import SceneError
-from spinlev.geometry.shapes import Cylinder, Sphere
+from spinlev.geometry.shapes import Box, Cylinder, Sphere
 
 DISC = {"shape": "cylinder", "diameter_mm": 20.0, "height_mm": 5.0}
 RING = {"shape": "ring", "diameter_mm": 20.0, "inner_diameter_mm": 12.0, "height_mm": 5.0}
@@ -119,6 +119,7 @@ def test_what_lies_in_the_hole_of_a_ring_does_not_overlap_it():
         of(PLACED | RING, PLACED | rod | {"center_mm": [0.05, 0.0, 0.0]})
 
 
+FLOOR = {"size_mm": [100.0, 100.0, 10.0], "center_mm": [0.0, 0.0, -55.0], "conductivity_S_m": 3.5e7}
 PLATE = {"center_mm": [1.0, -2.0, -45.0], "rotation_deg": [0.0, 0.0, 20.0], "conductivity_S_m": 3.5e7}
 
 
@@ -140,3 +141,38 @@ def test_a_plate_from_a_file_is_the_shape_it_has(tmp_path):
     assert (body.radius, body.height) == pytest.approx((0.04, 0.006))
     with pytest.raises(SceneError, match=r"plate\.file must be given"):
         scene(frequency_hz=100.0, rotor=magnets(PLACED | DISC), floater=BALL, plate=PLATE | {"shape": "file"})
+
+
+def test_several_plates_are_one_conductor_of_several_bodies():
+    wall = {"size_mm": [5.0, 40.0, 30.0], "center_mm": [-60.0, 0.0, -30.0], "conductivity_S_m": 5.9e7}
+    made = scene(frequency_hz=100.0, rotor=magnets(PLACED | DISC), floater=BALL, plate=[FLOOR, wall])
+    assert made.plate.each == (3.5e7, 5.9e7)
+    assert made.plate.conductivity == 5.9e7
+    assert made.plate.box.center == pytest.approx(1e-3 * np.array(FLOOR["center_mm"]))
+    assert made.plate.body.distance([-0.05, 0.0, -0.03]) == pytest.approx(7.5e-3)
+    written = replace(made, plate=replace(made.plate, lowering=None))
+    again = parse_scene(scene_text(written))
+    assert repr(again.plate) == repr(made.plate)
+    assert scene_digest(again) == scene_digest(made)
+    assert changed(made, {"plate.1.center_mm.0": -70.0}).plate.body.placed[1].center[0] == pytest.approx(-0.07)
+    alone = scene(frequency_hz=100.0, rotor=magnets(PLACED | DISC), floater=BALL, plate=[FLOOR])
+    assert isinstance(alone.plate.body, Box)
+
+
+@pytest.mark.parametrize(
+    ("second", "said"),
+    [
+        ({"center_mm": [0.0, 0.0, -60.0]}, r"plate\[1\] must be apart from plate\[0\], as .* they overlap by 5 mm"),
+        ({"center_mm": [0.0, 0.0, -65.0]}, "instead they touch; give them as one file"),
+        ({"center_mm": [0.0, 0.0, -80.0], "conductivity_S_m": -1.0}, r"plate\[1\].conductivity_S_m must be"),
+        ({"center_mm": [0.0, 0.0, -80.0], "conductvity_S_m": 1.0}, r"unknown key `plate\[1\].conductvity_S_m` \(did"),
+        (
+            {"center_mm": [0.0, 0.0, -80.0], "lowering": {"start_s": 1.0, "speed_mm_s": 1.0, "distance_mm": 1.0}},
+            r"plate\[1\].lowering must be that of plate\[0\]",
+        ),
+        ({"center_mm": [0.0, 0.0, -80.0], "diameter_mm": 3.0}, r"plate\[1\] must have size_mm, as the shape is"),
+    ],
+)
+def test_faults_of_several_plates_are_said(second, said):
+    with pytest.raises(SceneError, match=said):
+        scene(frequency_hz=100.0, rotor=magnets(PLACED | DISC), floater=BALL, plate=[FLOOR, FLOOR | second])
