@@ -10,7 +10,7 @@ import numpy as np
 from ...geometry.common import Array
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, left_product, matrices_of, quaternions_of
-from .balance import CONVERGED_STEP, DUPLICATE_DISTANCE
+from .balance import CONVERGED_STEP, DUPLICATE_DISTANCE, place_error
 from .equilibrium import LOCKED, Equilibrium, eigenmodes
 
 TURNS = 16  # about the moment from which each is looked for
@@ -66,7 +66,7 @@ def locked_equilibrium(
     values : (p,) of the parameters
     position : (3,) scaled
     quaternion : (4,)
-    doubt : (2,) error of the field there, T, and of its gradient, T/m
+    doubt : (2 + 12 c,) of the field there, T and T/m, see `field_doubts`
     """
     rate = float(values[Parameter.RATE])
     axes = matrices_of(quaternion)
@@ -80,15 +80,13 @@ def locked_equilibrium(
     by_turn = 0.5 * np.stack(left_product(list(np.eye(3)), list(quaternion[:, None] * np.ones(3))))
     tangents[6:10, 6:9], projections[6:9, 6:10] = by_turn, 4 * by_turn.T
     found = eigenmodes(projections @ jacobian @ tangents, tangents)
-    torque, length, inertia = values[[Parameter.TORQUE, Parameter.LENGTH, Parameter.INERTIA]]
-    unsure = np.abs(value) + torque * np.array([inertia * length * doubt[1]] * 3 + [doubt[0]] * 3)
     gravity = abs(float(values[Parameter.GRAVITY_Z]))
     unpacked = scales.unpack(state)
     return Equilibrium(
         state=unpacked,
         spin=float(unpacked.moment[2]),
         residual=float(np.abs(value).max() / (gravity or 1.0)),
-        position_error=float(np.linalg.norm((np.abs(np.linalg.pinv(slope)) @ unsure)[:3])) * scales.length,
+        position_error=place_error(np.linalg.pinv(slope), value, values, doubt, axes[:, 2], axes.T) * scales.length,
         **found.in_seconds(scales.time),
         kind=LOCKED,
         slope=slope,

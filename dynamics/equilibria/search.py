@@ -20,16 +20,12 @@ from ..motion.floater_effects import FloaterShape
 from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
-from .balance import CONVERGED_STEP, DUPLICATE_DISTANCE, EVERY, Balance, solve, tangent_basis
+from .balance import CONVERGED_STEP, DUPLICATE_DISTANCE, EVERY, Balance, place_error, solve, tangent_basis
 from .curves import FARTHEST, SearchRange, fixed_points
 from .equilibrium import AVERAGED, LOCKED, Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey, modes
 from .locked import TURNS, locked_equilibrium, locked_poses, without_twins
 from .orbits import ForcedMotion, overlap
 
-# Part of what a model leaves out that is wrong of its effect to first order, by all causes together and by each. Below
-# three vertical and four tilted rotors of permeable cubes the place by finite elements differed by 0.59 to 0.79 of the
-# error so stated for dipoles and cuboids (72 equilibria), below five horizontal ones by 0.1 to 1 of it.
-SECOND_ORDER = 0.25
 BEYOND = 0.1  # Part of a floater's weight that its multipoles may leave out; beyond, they do not tell an equilibrium
 
 
@@ -196,7 +192,7 @@ def _locked(
     known, doubts = field_doubts(table, position[inside] * scales.length)
     chosen = np.flatnonzero(inside)[known]
     found = [
-        locked_equilibrium(scales, rates, values, position[k], quaternion[k], _sizes(doubt))
+        locked_equilibrium(scales, rates, values, position[k], quaternion[k], doubt)
         for k, doubt in zip(chosen, doubts, strict=True)
     ]
     return without_twins([one for one in found if rotor_gap(scene, one.position, one.state.orientation) > 0])
@@ -233,13 +229,6 @@ def _of_shape(
                 kept[k] = missed[1] * floater.moment < BEYOND * floater.mass * unit
                 more += [np.concatenate([doubt[:2] + missed, doubt[2:]])] if kept[k] else []
     return kept, np.reshape(more, (-1, doubts.shape[1]))
-
-
-def _sizes(doubt: Array) -> Array:
-    """(2,) T and T/m of doubts (2 + 12 c,), see `field_doubts`, whatever their directions."""
-    left_out = doubt[2:].reshape(-1, 4, 3)
-    more = np.linalg.norm(left_out[:, 0], axis=1).sum(), np.linalg.norm(left_out[:, 1:], axis=(1, 2)).sum()
-    return np.asarray(doubt[:2] + more)
 
 
 def survey_of(scene: Scene, balance: Balance, known: FixedPoints) -> Survey:
@@ -355,17 +344,8 @@ def _equilibrium(
     (state,) = balance.states(point[None, :3], point[None, 3:])
     motion = modes(state, jacobian)
     values = np.ravel(balance.values)
-    torque, length, inertia = values[[Parameter.TORQUE, Parameter.LENGTH, Parameter.INERTIA]]
-    unsure = np.abs(residual) + torque * np.array([inertia * length * doubt[1]] * 3 + [doubt[0]] * 2)
-    inverse = np.linalg.inv(slope)
-    error = float(np.linalg.norm((np.abs(inverse) @ unsure)[:3]))
-    # What a model leaves out moves the place in a known direction: taken by sizes alone it would be 3 mm for 0.1.
-    left_out, moment = doubt[2:].reshape(-1, 4, 3), point[3:]
-    forces = inertia * length * (left_out[:, 1:] @ moment)
-    torques = np.cross(moment, left_out[:, 0]) @ tangent_basis(moment[None])[0].T
-    moved = (torque * np.concatenate([forces, torques], axis=1) @ inverse.T)[:, :3]
-    together, each = np.linalg.norm(moved.sum(axis=0)), np.linalg.norm(moved, axis=1)
-    error += float((1 + SECOND_ORDER) * together + SECOND_ORDER * each.sum())
+    inverse = np.asarray(np.linalg.inv(slope), float)
+    error = place_error(inverse, residual, values, doubt, point[3:], tangent_basis(point[None, 3:])[0])
     gravity = abs(float(values[Parameter.GRAVITY_Z]))
     return Equilibrium(
         state=scales.unpack(state),

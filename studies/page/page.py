@@ -108,6 +108,7 @@ class Page:
     def _become(self, method: str, *arguments: Any) -> None:
         """Ask for another state, by a method of the state at that time; of moves of one slider the last counts."""
         self.tell(message="")
+        # A slider's key replaces its own older moves; every other wish has a key of its own and is never dropped.
         key = arguments[0] if method == "changed" else object()
         other = partial(self._became, method == "opened")
         self.quick.ask(key, lambda: (work.become, self.state, method, arguments, self.near), other)
@@ -161,7 +162,7 @@ class Page:
         self.tell(numbers={**shown, "number": self.number, "complete": complete})
         keys = self.state.keys
         rotor, whole = str(keys["rotor"]), str((keys["rotor"], keys["floater"], keys.get("plate")))
-        if complete or self.drawn[0] != rotor:
+        if complete or self.drawn[0] != rotor:  # 7 kB that a slider of the frequency does not change
             strength = base64.b64encode(found.strength).decode()
             self.tell(slice={"x": work.SLICE[0], "z": work.SLICE[1], "pixel": work.PIXEL, "strength": strength})
         if found.lines or self.drawn[1] != whole:  # field lines are kept as far as they hold

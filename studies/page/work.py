@@ -148,6 +148,7 @@ def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -
     """
     known: dict[str, Levitation] = {}
     fresh: Sequence[Any] = ()  # places by the point dipole, the first of all
+    # Cheap models first: Newton's method finds the others' equilibria from theirs, where the last ones are too far off.
     for model in sorted(compared(state), key=lambda name: name in PERMEABLE):
         levitation = Levitation(state.scene, Models(model, "none"), state.spin)
         try:
@@ -217,8 +218,9 @@ def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
     for model in compared(state):
         if one := known.get(model):
             near = worth_a_row(one.equilibria)
+            # Not its first: that may be another branch, and the difference would be no error of a model.
             e = nearest_of(near, useful[0].position) if useful else next(iter(near), None)
-            name = MODEL_WORDS[one.table.model]
+            name = MODEL_WORDS[one.table.model]  # of the table, as "auto" and rotors without permeability choose it
             answers.append(
                 ModelAnswer(
                     name,
@@ -244,6 +246,7 @@ def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
                 drawn_field(state.scene, first.table)(1e-3 * np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)), axis=1
             )
         )
+    # A byte a pixel: a slice is sent with every step of a slider.
     levels = np.clip(np.nan_to_num((size - WEAKEST) / -WEAKEST * 254, neginf=0.0), 0, 254)
     levels = np.where(np.isnan(size), 255, levels)
     return Shown(
@@ -316,7 +319,7 @@ def regions(
     axes = [np.linspace(*span, points) for span in spans]
     unit = np.radians(1.0) if configuration == "tilt" else 1e-3
     try:
-        try:
+        try:  # magnets that move against each other have no one field by finite elements over a whole map
             family = rotor_family(state.scene, configuration, model)
         except InputError:
             model = "cuboid"
@@ -326,6 +329,8 @@ def regions(
         raise ComputationError(str(error)) from None
     stable, ends = found.number[1] > 0, _ends(family, found, state.spin)
     cells, border = list[list[Place]](), list[tuple[Place, ...]]()
+    # Marching squares: a cell's stable corners, and between a stable and another one where stability ends. Only points
+    # are classified, so that a tongue narrower than a step of the map is lost.
     for i, j in np.ndindex(points - 1, points - 1):
         outline, crossed = list[Place](), list[Place]()
         corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1), (i, j)]
@@ -358,6 +363,7 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
     ]  # fmt: skip
     if not pairs:
         return {}
+    # Of several stable equilibria at a point the first (the list is reversed, and a later key replaces an earlier one).
     which = {(int(found.row[k]), int(found.column[k])): k for k in np.flatnonzero(found.lasting)[::-1]}
     first = np.array([which[one] for one, _ in pairs])
     position, moment = found.position[first] / family.scene.floater.radius, found.moment[first]
@@ -366,6 +372,7 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
         np.array([[axis[k] for axis, k in zip(axes, pair[side], strict=True)] for pair in pairs]) for side in (0, 1)
     )
     low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    # All pairs are halved together: a call of compiled code costs more than the pairs in it.
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         values = family.values(*(begin + middle[:, None] * (end - begin)).T)
