@@ -37,6 +37,9 @@ print(levitation.flight(1.0).levitated_s)
 # [equilibria]
 found = sl.equilibria(scene, model="cuboid")
 print(found[["distance", "polar_angle", "growth", "stable"]].to_dataframe())
+# [gradient]
+slopes = sl.gradient(scene, of=["distance"], by=["rotor.edge_mm", "frequency_hz"], model="cuboid")
+print(1e3 * slopes.distance.isel(equilibrium=0).to_series())  # mm by mm, and by Hz
 # [stability]
 modes = sl.stability(scene, model="cuboid")
 print(modes[["mode_frequency", "mode_growth"]].to_dataframe())

@@ -39,6 +39,7 @@ from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
 from .figures.run import field_figure, force_figure, trajectory_figure
 from .figures.style import save_figures
+from .gradient import gradient_job
 from .levitation import Levitation
 from .plan import check_drive, sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
@@ -189,13 +190,17 @@ def response(
     return model, tensor, edge_error(plate, place), []
 
 
-def equilibria_job(scene: Scene, requested: Models, spin: float, out: Path) -> Answer:
-    """All equilibria of a `scene` with body `spin` by `requested` models, with stability; writes to `out`."""
+def equilibria_job(scene: Scene, requested: Models, spin: float, out: Path, gradient: bool = False) -> Answer:
+    """All equilibria of a `scene` with body `spin` by `requested` models, with stability; writes to `out`.
+
+    With their derivatives if a `gradient` is asked for.
+    """
     levitation = Levitation(scene, requested, spin)
     result = Result(levitation, levitation.survey)
-    values = {**result.summary, "tables_from_cache": levitation.from_cache}
+    more, lines = gradient_job(levitation, out) if gradient else ({}, [])
+    values = {**result.summary, **more, "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
-    return values, result.text()
+    return values, [*result.text(), *lines]
 
 
 def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, resume: bool) -> Answer:
@@ -247,8 +252,12 @@ def _of_trajectory(result: xr.Dataset) -> dict[str, Figure]:
     return {"trajectory": trajectory_figure(result), **drive}
 
 
-def main_job(scene: Scene, requested: Models, spin: float, duration: float, out: Path) -> Answer:
+def main_job(
+    scene: Scene, requested: Models, spin: float, duration: float, out: Path, gradient: bool = False
+) -> Answer:
     """Compute everything of a `scene` by `requested` models for a body `spin` and a trajectory of `duration` (s).
+
+    With the derivatives of its equilibria if a `gradient` is asked for.
 
     Writes result.nc, summary.json and the figures to `out`.
 
@@ -295,6 +304,10 @@ def main_job(scene: Scene, requested: Models, spin: float, duration: float, out:
         "tables_from_cache": levitation.from_cache,
     }
     lines = result.text()
+    if gradient and survey.equilibria:
+        more, derivatives = gradient_job(levitation, out)
+        values |= more
+        lines += derivatives
     if any(magnet.coercivity is not None and magnet.polarization.any() for magnet in scene.rotor):
         worked, sentences, _ = write_working_point(levitation, out)
         values |= worked

@@ -8,16 +8,20 @@ time domain: J. P. Boyd, Chebyshev and Fourier Spectral Methods, 2001, ch. 6 and
 The equations keep |m̂| and the body spin s = Ω·m̂/ω; both are prescribed beside them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..motion.events import clearance
-from ..motion.plate import PlateForce, PlateMemory
+from ..motion.plate import PlateCoupling, PlateForce, PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State, turned_about_z
 from .balance import Indices
@@ -119,6 +123,40 @@ def conserved(states: Array, spin: float) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
+class Pencil:
+    """T(λ) v = 0 of small motions e^{λτ} v(τ) about a periodic one, v at its n instants; T(0) is the orbit's own slope.
+
+    The plate's states are eliminated exactly, as from the orbit: their memory M depends on λ.
+    """
+
+    change: Array  # (n, n) derivative by scaled time
+    slopes: Array  # (n, 12, 12) of the floater's rates, the plate's currents as they are
+    plate: PlateForce | None = None
+    drive: PlateCoupling | None = None
+
+    def matrix(self, shift: complex) -> NDArray[Any]:
+        """T (12 n, 12 n) at λ = `shift` per unit of scaled time."""
+        n = len(self.change)
+        found = np.einsum("ab,xy->axby", self.change + shift * np.eye(n), np.eye(12))
+        found[np.arange(n), :, np.arange(n)] -= self.slopes
+        if self.plate is not None and self.drive is not None:
+            answer = self.plate.remembered(n, shift) - np.eye(n)
+            parts = self.drive.fields, answer, self.drive.by_state
+            found[:, ACCELERATED] -= np.einsum("aix,iab,biy->axby", *parts, optimize=True)
+        return np.asarray(found.reshape(12 * n, 12 * n))
+
+    def applied(self, vector: NDArray[Any], shift: complex) -> NDArray[Any]:
+        """T(λ) v (12 n,) of a vector (12 n,), without the matrix."""
+        motion = vector.reshape(-1, 12)
+        found = self.change @ motion + shift * motion - np.einsum("axy,ay->ax", self.slopes, motion)
+        if self.plate is not None and self.drive is not None:
+            signals = np.einsum("biy,by->bi", self.drive.by_state, motion)
+            currents = np.einsum("iab,bi->ai", self.plate.remembered(len(motion), shift), signals) - signals
+            found[:, ACCELERATED] -= np.einsum("aix,ai->ax", self.drive.fields, currents)
+        return np.asarray(found.ravel())
+
+
+@dataclass(frozen=True, eq=False)
 class OrbitProblem:
     """Equations of an orbit at `count` instants of a turn."""
 
@@ -134,22 +172,23 @@ class OrbitProblem:
 
     def __call__(self, states: Array) -> tuple[Array, Array]:
         """Residual (12 n,) and its derivatives (12 n, 12 n)."""
+        residual, pencil = self.linear(states)
+        return residual, pencil.matrix(0.0)
+
+    def linear(self, states: Array) -> tuple[Array, Pencil]:
+        """Residual (12 n,), and the equations of small motions about these states (n, 12)."""
         n, change = self.count, differentiation(self.count)
         rates, slopes = self._floater(states)
         residual = change @ states - rates
-        slope = np.einsum("ab,xy->axby", change, np.eye(12))
-        slope[np.arange(n), :, np.arange(n)] -= slopes
-        if self.plate is not None:
-            # The plate pulls with what its states have relaxed to, less the signals themselves: F (M - 1) s(x).
-            drive, memory = self.plate(self.times, states), self.plate.remembered(n)
-            currents = np.einsum("iab,bi->ai", memory, drive.signals) - drive.signals
-            residual[:, ACCELERATED] -= np.einsum("aix,ai->ax", drive.fields, currents)
-            pull = np.einsum("akyx,ak->axy", drive.pull, self.plate.strengths(currents))
-            slope[np.arange(n)[:, None], ACCELERATED, np.arange(n)[:, None]] -= pull
-            # F changes at the same instant alone, the currents with the signals of all instants.
-            answer = memory - np.eye(n)
-            slope[:, ACCELERATED] -= np.einsum("aix,iab,biy->axby", drive.fields, answer, drive.by_state, optimize=True)
-        return residual.ravel(), slope.reshape(12 * n, 12 * n)
+        if self.plate is None:
+            return residual.ravel(), Pencil(change, slopes)
+        # The plate pulls with what its states have relaxed to, less the signals themselves: F (M - 1) s(x).
+        drive = self.plate(self.times, states)
+        currents = np.einsum("iab,bi->ai", self.plate.remembered(n), drive.signals) - drive.signals
+        residual[:, ACCELERATED] -= np.einsum("aix,ai->ax", drive.fields, currents)
+        # F changes at the same instant alone, the currents with the signals of all instants.
+        slopes[:, ACCELERATED] += np.einsum("akyx,ak->axy", drive.pull, self.plate.strengths(currents))
+        return residual.ravel(), Pencil(change, slopes, self.plate, drive)
 
     def whole(self, states: Array) -> tuple[Array, Array]:
         """States of the plate (n, k), and derivatives of all rates by all states (n, 12 + k, 12 + k)."""

@@ -161,6 +161,11 @@ class FloaterShape:
     def count(self) -> int:
         return (len(self.heights) - 1) * LocalField.count
 
+    @property
+    def compiled_in(self) -> tuple[float, ...]:
+        """Numbers in the code of the equations, see `Rates.elsewhere`."""
+        return (*self.heights.tolist(), *self.dipoles.tolist())
+
     def placed(self, first: int) -> FloaterShape:
         """See `Placeable`."""
         numbers = range(len(self.heights) - 1)

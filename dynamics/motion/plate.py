@@ -28,6 +28,7 @@ The plate's torque on the rotor is Σ y_i ∂r_i/∂φ.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -291,12 +292,16 @@ class PlateForce:
         """(n, k) of the multipoles, from the currents (n, states)."""
         return np.asarray(currents @ self.memory.table.weights)
 
-    def remembered(self, count: int) -> Array:
-        """(states, n, n): the plate's states at n instants of a turn, from its signals at them, all periodic."""
+    def remembered(self, count: int, shift: complex = 0.0) -> NDArray[Any]:
+        """(states, n, n): the plate's states at n instants of a turn, from its signals at them, all periodic.
+
+        Of motions that are periodic times e^{λτ}, λ = `shift`; real where that is 0.
+        """
         decay = self.rates[:, None]
         harmonics = np.fft.fft(np.eye(count), axis=0)
-        factors = decay / (decay + 1j * self.values[Parameter.RATE] * np.fft.fftfreq(count, 1 / count))
-        return np.fft.ifft(factors[:, :, None] * harmonics, axis=1).real
+        factors = decay / (decay + shift + 1j * self.values[Parameter.RATE] * np.fft.fftfreq(count, 1 / count))
+        found = np.fft.ifft(factors[:, :, None] * harmonics, axis=1)
+        return found if shift else found.real
 
     def settled(self, state: Array, count: int = 33) -> Array:
         """States (states,) of the plate at t = 0 under a floater that has long turned with the rotor, (12,)."""

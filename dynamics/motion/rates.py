@@ -36,10 +36,7 @@ class Rates:
 
     def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
         whole = interaction_of(table)
-        # A field known by its expressions alone is compiled for itself.
-        self._field: Any = (
-            whole.field if hasattr(whole.field, "derivatives") else CompiledField(whole.field.expressions)
-        )
+        self._field, self._effects = _derived(whole), whole.effects
         self._rough = False
         self._placed: list[Placeable] = []
         effects: list[Effect] = []
@@ -55,6 +52,22 @@ class Rates:
         self._equations = equations_of_motion(Interaction(self._local, tuple(effects), whole.turning))
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._level = 1 if optimised else 0
+
+    def elsewhere(self, table: FieldFormula) -> Rates:
+        """The rates in another table, by the same code where its effects differ by runtime parameters alone."""
+        whole, first = interaction_of(table), self._local.first + self._local.count
+        # what effects have in their code beside their kind, as places of dipoles, must be the same
+        kinds = [[(one.name, getattr(one, "compiled_in", None)) for one in e] for e in (self._effects, whole.effects)]
+        if kinds[0] != kinds[1]:
+            return Rates(table, bool(self._level))
+        found = copy(self)
+        found.__dict__.pop("rough", None)
+        found._field, found._placed = _derived(whole), []
+        for effect in whole.effects:
+            if isinstance(effect, Placeable):
+                found._placed.append(effect.placed(first))
+                first += effect.count
+        return found
 
     def compile(self) -> None:
         """Compile now what is else compiled when it is first called."""
@@ -157,6 +170,11 @@ class Rates:
     @cached_property
     def _locked(self) -> Any:
         return self._compiled(locked_balances)
+
+
+def _derived(table: Interaction) -> Any:
+    """The field with its derivatives; one known by its expressions alone is compiled for itself."""
+    return table.field if hasattr(table.field, "derivatives") else CompiledField(table.field.expressions)
 
 
 def _with_jacobian(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:

@@ -298,10 +298,10 @@ class RotorCurrents(_Near):
 
     def numbers(self, field: DerivedField, poses: Poses) -> Array:
         """See `Placeable`."""
-        return self._entries(poses.places).T
+        return self.entries(poses.places).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
-        parts = self._entries(ball.center + ball.radius * nodes())
+        parts = self.entries(ball.center + ball.radius * nodes())
         lengths = np.repeat([UNIT, 1.0], (5, 3))
         units = np.array([lengths[a] * lengths[b] for a, b in ENTRIES])
         solve, basis = fitting(1)
@@ -311,8 +311,10 @@ class RotorCurrents(_Near):
         error = float(missed.max() / (units * np.abs(parts).max(axis=1)).max())
         return np.concatenate([quadratic, weights.ravel()]), error / BRAKE_ALLOWED
 
-    def _entries(self, places: Array) -> Array:
+    def entries(self, places: Array) -> Array:
         """(36, n) of S at places (n, 3) m."""
+        if not isinstance(self.table, RotorLosses) and hasattr(self.table, "entries"):  # one between others
+            return np.asarray(self.table.entries(places))
         fields, slopes = self.table.fields(places)
         rows = np.concatenate([np.stack([slopes[..., i, j] for i, j in UPPER], axis=2), fields], axis=2)
         return np.array([np.einsum("nk,nk->n", rows[..., a], rows[..., b]) for a, b in ENTRIES])

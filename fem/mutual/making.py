@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, permutations
 
 import numpy as np
@@ -122,7 +123,12 @@ EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE = 8000, 5.0, 6, 6
 INNER = 2  # points along each axis at which magnets beside each other respond beyond their direct response
 
 
-def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = unwatched) -> MutualTable:
+def mutual_table(
+    magnets: tuple[Magnet, ...],
+    floater: Floater,
+    watch: Watch = unwatched,
+    points: Sequence[tuple[int, int, int]] | None = None,
+) -> MutualTable:
     """Mutual magnetisation of a rotor and a spherical floater.
 
     Parameters
@@ -130,6 +136,7 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = u
     magnets : of the rotor
     floater : whose radius, remanence and recoil permeability count
     watch : called with the progress
+    points : along the edges of each magnet, at which it responds; left out, as many as the accuracy needs
 
     Raises
     ------
@@ -137,14 +144,14 @@ def mutual_table(magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = u
     """
     started = time.perf_counter()
     grids = []
-    for magnet in magnets:
+    for k, magnet in enumerate(magnets):
         if reason := without_response(magnet):
             raise InputError(
                 "Input magnets must be of the kinds that respond to the floater where both magnetise each other; "
                 f"instead one is {reason}"
             )
         box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
-        counts = _counts(magnet, floater.radius)
+        counts = points[k] if points else _counts(magnet, floater.radius)
         n = int(np.prod(counts))
         zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
         axis = magnet.polarization / size if size else np.zeros(3)
@@ -268,12 +275,27 @@ def cached_mutual_table(
     """
     upright = alike(magnets)
     table, found = MUTUAL.cached(_inputs(upright, floater), lambda: mutual_table(upright, floater, watch=watch), report)
+    return moved_mutual(table, magnets), found
+
+
+def moved_mutual(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
+    """The table of magnets that differ from its own in the pose of a lone one."""
     if len(magnets) != 1:
-        return replace(table, magnets=magnets), found
+        return replace(table, magnets=magnets)
     (magnet,), (grid,) = magnets, table.grids
-    turn = np.kron(np.eye(len(table.coupling) // 3), magnet.box.rotation)
+    turn = np.kron(np.eye(len(table.coupling) // 3), magnet.box.rotation @ grid.box.rotation.T)
     grids = (replace(grid, box=response_box(magnet.body)),)
-    return replace(table, magnets=magnets, grids=grids, coupling=turn @ table.coupling @ turn.T), found
+    return replace(table, magnets=magnets, grids=grids, coupling=turn @ table.coupling @ turn.T)
+
+
+def mutual_table_beside(
+    table: MutualTable, magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None]
+) -> MutualTable:
+    """The table of other magnets and another floater with as many points as `table`, for differences of the two."""
+    points = [grid.counts for grid in table.grids]
+    inputs = *_inputs(alike(magnets), floater), points
+    make = partial(mutual_table, alike(magnets), floater, points=points)
+    return moved_mutual(MUTUAL.cached(inputs, make, report)[0], magnets)
 
 
 def sphere_fit(

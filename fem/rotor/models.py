@@ -21,7 +21,7 @@ from ..closed_forms.moments import carrier, closed_part, first_order_moments, un
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from ..elements.surface import SurfaceCharges, bears_charges, gap
 from ..harmonics.expansion import MOST, MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
-from ..harmonics.solid import FOUR_PI, weighted_sums
+from ..harmonics.solid import FOUR_PI, rotated_harmonics, weighted_sums
 from .table import KNOWN, RotorTable
 
 # Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor
@@ -359,23 +359,13 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     ratios = _ratios(permeable, points)
     degree = _degree(permeable, ratios, accuracy.rtol / 10)
 
-    def charged(surfaces: SurfaceCharges) -> list[MultipoleExpansion]:
-        beyond, found = surfaces.beyond(carriers), list[MultipoleExpansion]()
-        for k, body in enumerate(magnet.body for magnet in permeable):
-            (places, amounts), radius = surfaces.refined(k, beyond), body.circumradius
-            weights = amounts[:, None] / (FOUR_PI * radius**2)
-            (sums,) = weighted_sums(degree, (places - body.center) / radius, weights)
-            sums[0] = 0.0  # a magnet has no charge
-            found.append(MultipoleExpansion(body.center, radius, without_noise(np.conj(sums), 1e-15)))
-        return found
-
     whole, steps, before, count = list[MultipoleExpansion](), list[MultipoleExpansion](), np.inf, 0
     surfaces: SurfaceCharges | None = None
     for k, more in enumerate(NODES if permeable else ()):
         if k > 1 and surfaces and surfaces.numbers_at(more) > LARGEST:
             break
         count, surfaces = more, SurfaceCharges(magnets, more)
-        coarse, whole = whole, charged(surfaces)
+        coarse, whole = whole, _charged(surfaces, carriers, degree)
         if not k:
             continue
         step = [replace(b, coefficients=b.coefficients - a.coefficients) for a, b in zip(coarse, whole, strict=True)]
@@ -394,6 +384,94 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     table = _trimmed(table, accuracy, (points, scale), BETWEEN / 20, 1.0, FITTED)
     _warn_beyond(table, accuracy, points, scale)
     return replace(table, provenance={"nodes": count, "seconds": time.perf_counter() - start})
+
+
+def _charged(surfaces: SurfaceCharges, carriers: Rotor, degree: int) -> list[MultipoleExpansion]:
+    """Expansions of the charges on permeable magnets beside the polarised `carriers`, up to a degree."""
+    beyond, found = surfaces.beyond(carriers), list[MultipoleExpansion]()
+    for k, body in enumerate(magnet.body for magnet in surfaces.magnets):
+        (places, amounts), radius = surfaces.refined(k, beyond), body.circumradius
+        weights = amounts[:, None] / (FOUR_PI * radius**2)
+        (sums,) = weighted_sums(degree, (places - body.center) / radius, weights)
+        sums[0] = 0.0  # a magnet has no charge
+        found.append(MultipoleExpansion(body.center, radius, without_noise(np.conj(sums), 1e-15)))
+    return found
+
+
+STEADY_NODES, STEADY_DEGREE = 16, 40  # of charges on surfaces whose fields are smooth functions of the magnets' numbers
+
+
+def changed_table(table: RotorTable, rotor: Rotor) -> RotorTable:
+    """The field of magnets that differ a little from a table's: a smooth function of their numbers, for differences.
+
+    A lone magnet that is moved, turned, magnified or polarised more has the table's own field, transformed. What else
+    changes is added to the table by closed forms, or of permeable magnets by charges on their surfaces, as many in both
+    cases; permeable magnets that have none, as parts of STEP files, change as if they were of μr = 1. Without doubts.
+    """
+    before = table.magnets
+    if sizes := magnified(before, rotor):
+        return _transformed(table, before[0], rotor[0], *sizes)
+    simple = {"dipole": lambda m: ((), tuple(uniform_moments(one, 1) for one in m))}.get(table.model, _closed)
+    accuracy = Accuracy()
+    charged = table.model in ("fem", "surface") and all(
+        not without_charges(m, accuracy, error_points(m, accuracy.clearance(m))[0]) for m in (before, rotor)
+    )
+    (minus, less), (plus, more) = ((_with_charges if charged else simple)(m) for m in (before, rotor))
+    less = tuple(replace(part, coefficients=-part.coefficients) for part in less)
+    minus = tuple(replace(one, polarization=-one.polarization) for one in minus)
+    return replace(
+        table,
+        magnets=rotor,
+        uniform=(*table.uniform, *minus, *plus),
+        expansions=(*table.expansions, *less, *more),
+        doubts={},
+    )
+
+
+def _closed(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:
+    """Closed forms of the remanence, and dipoles of parts, which have none."""
+    known = tuple(magnet for magnet in rotor if not isinstance(magnet.body, Part))
+    return known, tuple(uniform_moments(magnet, DEGREE) for magnet in rotor if isinstance(magnet.body, Part))
+
+
+def _with_charges(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:
+    carriers = tuple(carrier(magnet) for magnet in rotor)
+    charges = (
+        _charged(SurfaceCharges(rotor, STEADY_NODES), carriers, STEADY_DEGREE) if any(m.contrast for m in rotor) else []
+    )
+    return tuple(one for one in carriers if one.polarization.any()), tuple(charges)
+
+
+def magnified(rotor: Rotor, other: Rotor) -> tuple[float, float] | None:
+    """Sizes and remanence of a lone magnet by those of another, wherever they are; None where they differ in more."""
+    if not len(rotor) == len(other) == 1:
+        return None
+    (before,), (after,) = rotor, other
+    bodies = before.body, after.body
+    if type(bodies[0]) is not type(bodies[1]) or isinstance(bodies[0], Part):
+        return None
+    if (before.recoil_permeability, before.transverse_permeability) != (
+        after.recoil_permeability,
+        after.transverse_permeability,
+    ):
+        return None
+    numbers = [body.shape_numbers for body in bodies]
+    size = float(np.linalg.norm(numbers[1]) / np.linalg.norm(numbers[0]))
+    strong = float(np.linalg.norm(after.polarization) / (np.linalg.norm(before.polarization) or 1.0))
+    alike = [(numbers[0] * size, numbers[1]), (before.polarization * strong, after.polarization)]
+    return (size, strong) if all(np.allclose(a, b, rtol=1e-13, atol=1e-15) for a, b in alike) else None
+
+
+def _transformed(table: RotorTable, before: Magnet, after: Magnet, size: float, strong: float) -> RotorTable:
+    turn = after.body.rotation @ before.body.rotation.T
+
+    def there(part: MultipoleExpansion) -> MultipoleExpansion:
+        center = after.body.center + size * turn @ (part.center - before.body.center)
+        coefficients = strong * rotated_harmonics(part.coefficients, turn)
+        return MultipoleExpansion(center, size * part.radius, coefficients, turn @ part.axes)
+
+    forms = tuple(replace(form, body=after.body, polarization=strong * form.polarization) for form in table.uniform)
+    return replace(table, magnets=(after,), uniform=forms, expansions=tuple(map(there, table.expansions)), doubts={})
 
 
 def _warn_beyond(table: RotorTable, accuracy: Accuracy, points: Array, scale: Array) -> float:

@@ -6,7 +6,7 @@ import json
 import logging
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -307,6 +307,30 @@ def scene_keys(scene: Scene) -> dict[str, Any]:
         for name, (_, written) in FIELDS.items()
     }
     return {name: table for name, table in found.items() if table is not None}
+
+
+# Beginnings of keys whose numbers decide no equilibrium.
+OF_MOTION = ("start", "drive", "coils", "plate.lowering", "rotor.coercivity_kA_m")
+
+
+def scene_numbers(scene: Scene) -> tuple[Scene, dict[str, float]]:
+    """The scene with gravity and recoil permeabilities written out, and the numbers of its equilibria by dotted key."""
+    keys = {"gravity_m_s2": [0.0, 0.0, -9.81]} | scene_keys(scene)
+    rotor, floater = keys["rotor"], keys["floater"]
+    for table in rotor.get("magnets", [rotor]) + floater.get("magnets", [floater]):
+        table.setdefault("recoil_permeability", schema.RECOIL_PERMEABILITY)
+    found = dict(_flattened(keys))
+    whole = assemble(keys, "scene", Path())
+    _check_same(scene, whole.files, "scene")
+    return whole, {key: value for key, value in found.items() if not key.startswith(OF_MOTION)}
+
+
+def _flattened(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
+    if isinstance(value, Mapping | list):
+        for name, part in value.items() if isinstance(value, Mapping) else enumerate(value):
+            yield from _flattened(part, f"{key}.{name}".removeprefix("."))
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield key, float(value)
 
 
 def canonical_keys(scene: Scene) -> dict[str, Any]:

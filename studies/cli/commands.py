@@ -61,6 +61,7 @@ def run(
     spin: float = 0.0,
     duration_s: float = 10.0,
     quick: Flag = False,
+    gradient: Flag = False,
     output: Output = Output(),
 ) -> Answer:
     """Everything about one scene: field, equilibria and their stability, a trajectory, figures and pictures.
@@ -77,6 +78,8 @@ def run(
         Simulated time, s.
     quick
         Field to 0.1 %, plate's response to 5 %, no mutual magnetisation: half a minute for most scenes.
+    gradient
+        Also the derivatives of the equilibria by all numbers of the scene file, gradient.nc.
     """
     positive("--duration-s", duration_s)
     check_spin("--spin", spin)
@@ -90,7 +93,7 @@ def run(
     from ..run import main_job
 
     with owned(output.folder):
-        values, lines = main_job(loaded, requested, spin, duration_s, output.folder)
+        values, lines = main_job(loaded, requested, spin, duration_s, output.folder, gradient)
     said = f"Quick: field to {requested.rtol:.1%}, plate's response to {requested.plate_rtol:.0%}."
     return values, [*lines, said] if quick else lines
 
@@ -156,14 +159,25 @@ def field(
 
 
 def equilibria(
-    scene: SceneFile, *, requested: Models = Models(), spin: Spin = 0.0, output: Output = Output()
+    scene: SceneFile,
+    *,
+    requested: Models = Models(),
+    spin: Spin = 0.0,
+    gradient: Flag = False,
+    output: Output = Output(),
 ) -> Answer:
-    """All equilibria of the floater, frequency-locked to the rotor, with their modes and stability."""
+    """All equilibria of the floater, frequency-locked to the rotor, with their modes and stability.
+
+    Parameters
+    ----------
+    gradient
+        Also their derivatives by all numbers of the scene file, gradient.nc.
+    """
     check_spin("--spin", spin)
     loaded = _loaded(scene)
     from ..run import equilibria_job
 
-    return equilibria_job(loaded, requested.checked(), spin, output.folder)
+    return equilibria_job(loaded, requested.checked(), spin, output.folder, gradient)
 
 
 def compare(

@@ -1,0 +1,176 @@
+"""Derivatives of an equilibrium and its modes by a number of its scene: implicit differentiation.
+
+With the equations of a periodic motion F(x, p) = 0 (a fixed point is one of one instant), dx/dp = -F_x⁻¹ F_p.  A mode
+e^{λτ} v(τ) solves T(λ) v = 0 with the pencil of `orbits.Pencil`, and with its left vector u
+
+    dλ/dp = -uᴴ (dT/dp) v / uᴴ T_λ v,
+
+where dT is taken along the tangent (x + h dx/dp, p + h), so that it has the shift of the equilibrium in it (A. Andrew,
+K.-W. E. Chu and P. Lancaster, SIAM J. Matrix Anal. Appl. 14 (1993) 903).  The plate's states are eliminated from both.
+
+Of p are differenced the equations at a fixed state alone, smooth functions of the step; no equilibrium is sought anew.
+Equations of different p are each in their own units: as F and T v vanish, the units' change by p adds nothing.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...geometry.common import Array
+from ..motion.plate import PlateForce
+from ..motion.rates import Rates
+from ..motion.state import Parameter, Scales, State
+from .equilibrium import Equilibrium
+from .orbits import SHAKING, OrbitProblem, Pencil, conserved
+
+SINGULAR = 1e-9  # Smallest singular value of F_x, by the largest, below which the equilibrium is at a fold to round-off
+SLOWEST = 1e-7  # λ of a mode, rad⁻¹, that is no eigenvalue but one of the kept |m̂| and body spin
+COLLIDED = 1e-7  # |uᴴ T_λ v| by ‖T_λ v‖ below which two eigenvalues have met, where they have no derivative
+STEP = 1e-5  # Of differences along the tangent of what is a plain function of the state, scaled
+POLISHED = 3  # Steps of Newton's method that make a known λ one of the pencil
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """The equations of motion of a scene, in its own units."""
+
+    scales: Scales
+    rates: Rates
+    values: Array  # runtime parameters, drag along the moment left out
+    plate: PlateForce | None = None
+
+    def linear(self, turn: State, spin: float) -> tuple[Array, Pencil, Array, Array]:
+        """Residual (12 n,) and pencil of n states (n, 3), and what is `conserved` with a body `spin` s."""
+        states, values = self.scales.pack(turn), self.values
+        if len(states) == 1:  # what shakes a fixed point moves its mean to second order alone
+            values = values.copy()
+            values[SHAKING] = 0.0
+        residual, pencil = OrbitProblem(self.rates, values, self.plate, len(states)).linear(states)
+        rate = abs(float(self.values[Parameter.RATE]))
+        return residual, pencil, *conserved(states, spin * self.scales.spin_ratio * rate)
+
+
+@dataclass(frozen=True, eq=False)
+class Nearby:
+    """Equations at p + `offset`, with the weight of what they give in the derivative by p."""
+
+    offset: float
+    weight: float
+    setting: Setting
+
+
+@dataclass(frozen=True, eq=False)
+class _ModeAt:
+    """An eigenvalue of the pencil with its vectors."""
+
+    name: str
+    value: complex  # λ per unit of scaled time
+    left: NDArray[Any]
+    right: NDArray[Any]
+    speed: complex  # uᴴ T_λ v; 0 where it has no derivative
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """The way of an equilibrium by one number."""
+
+    start: Array  # (n, 12) scaled states
+    change: Array  # (n, 12) their derivatives
+    modes: dict[str, complex]  # derivatives of growth rate + 2πi frequency of each mode, 1/s
+    unpack: Callable[[Array], Equilibrium] = field(repr=False)
+
+    def of(self, quantity: Callable[[Equilibrium], Any]) -> Array:
+        """Derivative of a function of the motion alone, such as its distance."""
+        size = float(np.abs(self.change).max())
+        if not np.isfinite(size):
+            return np.full(np.shape(quantity(self.unpack(self.start))), np.nan)
+        if not size:
+            return np.zeros(np.shape(quantity(self.unpack(self.start))))
+        step = STEP / size
+        ends = [np.asarray(quantity(self.unpack(self.start + s * step * self.change)), float) for s in (1, -1, 2, -2)]
+        return np.asarray((8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * step))
+
+
+class Implicit:
+    """An equilibrium's equations, factorised once for derivatives by many numbers.
+
+    Parameters
+    ----------
+    known : of a body that is round about its moment, or its mean
+    setting : its equations
+    """
+
+    def __init__(self, known: Equilibrium, setting: Setting) -> None:
+        self.known, self.setting = known, setting
+        turn = known.turn or State(*(vector[None] for vector in known.state.vectors))
+        self.start = setting.scales.pack(turn)
+        _, self._pencil, rows, _ = setting.linear(turn, known.spin)
+        left, values, right = np.linalg.svd(np.vstack([self._pencil.matrix(0.0), rows]), full_matrices=False)
+        self.conditioning = float(values[-1] / values[0])  # zero at a fold
+        self._inverse = (right.T / values) @ left.T
+
+    @property
+    def at_fold(self) -> bool:
+        """Whether the equilibrium is at a fold, where it has no derivatives."""
+        return self.conditioning < SINGULAR
+
+    @cached_property
+    def modes(self) -> list[_ModeAt]:
+        """The floater's modes."""
+        scale = 2j * np.pi * self.setting.scales.time
+        given = [
+            (mode, mode.growth_per_s * self.setting.scales.time + scale * mode.frequency_hz)
+            for mode in self.known.modes
+        ]
+        return [self._mode(mode.name, complex(value)) for mode, value in given]
+
+    def _mode(self, name: str, value: complex) -> _ModeAt:
+        left = right = np.zeros(self.start.size)
+        speed = 0j
+        for _ in range(POLISHED):
+            vectors, _, rows = np.linalg.svd(self._pencil.matrix(value or 1e-300))
+            left, right = vectors[:, -1], rows[-1].conj()
+            speed = self._by_shift(left, right, value)
+            if abs(speed) < COLLIDED or abs(value) < SLOWEST:
+                return _ModeAt(name, value, left, right, 0j)
+            value -= np.vdot(left, self._pencil.applied(right, value)) / speed
+        return _ModeAt(name, value, left, right, speed)
+
+    def _by_shift(self, left: NDArray[Any], right: NDArray[Any], value: complex) -> complex:
+        ends = [self._pencil.applied(right, value + s * STEP) for s in (1, -1)]
+        return complex(np.vdot(left, (ends[0] - ends[1]) / (2 * STEP)))
+
+    def by(self, nearby: Sequence[Nearby]) -> Tangent:
+        """The way by a number, from the equations at some values of it."""
+        scales, spin = self.setting.scales, self.known.spin
+        turn = scales.unpack(self.start)
+        missed: Array = np.zeros(self._inverse.shape[1])
+        for there in nearby:
+            residual, _, _, aims = there.setting.linear(turn, spin)
+            missed = missed + there.weight * np.append(residual, aims)
+        change = (np.nan if self.at_fold else -1.0) * (self._inverse @ missed).reshape(self.start.shape)
+        by = {mode.name: 0j if not self.at_fold and mode.speed else complex(np.nan, np.nan) for mode in self.modes}
+        faster = 0.0  # derivative of the unit of the eigenvalues
+        for there in nearby:
+            faster += there.weight / there.setting.scales.time
+            if self.at_fold:
+                continue
+            pencil = there.setting.linear(scales.unpack(self.start + there.offset * change), spin)[1]
+            for mode in self.modes:
+                if mode.speed:
+                    found = np.vdot(mode.left, pencil.applied(mode.right, mode.value))
+                    by[mode.name] -= there.weight * complex(found) / mode.speed
+        rates = {mode.name: by[mode.name] / scales.time + mode.value * faster for mode in self.modes}
+        return Tangent(self.start, change, rates, self._equilibrium)
+
+    def _equilibrium(self, states: Array) -> Equilibrium:
+        """The equilibrium of other states (n, 12), of which the motion alone is right."""
+        mean = states.mean(axis=0)
+        mean[6:9] /= np.linalg.norm(mean[6:9])
+        scales = self.setting.scales
+        turn = None if self.known.turn is None else scales.unpack(states)
+        return replace(self.known, state=scales.unpack(mean), turn=turn)

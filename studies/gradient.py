@@ -1,0 +1,467 @@
+"""Derivatives of a scene's equilibria by the numbers of its scene file.
+
+What a number changes at a fixed state is differenced, and nothing else: the rotor's field and the effects at a few
+values of it (`_Changed`), from tables of one mesh, so that differences are smooth; the equilibrium and its modes follow
+by `dynamics.equilibria.derivatives`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from ..dynamics.equilibria.derivatives import Implicit, Nearby, Setting, Tangent
+from ..dynamics.equilibria.equilibrium import AVERAGED, LOCKED, Equilibrium, EquilibriumError
+from ..dynamics.motion.effect import Interaction, interaction_of
+from ..dynamics.motion.effects import mean_over_turns, with_effects
+from ..dynamics.motion.equations import parameters
+from ..dynamics.motion.plate import PlateForce, PlateMemory
+from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
+from ..dynamics.motion.state import Scales
+from ..fem.mutual.making import moved_mutual, mutual_table_beside
+from ..fem.mutual.table import MutualTable
+from ..fem.rotor.models import changed_table, magnified
+from ..fem.rotor.table import RotorTable
+from ..fem.rotor_metal import RotorLosses, cached_rotor_losses
+from ..geometry.common import Array, InputError, shown
+from ..geometry.magnets import Magnet
+from ..geometry.scene.contents import Scene
+from ..geometry.scene.files import changed, scene_numbers, scene_text
+from ..geometry.scene.messages import SceneError
+from .cli.console import note
+from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented
+from .levitation import Levitation
+from .plan import SceneLike
+from .result import IN_JSON, MODES, label_of_key, variable, write_dataset
+
+# What has derivatives: unit, label, and dimensions beside `equilibrium` and `key`, as in the dataset of equilibria
+ANSWERS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
+    "distance": ("m", "distance from the rotor's origin", ()),
+    "lateral_offset": ("m", "distance from the axis of rotation", ()),
+    "polar_angle": ("deg", "polar angle of the moment", ()),
+    "lag": ("deg", "lag behind the rotor of the moment's turning part", ()),
+    "position": ("m", "mean position, rotor's frame", ("axis",)),
+    "growth": ("1/s", "growth rate of the least stable mode", ()),
+    "mode_growth": ("1/s", "growth rate of a mode", ("mode",)),
+    "mode_frequency": ("Hz", "frequency of a mode", ("mode",)),
+}
+# Step of differences by a number, by its size or by one that such a number usually has, by the end of its key
+STEP, USUAL = 2e-3, {"mm": 10.0, "deg": 20.0, "T": 1.0, "m_s2": 9.81}
+# The same where a table is made anew by a fit: what its points leave is smooth over this
+WIDE = 0.02
+CENTRAL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))  # Steps and weights, of fourth order
+FORWARD = ((0, -25 / 12), (1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4))  # Where a number has an end
+AT_FOLD = "at a fold an equilibrium has no derivatives"
+
+
+class Gradient:
+    """Derivatives of the equilibria of a `levitation` by numbers of its scene.
+
+    Raises
+    ------
+    InputError : the rotor is at rest, or its field is a map
+    """
+
+    def __init__(self, levitation: Levitation) -> None:
+        self.levitation = levitation
+        self.scene, self.numbers = scene_numbers(levitation.still)
+        if not self.scene.frequency:
+            raise InputError("Input frequency_hz must be positive for derivatives; instead the rotor is at rest.")
+        if self.scene.field_map:
+            raise InputError("Input rotor.field_map must be left out for derivatives; instead the field is a map.")
+        # why derivatives are not known, and what is left out of those that are
+        self.reasons: dict[str, str] = {}
+
+    def checked_keys(self, by: Sequence[str] | None, name: str = "by") -> list[str]:
+        """The keys asked for, all of the scene's where none are. Raises InputError for one that is no number of it."""
+        if by is None:
+            return list(self.numbers)
+        if isinstance(by, str) or not by or not all(isinstance(key, str) for key in by):
+            raise InputError(f"Input {name} must be a list of keys of the scene file; instead received {shown(by)}.")
+        for key in by:
+            if key not in self.numbers:
+                close = difflib.get_close_matches(key, self.numbers, n=1)
+                hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(self.numbers)}"
+                raise InputError(f"Input {name}: {shown(key)} is no number of this scene ({hint})")
+        if len(set(by)) < len(by):
+            raise InputError(f"Input {name} must name each key once; instead received {shown(list(by))}.")
+        return list(by)
+
+    def tangents(self, known: Equilibrium, keys: Sequence[str]) -> dict[str, Tangent]:
+        """The way of one equilibrium by each key; none where it is not known, see `reasons`."""
+        if known.kind == LOCKED:
+            self.reasons[LOCKED] = (
+                "derivatives of frequency-locked equilibria of a body that is not round are not known"
+            )
+            return {}
+        base = _Changed(self.levitation, self.scene, known.kind == AVERAGED, known.currents is not None)
+        implicit = Implicit(known, base.setting)
+        if implicit.at_fold:
+            self.reasons["fold"] = AT_FOLD
+        found = {}
+        for key in keys:
+            if base.with_plate and (why := unknown_over_plate(key)):
+                self.reasons[why] = why
+                continue
+            nearby = [
+                Nearby(k * base.step(key, self.numbers[key]), weight, setting)
+                for k, weight, setting in self._around(base, key)
+            ]
+            found[key] = implicit.by(nearby)
+        return found
+
+    def _around(self, base: _Changed, key: str) -> list[tuple[int, float, Setting]]:
+        """Steps, weights and equations about a number; on one side where it may not grow or shrink."""
+        step = base.step(key, self.numbers[key])
+        for steps, sign in ((CENTRAL, 1), (FORWARD, 1), (FORWARD, -1)):
+            try:
+                scenes = {k: changed(self.scene, {key: self.numbers[key] + sign * k * step}) for k, _ in steps}
+            except SceneError:
+                continue
+            return [(sign * k, sign * weight / step, base.at(scenes[k], {key: sign * k * step})) for k, weight in steps]
+        raise InputError(f"Input {key} must have room to change for a derivative; instead it has none.")
+
+    def dataset(self, equilibria: Sequence[Equilibrium], of: Sequence[str], by: Sequence[str]) -> xr.Dataset:
+        """Derivatives over `equilibrium` and `key`; NaN where they do not exist, with the reasons as an attribute."""
+        sizes = {"axis": 3, "mode": len(MODES)}
+        columns = {
+            name: np.full((len(equilibria), len(by), *(sizes[d] for d in ANSWERS[name][2])), np.nan) for name in of
+        }
+        for row, known in enumerate(equilibria):
+            tangents = self.tangents(known, by)
+            for k, key in enumerate(by):
+                for name in of if key in tangents else ():
+                    columns[name][row, k] = derivative(known, tangents[key], name)
+        data = {
+            name: variable(
+                ("equilibrium", "key", *ANSWERS[name][2]), values, ANSWERS[name][0], f"derivative: {ANSWERS[name][1]}"
+            )
+            for name, values in columns.items()
+        }
+        data["number"] = variable(("key",), [self.numbers[key] for key in by], "as the key", "number of the scene")
+        units = [label_of_key(key)["units"] for key in by]
+        return xr.Dataset(
+            data,
+            {
+                "equilibrium": np.arange(len(equilibria)),
+                "key": list(by),
+                "unit": ("key", units),
+                "mode": list(MODES),
+                "axis": list("xyz"),
+            },
+            {"study": "gradient", "not_known": "; ".join(self.reasons.values()), **self.levitation.labels},
+        )
+
+
+def unknown_over_plate(key: str) -> str:
+    """Why derivatives by a key are not known where a plate's currents act; empty where they are."""
+    if key.startswith("plate.") and not key.startswith(("plate.center_mm", "plate.rotation_deg", "plate.conductivity")):
+        return "derivatives by sizes of a plate whose currents act are not known"
+    if key.startswith(("rotor.", "plate.center_mm", "plate.rotation_deg")) and not key.startswith("rotor.remanence_T"):
+        return "derivatives by what moves rotor or plate against each other are not known where its currents act"
+    return ""
+
+
+def derivative(known: Equilibrium, tangent: Tangent, name: str) -> ArrayLike:
+    """Derivative of an answer of `ANSWERS` along the way of an equilibrium."""
+    if name in ("mode_growth", "mode_frequency"):
+        rates = [tangent.modes.get(mode, complex(np.nan, np.nan)) for mode in MODES]
+        return np.real(rates) if name == "mode_growth" else np.imag(rates) / (2 * np.pi)
+    if name == "growth":
+        return tangent.modes[max(known.modes, key=lambda mode: mode.growth_per_s).name].real
+    attribute = name + ("_deg" if ANSWERS[name][0] == "deg" else "")
+    return tangent.of(lambda equilibrium: getattr(equilibrium, attribute))
+
+
+@dataclass(frozen=True, eq=False)
+class _Changed:
+    """A scene's equations, and those of scenes that differ from it in one number."""
+
+    levitation: Levitation
+    scene: Scene
+    averaged: bool  # the motion of the floater's mean over turns about its moment
+    with_plate: bool
+
+    def step(self, key: str, value: float) -> float:
+        """Of the differences by a key's number."""
+        usual = next((size for end, size in USUAL.items() if key.rstrip(".0123456789").endswith(f"_{end}")), 0.0)
+        return STEP * (max(abs(value), usual) or 1.0)
+
+    @cached_property
+    def setting(self) -> Setting:
+        return self._setting(
+            self.scene, self.levitation.interaction, self.levitation.plate if self.with_plate else None
+        )
+
+    def _setting(self, scene: Scene, interaction: Interaction, plate: PlateMemory | None) -> Setting:
+        if self.averaged:
+            scene, interaction, _ = mean_over_turns(scene, interaction)
+        scales = Scales.of(scene)
+        values = parameters(scene, scales, frozen_spin=True)
+        rates = self.levitation.rates
+        if interaction is not self.levitation.interaction or self.averaged:
+            rates = (self.setting.rates if "setting" in self.__dict__ else rates).elsewhere(interaction)
+        return Setting(scales, rates, values, PlateForce(plate, values) if plate else None)
+
+    def at(self, scene: Scene, offsets: Mapping[str, float]) -> Setting:
+        """The equations of a scene in which numbers are larger by `offsets`, by key."""
+        table, of_rotor = self.levitation.table, any(key.startswith("rotor.") for key in offsets)
+        field = changed_table(table, scene.rotor) if of_rotor and isinstance(table, RotorTable) else table
+        effects = interaction_of(field)
+        if (mutual := self.levitation.answers[0]) is not None:
+            effects = effects.joined(Mutual(self._mutual(mutual, scene, offsets), scene.floater.moment))
+        if (losses := self.levitation.losses) is not None:
+            effects = effects.joined(RotorCurrents(self._losses(losses, scene, offsets)))
+        plate = self._plate(scene, offsets) if self.with_plate else None
+        return self._setting(scene, with_effects(scene, effects), plate)
+
+    @cached_property
+    def _strength(self) -> float:
+        return float(np.linalg.norm(self.scene.rotor[0].polarization)) or 1.0
+
+    def _mutual(self, table: MutualTable, scene: Scene, offsets: Mapping[str, float]) -> Any:
+        lone, strong = magnified(self.scene.rotor, scene.rotor), 1.0
+        found: Any = moved_mutual(table, scene.rotor)
+        if "rotor.remanence_T" in offsets:
+            strong = float(np.linalg.norm(scene.rotor[0].polarization)) / self._strength
+        for key, offset in offsets.items():
+            moves = key.startswith("rotor.") and lone and lone[0] == 1.0
+            if moves or key.endswith("remanence_T") or not key.startswith(("rotor.", "floater.")):
+                continue
+            if key.startswith("floater.") and not key.endswith(("_mm", "permeability")):
+                continue
+            ends = self._ends_of(
+                "mutual", key, table, lambda there: mutual_table_beside(table, there.rotor, there.floater.ball, note)
+            )
+            found = _Line(found, *ends[:2], offset / ends[2])
+        return found if strong == 1.0 else _Stronger(found, strong)
+
+    def _losses(self, losses: RotorLosses, scene: Scene, offsets: Mapping[str, float]) -> Any:
+        before, after = self.scene.rotor, scene.rotor
+        found: Any = losses
+        alone = not self.scene.conductors and len({magnet.conductivity for magnet in after}) == 1
+        lone = alone and magnified(before, after)
+        if alone and "rotor.conductivity_S_m" in offsets:
+            ratio = float(after[0].conductivity / before[0].conductivity)  # type: ignore[operator]
+            found = replace(losses, weights=losses.weights * np.sqrt(ratio))
+        if lone:
+            return _MovedLosses(found, before[0], after[0], lone[0])
+        for key, offset in offsets.items():
+            if key.startswith("rotor.") and not key.endswith(
+                ("remanence_T", "recoil_permeability", "rotor.conductivity_S_m")
+            ):
+                ends = self._ends_of("losses", key, losses, lambda there: cached_rotor_losses(there, note)[0])
+                found = _Line(found, *ends[:2], offset / ends[2])
+        return found
+
+    def _plate(self, scene: Scene, offsets: Mapping[str, float]) -> PlateMemory | None:
+        memory = self.levitation.plate
+        assert memory is not None
+        assert scene.plate is not None
+        if "plate.conductivity_S_m" in offsets:
+            rates = memory.table.rates * (memory.plate.conductivity / scene.plate.conductivity)
+            memory = replace(memory, table=replace(memory.table, rates=rates))
+        if "rotor.remanence_T" in offsets:
+            strong = float(np.linalg.norm(scene.rotor[0].polarization)) / self._strength
+            memory = replace(memory, share=replace(memory.share, series=strong * memory.share.series))
+        if any(key.startswith(("plate.center_mm", "plate.rotation_deg")) for key in offsets):
+            memory = replace(memory, plate=replace(memory.plate, body=scene.plate.body))
+        return memory
+
+    def _ends_of(self, name: str, key: str, base: Any, make: Callable[[Scene], Any]) -> tuple[Any, Any, float]:
+        """Tables that are made at `WIDE` steps to both sides of a number, and the way between."""
+        if (name, key) not in self._ends:
+            value = scene_numbers(self.scene)[1][key]
+            wide = WIDE / STEP * self.step(key, value)
+            try:
+                first, last = (make(changed(self.scene, {key: value + s * wide})) for s in (-1, 1))
+                self._ends[name, key] = first, last, 2 * wide
+            except SceneError:  # it has an end here
+                self._ends[name, key] = base, make(changed(self.scene, {key: value + wide})), wide
+        return self._ends[name, key]
+
+    @cached_property
+    def _ends(self) -> dict[tuple[str, str], tuple[Any, Any, float]]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A table between others: the numbers of `base` and a share of what two others differ by."""
+
+    base: Any
+    first: Any
+    last: Any
+    share: float
+
+    @property
+    def polarizability(self) -> float:
+        return float(self.base.polarizability)
+
+    def derivatives(self, places: Array, moments: Array) -> tuple[Array, ...]:
+        """See `MutualTable`."""
+        parts = (table.derivatives(places, moments) for table in (self.base, self.first, self.last))
+        return tuple(a + self.share * (c - b) for a, b, c in zip(*parts, strict=True))
+
+    def entries(self, places: Array) -> Array:
+        """See `RotorCurrents`."""
+        base, first, last = (RotorCurrents(table).entries(places) for table in (self.base, self.first, self.last))
+        return base + self.share * (last - first)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stronger:
+    """A mutual table of a rotor that is polarised more: u is quadratic in that, V linear, and H does not know it."""
+
+    base: Any
+    strong: float
+
+    @property
+    def polarizability(self) -> float:
+        return float(self.base.polarizability)
+
+    def derivatives(self, places: Array, moments: Array) -> tuple[Array, ...]:
+        """See `MutualTable`: the energy of M by J times s is s² that of M/s by J."""
+        energy, slope, second = self.base.derivatives(places, moments / self.strong)
+        units = np.repeat([1.0, 1 / self.strong], 3)
+        square = self.strong**2
+        return square * energy, square * slope * units, square * second * np.outer(units, units)
+
+
+@dataclass(frozen=True, eq=False)
+class _MovedLosses:
+    """Losses in a lone magnet that was moved, turned and magnified: patterns fall as the root of the size."""
+
+    table: RotorLosses
+    before: Magnet
+    after: Magnet
+    size: float
+
+    def fields(self, places: Array) -> tuple[Array, Array]:
+        """See `RotorLosses`."""
+        turn = self.after.body.rotation @ self.before.body.rotation.T
+        there = self.before.body.center + (places - self.after.body.center) @ turn / self.size
+        fields, slopes = self.table.fields(there)
+        return fields @ turn.T / self.size**0.5, turn @ slopes @ turn.T / self.size**1.5
+
+
+@documented
+def gradient(
+    scene: SceneLike,
+    of: Sequence[str] | None = None,
+    by: Sequence[str] | None = None,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    progress: bool | None = None,
+    **requested: Unpack[Requested],
+) -> xr.Dataset:
+    """Derivatives of all equilibria, and of their modes, by numbers of the scene file, without searching anew.
+
+    Parameters
+    ----------
+    of : sequence of str, optional
+        "distance", "lateral_offset", "polar_angle", "lag", "position", "growth", "mode_growth" and "mode_frequency";
+        left out, all.
+    by : sequence of str, optional
+        Dotted keys of numbers, as `rotor.edge_mm` or `plate.center_mm.2`; left out, all that the scene has.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `equilibrium` and `key`: SI units and degrees per unit of the key, which is the coordinate `unit`; NaN
+        where there is no derivative, as at a fold, with the reasons in the attribute `not_known`.
+
+    Raises
+    ------
+    EquilibriumError
+        There is no equilibrium.
+
+    Examples
+    --------
+    >>> import spinlev as sl
+    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
+    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
+    >>> found = sl.gradient(scene, ["distance"], ["rotor.edge_mm"], model="dipole").isel(equilibrium=0)
+    >>> round(1e3 * float(found.distance[0]), 3)  # mm by mm
+    1.573
+    """
+    levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
+    found = Gradient(levitation)
+    names, keys = checked_answers(of), found.checked_keys(by)
+    if not levitation.equilibria:
+        raise EquilibriumError(f"At {levitation.scene.frequency:g} Hz the floater has no equilibrium to differentiate.")
+    return found.dataset(levitation.equilibria, names, keys).assign_attrs(scene=scene_text(levitation.scene))
+
+
+def checked_answers(of: Sequence[str] | None) -> list[str]:
+    """The answers asked for, all where none are. Raises InputError for one that has no derivatives."""
+    if of is None:
+        return list(ANSWERS)
+    if isinstance(of, str) or not of or not all(isinstance(name, str) for name in of):
+        raise InputError(f"Input of must be a list of answers; instead received {shown(of)}.")
+    for name in of:
+        if name not in ANSWERS:
+            close = difflib.get_close_matches(name, ANSWERS, n=1)
+            hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(ANSWERS)}"
+            raise InputError(f"Input of: {shown(name)} has no derivatives ({hint})")
+    return list(of)
+
+
+def gradient_job(levitation: Levitation, out: Path) -> Answer:
+    """Derivatives of all equilibria for JSON, those of the first as a table too; writes gradient.nc to `out`."""
+    found = Gradient(levitation)
+    if not levitation.equilibria:
+        return {"gradient": []}, []
+    result = found.dataset(levitation.equilibria, list(ANSWERS), found.checked_keys(None))
+    write_dataset(result, out / "gradient.nc", levitation.scene)
+    rows = [
+        {
+            str(key): {
+                "unit": str(one["unit"].values),
+                **{
+                    f"{name}{IN_JSON[unit][0]}": float(one[name]) / IN_JSON[unit][1]
+                    for name, (unit, _, dims) in ANSWERS.items()
+                    if not dims
+                },
+                "modes": [
+                    {
+                        "name": str(m),
+                        "growth_per_s": float(one["mode_growth"].sel(mode=m)),
+                        "frequency_hz": float(one["mode_frequency"].sel(mode=m)),
+                    }
+                    for m in one["mode"].values
+                ],
+            }
+            for key in each["key"].values
+            for one in [each.sel(key=key)]
+        }
+        for each in (result.isel(equilibrium=k) for k in range(result.sizes["equilibrium"]))
+    ]
+    head = (
+        "derivative of the first by",
+        "unit",
+        "distance (mm)",
+        "polar angle (°)",
+        "growth rate (s⁻¹)",
+        "axial mode (Hz)",
+    )
+    first = result.isel(equilibrium=0)
+    cells: list[tuple[str, ...]] = [head]
+    for key in first["key"].values:
+        one = first.sel(key=key)
+        numbers = 1e3 * one["distance"], one["polar_angle"], one["growth"], one["mode_frequency"].sel(mode=MODES[0])
+        cells.append((str(key), str(one["unit"].values), *(f"{float(number):.5g}" for number in numbers)))
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = ["  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in cells]
+    not_known = str(result.attrs["not_known"])
+    return {"gradient": rows, "not_known": not_known}, [*lines, *([f"Derivatives: {not_known}."] if not_known else [])]

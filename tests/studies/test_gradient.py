@@ -1,0 +1,200 @@
+"""Derivatives of equilibria against central differences of whole equilibria, each searched for anew.
+
+The differences are of fourth order with steps of a few thousandths, so that both their own errors, of the step and of
+the search's round-off, are below 1e-7 of a derivative; 1e-6 is asked.
+"""
+
+import json
+import threading
+
+import numpy as np
+import pytest
+import xarray as xr
+from article import BALL
+from places import HORIZONTAL, OVER_PLATE
+
+import spinlev as sl
+from spinlev.dynamics.equilibria import derivatives
+from spinlev.geometry.scene.files import changed
+from spinlev.studies.cli.main import run
+from spinlev.studies.gradient import Gradient
+from spinlev.studies.levitation import Levitation
+
+CUBE = {"edge_mm": 10.0, "remanence_T": 1.305}
+METAL = {"conductivity_S_m": 6.7e5}
+
+
+def scene(frequency, rotor, floater=BALL, **more):
+    return sl.scene(frequency_hz=frequency, rotor=rotor, floater=floater, **more)
+
+
+CASES = {
+    "displaced": (scene(110.0, sl.horizontal(displacement_mm=2.0, **CUBE)), "dipole", "rigid"),
+    "tilted, finite": (scene(130.0, sl.tilt(angle_deg=10.0, **CUBE)), "cuboid", "rigid"),
+    "stacked": (scene(80.0, sl.vertical(displacement_mm=14.0, **CUBE)), "cuboid", "rigid"),
+    "real air and currents in the floater": (
+        scene(110.0, sl.horizontal(displacement_mm=2.0, **CUBE), BALL | METAL, drag={"model": "air"}),
+        *("dipole", "rigid"),
+    ),
+    "sphere as rotor": (
+        scene(110.0, sl.horizontal(displacement_mm=2.0, remanence_T=1.305, shape="sphere", diameter_mm=12.4)),
+        *("dipole", "rigid"),
+    ),
+    "two magnets": (
+        scene(
+            120.0,
+            sl.magnets(
+                {"size_mm": [10.0, 10.0, 10.0], "center_mm": [1.5, 0.0, 0.0], "polarization_T": [1.3, 0.0, 0.05]},
+                {"size_mm": [6.0, 8.0, 5.0], "center_mm": [0.0, 0.0, 12.0], "polarization_T": [0.0, 0.1, 0.6]},
+            ),
+        ),
+        *("cuboid", "rigid"),
+    ),
+    "by charges": (scene(80.0, sl.vertical(displacement_mm=14.0, **CUBE)), "surface", "rigid"),
+    "elements": (scene(130.0, sl.tilt(angle_deg=10.0, **CUBE)), "fem", "rigid"),
+    "mutual": (scene(130.0, sl.tilt(angle_deg=10.0, **CUBE)), "fem", "mutual"),
+    "currents in the rotor": (scene(130.0, sl.tilt(angle_deg=10.0, **CUBE, **METAL)), "dipole", "rigid"),
+    "cylinder as floater": (
+        scene(
+            110.0,
+            sl.horizontal(displacement_mm=2.0, **CUBE),
+            {"shape": "cylinder", "diameter_mm": 12.0, "height_mm": 9.0, "remanence_T": 1.305, "density_kg_m3": 7500.0},
+        ),
+        *("dipole", "rigid"),
+    ),
+}
+QUICK = ("displaced", "tilted, finite")
+SLOW = ("real air and currents in the floater", "stacked", "sphere as rotor", "two magnets", "by charges", "elements",
+        "mutual", "currents in the rotor", "cylinder as floater")  # fmt: skip
+# Numbers whose tables are made anew: there differences of whole equilibria are of tables that err by themselves
+BY_A_FIT = {
+    "by charges": ("rotor.displacement_mm", "rotor.edge_mm", "rotor.recoil_permeability"),
+    "elements": ("rotor.edge_mm", "rotor.recoil_permeability"),
+    "mutual": ("rotor.edge_mm", "rotor.recoil_permeability", "floater.diameter_mm", "floater.recoil_permeability"),
+}
+
+
+def answers(levitation, near):
+    """Distance, polar angle, and growth rates and frequencies of the modes."""
+    found = min(levitation.equilibria, key=lambda one: np.linalg.norm(one.position - near.position))
+    modes = [(mode.growth_per_s, mode.frequency_hz) for mode in found.modes]
+    return np.array([found.distance, found.polar_angle_deg, *np.array(modes).T.ravel()])
+
+
+def differenced(scene, models, key, value, near):
+    step = 3e-3 * max(abs(value), 1.0 if key.startswith("gravity") else 0.1)
+    ends = {k: answers(Levitation(changed(scene, {key: value + k * step}), models), near) for k in (1, -1, 2, -2)}
+    return (8 * (ends[1] - ends[-1]) - (ends[2] - ends[-2])) / (12 * step)
+
+
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+def test_derivatives_are_those_of_whole_equilibria(name):
+    scene, model, interaction = CASES[name]
+    levitation = Levitation(scene, sl.Models(model, "none", interaction=interaction))
+    gradient, known = Gradient(levitation), levitation.equilibria[0]
+    keys = [key for key in gradient.numbers if not key.startswith(("gravity_m_s2.0", "gravity_m_s2.1", "drag"))]
+    keys = [key for key in keys if key not in BY_A_FIT.get(name, ())][:: 1 if name in QUICK else 2]
+    found = gradient.dataset([known], ["distance", "polar_angle", "mode_growth", "mode_frequency"], keys)
+    for key in keys:
+        one = found.isel(equilibrium=0).sel(key=key)
+        got = np.array([one.distance, one.polar_angle, *one.mode_growth, *one.mode_frequency], float)
+        wanted = differenced(gradient.scene, levitation.models, key, gradient.numbers[key], known)
+        # growth rates that are round-off of undamped modes, and what symmetry forbids, have no digits
+        least = np.array([1e-11, 1e-8, *[1e-7] * 5, *[1e-6] * 5]) / max(abs(gradient.numbers[key]), 1e-3)
+        assert np.all(np.abs(got - wanted) < 1e-6 * np.abs(wanted) + least), (key, got, wanted)
+
+
+def test_a_spun_body_moves_as_its_spin_says():
+    """By the frequency at fixed S = Ω·m̂/ω, which is another thing than at fixed Ω."""
+    scene, _, _ = CASES["displaced"]
+    levitation = Levitation(scene, sl.Models("dipole", "none"), spin=-0.2)
+    known = levitation.equilibria[0]
+    found = Gradient(levitation).dataset([known], ["distance"], ["frequency_hz"])
+    ends = [
+        Levitation(changed(scene, {"frequency_hz": f}), sl.Models("dipole", "none"), -0.2).equilibria[0].distance
+        for f in (110.1, 109.9)
+    ]
+    assert float(found.distance[0, 0]) == pytest.approx((ends[0] - ends[1]) / 0.2, rel=1e-5)  # of second order
+
+
+def test_gradient_over_a_plate_moves_with_its_conductivity():
+    """Over a slab, whose table is made in a second: by what leaves rotor and plate where they are."""
+    scene = sl.load_scene(OVER_PLATE)
+    models = sl.Models("dipole", "slab", plate_rtol=5e-2)
+    levitation = Levitation(scene, models)
+    gradient, known = Gradient(levitation), levitation.equilibria[0]
+    keys = ["floater.density_kg_m3", "gravity_m_s2.2", "frequency_hz", "rotor.remanence_T", "rotor.edge_mm"]
+    found = gradient.dataset([known], ["distance", "polar_angle", "mode_growth", "mode_frequency"], keys).isel(
+        equilibrium=0
+    )
+    assert "against each other" in found.not_known
+    assert np.isnan(found.distance.sel(key="rotor.edge_mm"))
+    for key in keys[:2]:
+        one = found.sel(key=key)
+        got = np.array([one.distance, one.polar_angle, *one.mode_growth, *one.mode_frequency], float)
+        ends = {}
+        value = gradient.numbers[key]
+        for k in (1, -1):
+            there = Levitation(changed(gradient.scene, {key: value * (1 + 1e-3 * k)}), models)
+            there.plate = levitation.plate  # the same table, which another place would not ask for
+            ends[k] = answers(there, known)
+        wanted = (ends[1] - ends[-1]) / (2e-3 * value)
+        assert got == pytest.approx(wanted, rel=2e-5, abs=1e-9)  # of second order
+
+
+def test_gradient_is_labelled_and_lazy_users_get_all():
+    scene, _, _ = CASES["displaced"]
+    found = sl.gradient(scene, model="dipole", by=["rotor.edge_mm", "frequency_hz"])
+    assert isinstance(found, xr.Dataset)
+    assert found.distance.dims == ("equilibrium", "key")
+    assert found.mode_frequency.dims == ("equilibrium", "key", "mode")
+    assert found.unit.values.tolist() == ["mm", "Hz"]
+    assert found.distance.attrs["units"] == "m"
+    assert found.not_known == ""
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"by": ["rotor.edge"]}, "did you mean `rotor.edge_mm`"),
+        ({"by": ["rotor.configuration"]}, "is no number of this scene"),
+        ({"by": []}, "must be a list of keys"),
+        ({"by": "frequency_hz"}, "must be a list of keys"),
+        ({"by": ["frequency_hz", "frequency_hz"]}, "each key once"),
+        ({"of": ["distanse"]}, "did you mean `distance`"),
+        ({"of": "distance"}, "must be a list of answers"),
+        ({"model": "circle"}, "Input model must be one of"),
+    ],
+)
+def test_bad_requests_are_refused(asked, said):
+    scene, _, _ = CASES["displaced"]
+    with pytest.raises(sl.InputError, match=said):
+        sl.gradient(scene, **({"model": "dipole"} | asked))
+
+
+def test_where_nothing_levitates_or_the_rotor_rests_there_is_no_derivative():
+    scene, _, _ = CASES["displaced"]
+    with pytest.raises(sl.EquilibriumError, match="no equilibrium"):
+        sl.gradient(changed(scene, {"floater.remanence_T": 1e-3}), model="dipole")
+    with pytest.raises(sl.InputError, match="rotor is at rest"):
+        sl.gradient(changed(scene, {"frequency_hz": 0.0}), model="dipole")
+
+
+def test_at_a_fold_there_are_no_derivatives(monkeypatch):
+    """A fold cannot be met to round-off by a frequency in double precision; one that is near counts as met here."""
+    scene, _, _ = CASES["displaced"]
+    monkeypatch.setattr(derivatives, "SINGULAR", 1.0)
+    found = sl.gradient(scene, ["distance", "mode_growth"], ["frequency_hz"], model="dipole")
+    assert np.isnan(found.distance).all()
+    assert np.isnan(found.mode_growth).all()
+    assert "fold" in found.not_known
+
+
+def test_the_command_line_has_them(tmp_path):
+    command = ["equilibria", str(HORIZONTAL), "--model", "dipole", "--plate-model", "none", "--gradient"]
+    assert run([*command, "--out", str(tmp_path)], threading.Event()) == 0
+    said = json.loads((tmp_path / "equilibria.json").read_text())
+    first = said["gradient"][0]["rotor.displacement_mm"]
+    assert first["unit"] == "mm"
+    with xr.open_dataset(tmp_path / "gradient.nc") as kept:
+        assert 1e3 * float(kept.distance[0].sel(key="rotor.displacement_mm")) == pytest.approx(first["distance_mm"])
