@@ -40,6 +40,9 @@ print(found[["distance", "polar_angle", "growth", "stable"]].to_dataframe())
 # [gradient]
 slopes = sl.gradient(scene, of=["distance"], by=["rotor.edge_mm", "frequency_hz"], model="cuboid")
 print(1e3 * slopes.distance.isel(equilibrium=0).to_series())  # mm by mm, and by Hz
+# [uncertainty]
+bars = sl.uncertainty(scene, {"rotor.edge_mm": 0.05, "frequency_hz": 0.5}, model="cuboid").isel(equilibrium=0)
+print(f"{1e3 * bars.distance:.2f} ± {1e3 * bars.distance_error:.2f} mm", 1e3 * bars.distance_drawn.values)
 # [stability]
 modes = sl.stability(scene, model="cuboid")
 print(modes[["mode_frequency", "mode_growth"]].to_dataframe())

@@ -33,5 +33,6 @@ from .studies.interface import (
 )
 from .studies.levitation import Levitation as Levitation
 from .studies.magpylib import from_magpylib as from_magpylib, to_magpylib as to_magpylib
+from .studies.uncertainty import uncertainty as uncertainty
 
 __version__: str

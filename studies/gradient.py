@@ -95,14 +95,17 @@ class Gradient:
             raise InputError(f"Input {name} must name each key once; instead received {shown(list(by))}.")
         return list(by)
 
-    def tangents(self, known: Equilibrium, keys: Sequence[str]) -> dict[str, Tangent]:
-        """The way of one equilibrium by each key; none where it is not known, see `reasons`."""
+    def ways(self, known: Equilibrium, keys: Sequence[str]) -> tuple[dict[str, Tangent], Implicit | None, _Changed]:
+        """The way of one equilibrium by each key, with its equations and those of scenes nearby.
+
+        There is none by a key, or no equations, where it is not known: see `reasons`.
+        """
+        base = _Changed(self.levitation, self.scene, known.kind == AVERAGED, known.currents is not None)
         if known.kind == LOCKED:
             self.reasons[LOCKED] = (
                 "derivatives of frequency-locked equilibria of a body that is not round are not known"
             )
-            return {}
-        base = _Changed(self.levitation, self.scene, known.kind == AVERAGED, known.currents is not None)
+            return {}, None, base
         implicit = Implicit(known, base.setting)
         if implicit.at_fold:
             self.reasons["fold"] = AT_FOLD
@@ -111,12 +114,11 @@ class Gradient:
             if base.with_plate and (why := unknown_over_plate(key)):
                 self.reasons[why] = why
                 continue
-            nearby = [
-                Nearby(k * base.step(key, self.numbers[key]), weight, setting)
-                for k, weight, setting in self._around(base, key)
-            ]
-            found[key] = implicit.by(nearby)
-        return found
+            step = base.step(key, self.numbers[key])
+            found[key] = implicit.by(
+                [Nearby(k * step, weight, setting) for k, weight, setting in self._around(base, key)]
+            )
+        return found, implicit, base
 
     def _around(self, base: _Changed, key: str) -> list[tuple[int, float, Setting]]:
         """Steps, weights and equations about a number; on one side where it may not grow or shrink."""
@@ -136,7 +138,7 @@ class Gradient:
             name: np.full((len(equilibria), len(by), *(sizes[d] for d in ANSWERS[name][2])), np.nan) for name in of
         }
         for row, known in enumerate(equilibria):
-            tangents = self.tangents(known, by)
+            tangents, _, _ = self.ways(known, by)
             for k, key in enumerate(by):
                 for name in of if key in tangents else ():
                     columns[name][row, k] = derivative(known, tangents[key], name)
@@ -170,6 +172,16 @@ def unknown_over_plate(key: str) -> str:
     return ""
 
 
+def answer_of(known: Equilibrium, name: str) -> ArrayLike:
+    """An answer of `ANSWERS`, SI units and degrees."""
+    if name in ("mode_growth", "mode_frequency"):
+        modes = {mode.name: (mode.growth_per_s, mode.frequency_hz) for mode in known.modes}
+        return np.array([modes.get(mode, (np.nan, np.nan))[name == "mode_frequency"] for mode in MODES])
+    if name == "growth":
+        return known.growth_per_s
+    return getattr(known, name + ("_deg" if ANSWERS[name][0] == "deg" else ""))  # type: ignore[no-any-return]
+
+
 def derivative(known: Equilibrium, tangent: Tangent, name: str) -> ArrayLike:
     """Derivative of an answer of `ANSWERS` along the way of an equilibrium."""
     if name in ("mode_growth", "mode_frequency"):
@@ -177,8 +189,7 @@ def derivative(known: Equilibrium, tangent: Tangent, name: str) -> ArrayLike:
         return np.real(rates) if name == "mode_growth" else np.imag(rates) / (2 * np.pi)
     if name == "growth":
         return tangent.modes[max(known.modes, key=lambda mode: mode.growth_per_s).name].real
-    attribute = name + ("_deg" if ANSWERS[name][0] == "deg" else "")
-    return tangent.of(lambda equilibrium: getattr(equilibrium, attribute))
+    return tangent.of(lambda equilibrium: answer_of(equilibrium, name))
 
 
 @dataclass(frozen=True, eq=False)

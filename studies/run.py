@@ -43,6 +43,7 @@ from .gradient import gradient_job
 from .levitation import Levitation
 from .plan import check_drive, sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
+from .uncertainty import uncertainty_job
 from .words import flight_words, headline, left_out_words, note_details
 
 MODELS = ("dipole", "cuboid", "fem")
@@ -197,7 +198,10 @@ def equilibria_job(scene: Scene, requested: Models, spin: float, out: Path, grad
     """
     levitation = Levitation(scene, requested, spin)
     result = Result(levitation, levitation.survey)
-    more, lines = gradient_job(levitation, out) if gradient else ({}, [])
+    more, lines = uncertainty_job(levitation, out)
+    if gradient:
+        slopes, said = gradient_job(levitation, out)
+        more, lines = {**more, **slopes}, [*lines, *said]
     values = {**result.summary, **more, "tables_from_cache": levitation.from_cache}
     write_whole(out / "equilibria.json", f"{to_json(values)}\n".encode())
     return values, [*result.text(), *lines]
@@ -304,8 +308,8 @@ def main_job(
         "tables_from_cache": levitation.from_cache,
     }
     lines = result.text()
-    if gradient and survey.equilibria:
-        more, derivatives = gradient_job(levitation, out)
+    for job in (uncertainty_job, *([gradient_job] if gradient else [])):
+        more, derivatives = job(levitation, out) if survey.equilibria else ({}, [])
         values |= more
         lines += derivatives
     if any(magnet.coercivity is not None and magnet.polarization.any() for magnet in scene.rotor):

@@ -24,13 +24,14 @@ from ...geometry.common import Array
 from ..motion.plate import PlateForce
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
-from .equilibrium import Equilibrium
-from .orbits import SHAKING, OrbitProblem, Pencil, conserved
+from .equilibrium import Equilibrium, Mode
+from .orbits import CONVERGED, ROUNDED, SHAKING, OrbitProblem, Pencil, conserved
 
 SINGULAR = 1e-9  # Smallest singular value of F_x, by the largest, below which the equilibrium is at a fold to round-off
 SLOWEST = 1e-7  # λ of a mode, rad⁻¹, that is no eigenvalue but one of the kept |m̂| and body spin
 COLLIDED = 1e-7  # |uᴴ T_λ v| by ‖T_λ v‖ below which two eigenvalues have met, where they have no derivative
 STEP = 1e-5  # Of differences along the tangent of what is a plain function of the state, scaled
+NEWTON_STEPS, FARTHEST = 20, 0.5  # Most steps to an equilibrium nearby, and the longest, in floater radii and rad
 POLISHED = 3  # Steps of Newton's method that make a known λ one of the pencil
 
 
@@ -93,6 +94,22 @@ class Tangent:
         step = STEP / size
         ends = [np.asarray(quantity(self.unpack(self.start + s * step * self.change)), float) for s in (1, -1, 2, -2)]
         return np.asarray((8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * step))
+
+
+def _eigenvalue(pencil: Pencil, near: _ModeAt, value: complex) -> complex:
+    """An eigenvalue of a pencil, by inverse iteration from one nearby (A. Ruhe, SIAM J. Numer. Anal. 10 (1973) 674)."""
+    right = near.right
+    for _ in range(POLISHED if np.isfinite(value) else 0):
+        slope = (pencil.applied(right, value + STEP) - pencil.applied(right, value - STEP)) / (2 * STEP)
+        try:
+            after = np.linalg.solve(pencil.matrix(value), slope)
+        except np.linalg.LinAlgError:  # it is one to the last bit
+            break
+        change = complex(np.vdot(near.right, right) / np.vdot(near.right, after))
+        right, value = after / np.linalg.norm(after), value - change
+        if abs(change) < CONVERGED:
+            break
+    return value
 
 
 class Implicit:
@@ -166,6 +183,37 @@ class Implicit:
                     by[mode.name] -= there.weight * complex(found) / mode.speed
         rates = {mode.name: by[mode.name] / scales.time + mode.value * faster for mode in self.modes}
         return Tangent(self.start, change, rates, self._equilibrium)
+
+    def moved(self, setting: Setting, tangents: Sequence[tuple[float, Tangent]]) -> Equilibrium | None:
+        """The equilibrium that equations nearby have, by Newton's method from where tangents lead; None where none is.
+
+        Parameters
+        ----------
+        setting : the equations
+        tangents : steps of numbers with the way by each
+        """
+        spin, scales = self.known.spin, setting.scales
+        begun = self.start + sum((step * way.change for step, way in tangents), np.zeros_like(self.start))
+        states, size = scales.pack(self.setting.scales.unpack(begun)), np.inf
+        for _ in range(NEWTON_STEPS):
+            residual, pencil, rows, aims = setting.linear(scales.unpack(states), spin)
+            step = np.linalg.lstsq(np.vstack([pencil.matrix(0.0), rows]), -np.append(residual, aims))[0]
+            before, size = size, float(np.abs(step).max())
+            if not size < FARTHEST:
+                return None
+            states = states + step.reshape(states.shape)
+            if size < CONVERGED or before / 2 < size < ROUNDED:
+                break
+        else:
+            return None
+        modes, pencil = [], setting.linear(scales.unpack(states), spin)[1]
+        for mode in self.modes:
+            rate = mode.value / self.setting.scales.time + sum(step * way.modes[mode.name] for step, way in tangents)
+            value = _eigenvalue(pencil, mode, complex(rate) * scales.time)
+            modes.append(Mode(mode.name, value.real / scales.time, abs(value.imag) / (2 * np.pi * scales.time)))
+        growth = max((mode.growth_per_s for mode in modes), default=np.nan)
+        found = self._equilibrium(self.setting.scales.pack(scales.unpack(states)))
+        return replace(found, modes=tuple(modes), growth_per_s=growth)
 
     def _equilibrium(self, states: Array) -> Equilibrium:
         """The equilibrium of other states (n, 12), of which the motion alone is right."""

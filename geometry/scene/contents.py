@@ -186,6 +186,7 @@ class Scene:
     coils : that drive currents in the conductors
     keys : the tables of a scene file that it was made of, and the scene that they made: what of that was not replaced
         since is as they say. None of a scene that was put together from its parts
+    tolerances : by dotted key of the scene file, in its units: how far its number may be off, either way
     """
 
     frequency: float
@@ -204,6 +205,7 @@ class Scene:
     drive: tuple[DriveStep, ...] = ()
     coils: tuple[Coil, ...] = ()
     keys: tuple[Mapping[str, Any], Scene] | None = field(default=None, compare=False, repr=False)
+    tolerances: tuple[tuple[str, float], ...] = field(default=(), compare=False)
 
     @property
     def angular_velocity(self) -> float:

@@ -20,7 +20,7 @@ from ..shapes import rotation_angles
 from ..solids import Part, Solid
 from . import schema
 from .contents import Coil, Drag, OffsetStart, Scene
-from .making import assemble, content_digest
+from .making import WITH_TOLERANCE, assemble, content_digest
 from .messages import SceneError, unusual
 
 SAME = 1e-12  # Entry of a vector, in its largest, below which it is round-off
@@ -151,7 +151,7 @@ def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", k
         _replace(keys, key, value, source)
     found = assemble(keys, source, Path(), known)
     _check_same(scene, found.files, source)
-    return found
+    return replace(found, tolerances=scene.tolerances)
 
 
 def driven(scene: Scene, steps: Sequence[Mapping[str, Any]], source: str = "drive", **keys: Any) -> Scene:
@@ -288,7 +288,16 @@ def _plain(value: Any, depth: int = 0) -> Any:
 def scene_text(scene: Scene) -> str:
     """The scene file of a scene: the one that was read if nothing was replaced since, else one of its keys."""
     untouched = scene.text and all(_as_written(scene, name) for name in FIELDS)
-    return scene.text if untouched else _toml(scene_keys(scene))
+    return scene.text if untouched else _toml(_with_tolerances(scene_keys(scene), dict(scene.tolerances)))
+
+
+def _with_tolerances(keys: Any, tolerances: Mapping[str, float], place: str = "") -> Any:
+    """Keys with their numbers as `without_tolerances` reads them, where there is a tolerance."""
+    if isinstance(keys, Mapping | list):
+        pairs = keys.items() if isinstance(keys, Mapping) else enumerate(keys)
+        found = {k: _with_tolerances(value, tolerances, f"{place}.{k}".removeprefix(".")) for k, value in pairs}
+        return found if isinstance(keys, Mapping) else list(found.values())
+    return {"value": keys, "tolerance": tolerances[place]} if place in tolerances else keys
 
 
 def startless_text(scene: Scene) -> str:
@@ -320,7 +329,7 @@ def scene_numbers(scene: Scene) -> tuple[Scene, dict[str, float]]:
     for table in rotor.get("magnets", [rotor]) + floater.get("magnets", [floater]):
         table.setdefault("recoil_permeability", schema.RECOIL_PERMEABILITY)
     found = dict(_flattened(keys))
-    whole = assemble(keys, "scene", Path())
+    whole = replace(assemble(keys, "scene", Path()), tolerances=scene.tolerances)
     _check_same(scene, whole.files, "scene")
     return whole, {key: value for key, value in found.items() if not key.startswith(OF_MOTION)}
 
@@ -499,10 +508,16 @@ def _toml(keys: Mapping[str, Any], table: str = "") -> str:
     plain, tables = "", ""
     for key, value in keys.items():
         name = f"{table}.{key}".lstrip(".")
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value.keys() != WITH_TOLERANCE:
             tables += f"\n[{name}]\n{_toml(value, name)}"
-        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping) and value[0].keys() != WITH_TOLERANCE:
             tables += "".join(f"\n[[{name}]]\n{_toml(entry, name)}" for entry in value)
         else:
-            plain += f"{key} = {json.dumps(value)}\n"
+            plain += f"{key} = {_inline(value)}\n"
     return plain + tables
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key} = {_inline(entry)}' for key, entry in value.items())}}}"
+    return f"[{', '.join(map(_inline, value))}]" if isinstance(value, list) else json.dumps(value)

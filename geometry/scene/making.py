@@ -38,6 +38,9 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     ------
     SceneError : unknown, missing or wrong keys, bodies that overlap, or a file that is not known
     """
+    keys, tolerances, faults = without_tolerances(keys)
+    if faults:
+        raise SceneError(source, faults)
     try:
         table = SceneTable.model_validate(keys)
     except ValidationError as error:
@@ -71,8 +74,44 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         if k >= 0 and owner != "plate":
             of_owner = of_owner.get("magnets", []) + (of_owner.get("bodies", []) if owner == "floater" else [])
         (of_owner if k < 0 else of_owner[k])["file"] = str(path)
-    scene = replace(scene, files=tuple(files.items()), parts=tuple(parts.values()))
+    scene = replace(
+        scene, files=tuple(files.items()), parts=tuple(parts.values()), tolerances=tuple(tolerances.items())
+    )
     return replace(scene, keys=(own, scene))
+
+
+DEEPEST = 20  # tables and lists in each other in which numbers are looked for
+WITH_TOLERANCE = {"value", "tolerance"}  # the keys of a number that says how well it is known
+
+
+def without_tolerances(keys: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, float], list[str]]:
+    """Keys whose numbers may be written `{value = 10, tolerance = 0.05}`: the plain ones, tolerances by key, faults."""
+    tolerances, faults = dict[str, float](), list[str]()
+
+    def plain(value: Any, place: str, depth: int = 0) -> Any:
+        if depth > DEEPEST:  # the schema refuses it
+            return value
+        if isinstance(value, list):
+            return [plain(entry, f"{place}.{k}", depth + 1) for k, entry in enumerate(value)]
+        if not isinstance(value, Mapping):
+            return value
+        if not WITH_TOLERANCE & value.keys():
+            return {key: plain(entry, f"{place}.{key}".removeprefix("."), depth + 1) for key, entry in value.items()}
+        for key in value.keys() - WITH_TOLERANCE:
+            faults.append(f"unknown key `{place}.{key}` (allowed are value, tolerance)")
+        for key in () if len(value) > 1 else sorted(WITH_TOLERANCE - value.keys()):
+            faults.append(f"Input {place}.{key} must be given; instead it is missing.")
+        for key in sorted(WITH_TOLERANCE & value.keys()):
+            number, any_sign = value[key], key == "value"
+            fine = isinstance(number, int | float) and not isinstance(number, bool) and abs(number) < float("inf")
+            if not fine or not (any_sign or number > 0):
+                rule = "a number" if any_sign else "a positive number"
+                faults.append(f"Input {place}.{key} must be {rule}; instead received {shown(number)}.")
+            elif key == "tolerance":
+                tolerances[place] = float(number)
+        return value.get("value")
+
+    return plain(keys, ""), tolerances, faults
 
 
 def content_digest(path: Path) -> str:

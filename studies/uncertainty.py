@@ -1,0 +1,233 @@
+"""Error bars of equilibria from the tolerances of a scene's numbers, to first order, and a check by draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+import xarray as xr
+from scipy.stats import qmc
+
+from ..dynamics.equilibria.derivatives import Tangent
+from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
+from ..geometry.common import Array, InputError, shown
+from ..geometry.scene.files import changed, scene_text
+from ..geometry.scene.messages import SceneError
+from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
+from .gradient import ANSWERS, Gradient, answer_of, derivative
+from .levitation import Levitation
+from .plan import SceneLike
+from .result import AXIS, IN_JSON, MODES, variable, write_dataset
+
+DRAWS, SEED = 200, 20250701  # of the check, by default
+PERCENTILES = (5.0, 95.0)
+CHECKED = 0.2  # Relative difference of the two error bars from which on the first order is said not to do
+
+
+def error_bars(
+    levitation: Levitation,
+    tolerances: Mapping[str, float],
+    draws: int = DRAWS,
+    seed: int = SEED,
+    name: str = "tolerances",
+) -> xr.Dataset:
+    """The Dataset of `uncertainty` for a scene's `levitation`; `name` is what messages call the tolerances."""
+    gradient = Gradient(levitation)
+    if not isinstance(tolerances, Mapping) or not tolerances:
+        raise InputError(
+            f"Input {name} must be numbers by key of the scene file; instead received {shown(tolerances)}. A scene "
+            "file may have them: edge_mm = {value = 10, tolerance = 0.05}."
+        )
+    keys = gradient.checked_keys(list(tolerances), name)
+    for key, value in tolerances.items():
+        if not is_number(value) or not value > 0:
+            raise InputError(f"Input {name}: that of {key} must be a positive number; instead received {shown(value)}.")
+    if isinstance(draws, bool) or not isinstance(draws, int) or not 0 <= draws <= 100_000:
+        raise InputError(f"Input draws must be a number from 0 to 100000; instead received {shown(draws)}.")
+    known = levitation.equilibria
+    if not known:
+        raise EquilibriumError(f"At {levitation.scene.frequency:g} Hz the floater has no equilibrium.")
+    wide = np.array([float(tolerances[key]) for key in keys])
+    # a Latin hypercube: each number's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239)
+    drawn = (
+        wide * (2 * qmc.LatinHypercube(len(keys), seed=seed).random(draws) - 1) if draws else np.zeros((0, len(keys)))
+    )
+    rows = [_row(gradient, one, keys, wide, drawn) for one in known]
+    data: dict[str, Any] = {}
+    for k, (answer, (unit, label, dims)) in enumerate(ANSWERS.items()):
+        here, shares, sample = ([row[part][k] for row in rows] for part in range(3))
+        over = ("equilibrium", *dims)
+        first, many = np.array(shares), np.array(sample)
+        error = np.sqrt(np.sum(first**2, axis=1))
+        data[answer] = variable(over, np.array(here), unit, label)
+        data[f"{answer}_error"] = variable(over, error, unit, f"standard deviation of the {label}, to first order")
+        data[f"{answer}_share"] = variable(("equilibrium", "key", *dims), first, unit, f"part of it: {label}")
+        if draws:
+            some = [_statistics(one) for one in many]
+            data[f"{answer}_drawn_error"] = variable(
+                over, np.array([s[0] for s in some]), unit, f"the same of draws: {label}"
+            )
+            data[f"{answer}_drawn"] = variable(
+                ("equilibrium", "percentile", *dims), np.array([s[1] for s in some]), unit, label
+            )
+    if draws:
+        lost = [np.isnan(row[2][0]).mean() for row in rows]
+        data["lost"] = variable(("equilibrium",), lost, "1", "part of the draws that have no such equilibrium")
+    data["tolerance"] = variable(("key",), wide, "as the key", "how far the number may be off")
+    return xr.Dataset(
+        data,
+        {
+            "equilibrium": np.arange(len(known)),
+            "key": keys,
+            "mode": list(MODES),
+            "axis": list(AXIS),
+            "percentile": list(PERCENTILES),
+        },
+        {
+            "study": "uncertainty",
+            "draws": draws,
+            "seed": seed,
+            "not_known": "; ".join(gradient.reasons.values()),
+            **levitation.labels,
+        },
+    )
+
+
+def _statistics(sample: Array) -> tuple[Array, Array]:
+    """Standard deviations and percentiles of draws (draw, ...), of those that have an equilibrium."""
+    good = sample[np.isfinite(sample).reshape(len(sample), -1).any(axis=1)]
+    if len(good) < 2:
+        return np.full(sample.shape[1:], np.nan), np.full((len(PERCENTILES), *sample.shape[1:]), np.nan)
+    return np.std(good, axis=0, ddof=1), np.percentile(good, PERCENTILES, axis=0)
+
+
+def _row(
+    gradient: Gradient, known: Equilibrium, keys: Sequence[str], wide: Array, drawn: Array
+) -> tuple[list[Array], list[Array], list[Array]]:
+    """Of one equilibrium, for each answer: its value, what each tolerance makes of it (key, ...), draws (draw, ...)."""
+    tangents, implicit, changes = gradient.ways(known, keys)
+    values = [np.asarray(answer_of(known, name), float) for name in ANSWERS]
+    shares = [
+        np.array(
+            [_or_nan(known, tangents.get(key), name, value) * w / np.sqrt(3) for key, w in zip(keys, wide, strict=True)]
+        )
+        for name, value in zip(ANSWERS, values, strict=True)
+    ]
+    sample = [np.full((len(drawn), *value.shape), np.nan) for value in values]
+    if implicit is None or len(tangents) < len(keys):
+        return values, shares, sample
+    for k, draw in enumerate(drawn):
+        offsets = dict(zip(keys, draw.tolist(), strict=True))
+        try:
+            scene = changed(gradient.scene, {key: gradient.numbers[key] + offset for key, offset in offsets.items()})
+        except SceneError:  # as with overlapping bodies
+            continue
+        found = implicit.moved(changes.at(scene, offsets), [(offsets[key], tangents[key]) for key in keys])
+        if found is not None:
+            for row, name in zip(sample, ANSWERS, strict=True):
+                row[k] = answer_of(found, name)
+    return values, shares, sample
+
+
+def _or_nan(known: Equilibrium, tangent: Tangent | None, name: str, value: Array) -> Array:
+    return np.full(value.shape, np.nan) if tangent is None else np.asarray(derivative(known, tangent, name), float)
+
+
+@documented
+def uncertainty(
+    scene: SceneLike,
+    tolerances: Mapping[str, float] | None = None,
+    draws: int = DRAWS,
+    seed: int = SEED,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    progress: bool | None = None,
+    **requested: Unpack[Requested],
+) -> xr.Dataset:
+    """Error bars of all equilibria and their modes from the tolerances of the scene's numbers.
+
+    A number lies anywhere within its tolerance, either way, alike: its standard deviation is the tolerance over √3.
+    Draws are equilibria of the whole equations, which Newton's method finds from the tangent.
+
+    Parameters
+    ----------
+    tolerances : dict of str to float, optional
+        By dotted key, in its unit; left out, those of the scene file (`edge_mm = {value = 10, tolerance = 0.05}`).
+    draws : int
+        Of the numbers together, for a check of the first order; 0 for none.
+    seed : int
+        Of the draws.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `equilibrium`, `key` and `mode`: each answer of `gradient` with its standard deviation to first order
+        (``..._error``), each tolerance's part of it (``..._share``, signed), of draws (``..._drawn_error``) and their
+        percentiles (``..._drawn``); `lost` is the part of the draws that have no such equilibrium.
+
+    Raises
+    ------
+    EquilibriumError
+        There is no equilibrium.
+
+    Examples
+    --------
+    >>> import spinlev as sl
+    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
+    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
+    >>> found = sl.uncertainty(scene, {"rotor.edge_mm": 0.05}, model="dipole").isel(equilibrium=0)
+    >>> print(f"{1e3 * found.distance:.2f} ± {1e3 * found.distance_error:.2f} mm")
+    18.84 ± 0.05 mm
+    """
+    levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
+    given = dict(levitation.scene.tolerances) if tolerances is None else tolerances
+    return error_bars(levitation, given, draws, seed).assign_attrs(scene=scene_text(levitation.scene))
+
+
+def uncertainty_job(levitation: Levitation, out: Path) -> Answer:
+    """Error bars by a scene file's tolerances, if it has some, for JSON and in words; uncertainty.nc in `out`."""
+    tolerances = dict(levitation.scene.tolerances)
+    if not tolerances or not levitation.equilibria:
+        return {}, []
+    found = error_bars(levitation, tolerances)
+    write_dataset(found, out / "uncertainty.nc", levitation.scene)
+    rows = []
+    for number in range(found.sizes["equilibrium"]):
+        one, row = found.isel(equilibrium=number), dict[str, Any]()
+        for name, (unit, _, dims) in ANSWERS.items():
+            if not dims:
+                end, scale = IN_JSON[unit]
+                parts = {part: float(one[f"{name}{part}"]) / scale for part in ("_error", "_drawn_error")}
+                row[f"{name}{end}"] = {"error": parts["_error"], "drawn_error": parts["_drawn_error"]}
+                row[f"{name}{end}"]["share"] = {
+                    str(k): float(one[f"{name}_share"].sel(key=k)) / scale for k in one["key"].values
+                }
+        rows.append(row | {"lost": float(one["lost"])})
+    first = found.isel(equilibrium=0)
+    growth = ("growth", "growth rate", 1.0, " s⁻¹")
+    shown_as = (("distance", "distance", 1e3, " mm"), ("polar_angle", "polar angle", 1.0, "°"), growth)
+    said = [
+        f"{words} {scale * float(first[name]):.4g} ± {scale * float(first[f'{name}_error']):.2g}{unit}"
+        for name, words, scale, unit in shown_as
+    ]
+    largest = (
+        str(first["key"].values[int(np.nanargmax(np.abs(first["distance_share"].values)))])
+        if np.isfinite(first["distance_error"])
+        else ""
+    )
+    lines = [
+        f"Within the tolerances (standard deviations): {', '.join(said)}."
+        + (f" Most of it by {largest}." if largest else "")
+    ]
+    ratio = float(first["distance_drawn_error"] / first["distance_error"])
+    lost = float(first["lost"])
+    if lost or not abs(ratio - 1) < CHECKED:
+        lines.append(
+            f"Of {found.attrs['draws']} draws {lost:.0%} have no such equilibrium; the others' distances scatter "
+            f"{ratio:.2g} times as much as the first order says."
+        )
+    return {"uncertainty": rows, "draws": int(found.attrs["draws"])}, lines
