@@ -45,6 +45,7 @@ FORMATS = {
     "edges": 2,
     "rotor-losses": 2,
     "floating": 1,
+    "floating-free": 1,
     "equilibria": 4,
     "experiment": 2,
     "code": 1,

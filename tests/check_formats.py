@@ -30,6 +30,7 @@ SOLVERS = {
     "edges": "fem/plate/slab.py",
     "rotor-losses": "fem/rotor_metal.py",
     "floating": "fem/plate/floating.py",
+    "floating-free": "fem/plate/floating.py",
     "equilibria": "dynamics/equilibria/search.py",
     "experiment": "studies/catalogue/experiment_design.py",
 }

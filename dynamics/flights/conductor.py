@@ -1,4 +1,4 @@
-"""Motion of a conductor along the axis of coils, carried by its own eddy currents.
+"""Motion of a conductor over coils, along their axis or freely, carried by its own eddy currents.
 
 State: height z of its centre, speed v, flux p_i of each mode (`fem/plate/floating`), and what heat, air and the coils'
 supply take, whose sum with the energy stays:
@@ -8,25 +8,33 @@ supply take, whose sum with the energy stays:
 By the explicit method of order 8 of Dormand and Prince (SciPy).  Modes whose rate is `FAST` times the currents' and
 more would decide its steps; they follow at once, λ_i x_i = -d(Σ_s G_is I_s)/dt, which leaves their loss and the balance
 as they are and misses `FAST`⁻² of their share.
+
+One that is not on a common axis moves in six degrees: place, velocity, the unit quaternion of its axes, its spin along
+these, and the same fluxes, whose rate is that of the coils' field at the moving dipoles that stand for each mode.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from time import process_time
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ...fem.plate.floating import FloatingModes
+from ...fem.plate.floating import FloatingModes, FreeModes, Room
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AbsoluteStart, Coil, Scene
+from ..motion.state import matrices_of, quaternions_of, rotation_of
 
 FAST = 40.0  # Rate over the highest angular frequency of a current from which a mode follows at once
+LOWEST = 50.0  # Frequency (Hz) of which coils count at least: of steady ones the motion alone drives currents
 TOLERANCE = 1e-8  # Of the integration: heights are then right to 1e-13 m
 SMALL = 1e-3  # Height and its rate that absolute errors are relative to, in the height over the coils
 LEAST, FARTHEST = 0.5, 8.0  # Range of heights over the coils that is precomputed, in the one where a motion begins
 RASTER = 1e-4  # Ends of that range are multiples of this, m, so that motions that begin alike share it
+ASIDE = 4.0  # Of one that moves freely, how far aside of its start, in the height over the coils where it begins
 
 
 def sources_of(coils: Sequence[Coil]) -> list[list[int]]:
@@ -64,6 +72,15 @@ class Supply:
         tables = [coil.current[:, 0] for coil in self.coils if isinstance(coil.current, np.ndarray)]
         return np.unique(np.concatenate([np.zeros(1), *tables]))
 
+    @property
+    def first(self) -> Array:
+        """(sources,) A at the start."""
+        return np.array([f(0.0)[0] for f in self.functions(0.0)])
+
+    def kept(self, rates: Array) -> NDArray[np.bool_]:
+        """Which modes of `rates` (states,) 1/s are states; the others follow at once."""
+        return rates < FAST * 2 * np.pi * max(LOWEST, *(coil.frequency for coil in self.leaders))
+
     def functions(self, start: float) -> list[Callable[[float], tuple[float, float]]]:
         """Current (A) and its rate (A/s) of each source at a time (s) in the stretch that begins at one."""
 
@@ -86,21 +103,38 @@ class Supply:
 
 @dataclass(frozen=True, eq=False)
 class ConductorMotion:
-    """A trajectory along the axis."""
+    """A trajectory."""
 
     time: Array  # (n,) s
-    height: Array  # (n,) m, of the centre
-    speed: Array  # (n,) m/s
+    position: Array  # (n, 3) m, of the centre of mass
+    velocity: Array  # (n, 3) m/s
+    axes: Array  # (n, 3, 3), whose columns are the body's axes
+    spin: Array  # (n, 3) rad/s, along these
     heat: Array  # (n,) J, Joule loss since the start
     ended_by: str  # "duration", "contact" or "lost"
     energy_error: float  # largest violation of the energy balance, relative to what was turned over
     seconds: float  # of processor time
 
+    @property
+    def height(self) -> Array:
+        """(n,) m, of the centre."""
+        return self.position[:, 2]
+
+
+def on_axis(scene: Scene) -> bool:
+    """Whether a scene's floater keeps moving along the common axis of its coils."""
+    start = scene.start
+    assert isinstance(start, AbsoluteStart)
+    axes = np.array([*(coil.center[:2] for coil in scene.coils), start.position[:2]])
+    aside = [np.ptp(axes, axis=0), scene.gravity[:2], start.velocity[:2], start.spin]
+    still = all(float(np.abs(part).max()) <= 1e-9 for part in aside)
+    return still and start.moment[2] > 1 - 1e-12 and {0, 1} <= set(scene.floater.bodies[0].mirrors)
+
 
 def heights_over(scene: Scene) -> tuple[float, float]:
     """Range of heights (m) of the floater's centre in which its modes are known.
 
-    Raises InputError: a start that is not given, off the coils' axis or not above them, or a floater of no use here.
+    Raises InputError: a start that is not given or not above the coils, or a floater of no use here.
     """
     start, floater, coils = scene.start, scene.floater, scene.coils
     if not floater.conductivity or floater.remanence or len(floater.bodies) > 1:
@@ -112,15 +146,9 @@ def heights_over(scene: Scene) -> tuple[float, float]:
         raise InputError("Input scene must have no rotor and no plate beside coils; instead it has. Leave them out.")
     if not isinstance(start, AbsoluteStart):
         raise InputError("Input start.position_mm must be given beside coils; instead it is missing.")
-    axes = np.array([*(coil.center[:2] for coil in coils), start.position[:2]])
-    if np.ptp(axes, axis=0).max() > 1e-9 or np.abs(scene.gravity[:2]).max() > 0 or np.abs(start.velocity[:2]).max() > 0:
-        raise InputError(
-            "Input coils, start.position_mm, start.velocity_mm_s and gravity_m_s2 must have one vertical axis, along "
-            "which the floater moves; instead they have not."
-        )
-    if start.moment[2] < 1 - 1e-12 or not {0, 1} <= set(floater.bodies[0].mirrors):
-        raise InputError("Input start.moment must be [0, 0, 1], and the floater mirrored about it; instead it is not.")
-    top, half = max(coil.center[2] + coil.height / 2 for coil in coils), float(floater.bodies[0].half_edges[2])
+    top = max(coil.center[2] + coil.height / 2 for coil in coils)
+    down = -floater.axes(start.moment, start.body_x)[2]
+    half = float(floater.bodies[0].support(down[None])[0] + floater.bodies[0].center @ down)
     gap = start.position[2] - half - top
     if gap <= RASTER:
         raise InputError(
@@ -168,59 +196,162 @@ def conductor_motion(scene: Scene, modes: FloatingModes, duration: float, sample
     supply = Supply(scene.coils, sources_of(scene.coils))
     mass, gravity, brake, rates = floater.mass, -float(scene.gravity[2]), scene.drag.linear, modes.rates
     low, high = modes.heights
-    currents = np.array([f(0.0)[0] for f in supply.functions(0.0)])
-    fastest = 2 * np.pi * max(coil.frequency for coil in supply.leaders)
-    kept = rates < FAST * fastest if fastest else np.full(len(rates), True)
-    first = (modes.flux(start.position[2])[0] @ currents)[kept]
+    kept = supply.kept(rates)
+    first = (modes.flux(start.position[2])[0] @ supply.first)[kept]
     state = np.concatenate([[start.position[2], start.velocity[2]], first, [0.0] * 2])
     gap = start.position[2] - low
     energy = mass * abs(gravity) * gap
-    allowed = TOLERANCE * np.concatenate([
+    allowed = np.concatenate([
         [SMALL * gap, SMALL * np.sqrt(abs(gravity) * gap)], np.full(len(first), np.sqrt(energy)), [energy] * 2,
     ])  # fmt: skip
-    times, states, ended = [np.zeros(1)], [state[None]], "duration"
-    ends = [*(t for t in supply.knots if 0 < t < duration), duration]
-    for begin, end in zip([0.0, *ends[:-1]], ends, strict=True):
-        functions = supply.functions(begin)
 
-        def slope(time: float, u: Array, functions: list[Callable[[float], tuple[float, float]]] = functions) -> Array:
-            now, change = np.array([f(time) for f in functions]).T
-            flux, steeper, driven = modes.driven(min(max(u[0], low), high), now, change)
-            own = np.where(kept, 0.0, -(driven + steeper * u[1]) / rates)
-            own[kept] = u[2:-2] - flux[kept]
-            decay = rates * own
-            found = np.empty(len(u))
-            found[0], found[1] = u[1], (own @ steeper - brake * u[1]) / mass - gravity
-            found[2:-2] = -decay[kept]
-            found[-2] = decay @ own
-            found[-1] = found[-2] + brake * u[1] ** 2 + own @ driven
-            return found
+    def slope(u: Array, now: Array, change: Array) -> Array:
+        flux, steeper, driven = modes.driven(min(max(u[0], low), high), now, change)
+        own = np.where(kept, 0.0, -(driven + steeper * u[1]) / rates)
+        own[kept] = u[2:-2] - flux[kept]
+        decay = rates * own
+        found = np.empty(len(u))
+        found[0], found[1] = u[1], (own @ steeper - brake * u[1]) / mass - gravity
+        found[2:-2] = -decay[kept]
+        found[-2] = decay @ own
+        found[-1] = found[-2] + brake * u[1] ** 2 + own @ driven
+        return found
 
-        def contact(time: float, u: Array, *more: object) -> float:
-            return float(u[0] - low)
-
-        def lost(time: float, u: Array, *more: object) -> float:
-            return float(high - u[0])
-
-        contact.terminal = lost.terminal = True  # type: ignore[attr-defined]
-        every = np.union1d(np.arange(np.ceil(begin * samples), np.floor(end * samples) + 1) / samples, [end])
-        every = every[(every > begin) & (every <= end)]
-        done = solve_ivp(
-            slope, (begin, end), states[-1][-1], "DOP853", every, events=[contact, lost], rtol=TOLERANCE, atol=allowed
-        )
-        if len(done.t):
-            times.append(done.t)
-            states.append(done.y.T)
-        if done.status == 1:
-            ended, which = ("contact", 0) if len(done.t_events[0]) else ("lost", 1)
-            times.append(done.t_events[which])
-            states.append(done.y_events[which])
-            break
-    time, path = np.concatenate(times), np.concatenate(states)
+    inside: Ends = [("contact", lambda u: u[0] - low), ("lost", lambda u: high - u[0])]
+    time, path, ended = _integrated(supply, state, slope, inside, allowed, duration, samples)
     amperes = np.stack([coil.amperes(time) for coil in supply.leaders], axis=1)
     fluxes = np.array([modes.flux(z)[0][kept] for z in np.clip(path[:, 0], low, high)])
     own = path[:, 2:-2] - np.einsum("nms,ns->nm", fluxes, amperes)
     parts = [mass * path[:, 1] ** 2 / 2, mass * gravity * path[:, 0], np.sum(np.square(own), axis=1) / 2, path[:, -1]]
-    turned = max(energy, float(np.ptp(path[:, -2])))
-    error = float(np.ptp(np.sum(parts, axis=0))) / turned
-    return ConductorMotion(time, path[:, 0], path[:, 1], path[:, -2], ended, error, process_time() - begun)
+    error = float(np.ptp(np.sum(parts, axis=0))) / max(energy, float(np.ptp(path[:, -2])))
+    place, speed, still = np.tile(start.position, (len(time), 1)), np.zeros((len(time), 3)), np.zeros((len(time), 3))
+    place[:, 2], speed[:, 2] = path[:, :2].T
+    axes = np.tile(floater.axes(start.moment, start.body_x), (len(time), 1, 1))
+    return ConductorMotion(time, place, speed, axes, still, path[:, -2], ended, error, process_time() - begun)
+
+
+Ends = list[tuple[str, Callable[[Array], float]]]  # What ends a motion where a function of the state becomes negative
+
+
+def _integrated(
+    supply: Supply, state: Array, slope: Callable[[Array, Array, Array], Array], inside: Ends, allowed: Array,
+    duration: float, samples: int,
+) -> tuple[Array, Array, str]:  # fmt: skip
+    """Times (n,) s, states (n, m) and what ended it: of a slope by the state, the currents and their rates."""
+    times, states = [np.zeros(1)], [state[None]]
+    events = [lambda time, u, *more, f=f: float(f(u)) for _, f in inside]
+    for event in events:
+        event.terminal = True  # type: ignore[attr-defined]
+    ends = [*(t for t in supply.knots if 0 < t < duration), duration]
+    for begin, end in zip([0.0, *ends[:-1]], ends, strict=True):
+        functions = supply.functions(begin)
+
+        def at(time: float, u: Array, functions: list[Callable[[float], tuple[float, float]]] = functions) -> Array:
+            return slope(u, *np.array([f(time) for f in functions]).T)
+
+        every = np.union1d(np.arange(np.ceil(begin * samples), np.floor(end * samples) + 1) / samples, [end])
+        every = every[(every > begin) & (every <= end)]
+        step = partial(solve_ivp, at, method="DOP853", rtol=TOLERANCE, atol=TOLERANCE * allowed)
+        done = step((begin, end), states[-1][-1], t_eval=every, events=events)
+        if len(done.t):
+            times.append(done.t)
+            states.append(done.y.T)
+        if done.status == 1:
+            which = next(k for k, found in enumerate(done.t_events) if len(found))
+            over = float(done.t_events[which][0])
+            last = step((times[-1][-1], over), states[-1][-1])  # the state there, which was interpolated
+            return np.append(np.concatenate(times), over), np.vstack([*states, last.y[:, -1]]), inside[which][0]
+    return np.concatenate(times), np.concatenate(states), "duration"
+
+
+def room_over(scene: Scene) -> Room:
+    """Box (3,) m of the centre of a floater that moves freely, and the level (m) that it keeps above.
+
+    Raises InputError: as `heights_over`.
+    """
+    start, (low, high) = scene.start, heights_over(scene)
+    assert isinstance(start, AbsoluteStart)
+    top = max(coil.center[2] + coil.height / 2 for coil in scene.coils)
+    gap = (high - low) / (FARTHEST - LEAST)
+    aside = np.ceil(ASIDE * gap / RASTER) * RASTER
+    corner = np.floor(start.position[:2] / RASTER) * RASTER
+    box = np.array([*(corner - aside), low]), np.array([*(corner + aside), high])
+    return box, float(np.floor((top + LEAST * gap) / RASTER) * RASTER)
+
+
+def _turn(quaternion: Array) -> Array:
+    return np.array(rotation_of((quaternion / np.linalg.norm(quaternion)).tolist()))
+
+
+def free_motion(scene: Scene, modes: FreeModes, duration: float, samples: int = 1000) -> ConductorMotion:
+    """Simulate a conductor over the coils of a scene in six degrees of freedom, until contact, loss or the end.
+
+    Parameters
+    ----------
+    scene : with an absolute start
+    modes : of its floater over its coils, in the room of `room_over`
+    duration : s
+    samples : in a second; times at which a current has a corner are added
+    """
+    begun, floater, start = process_time(), scene.floater, scene.start
+    assert isinstance(start, AbsoluteStart)
+    supply, (box, floor) = Supply(scene.coils, sources_of(scene.coils)), room_over(scene)
+    body, mass, inertia, rates = floater.bodies[0], floater.mass, floater.principal_inertia, modes.rates
+    places = body.center + modes.places @ body.rotation.T  # along the floater's axes
+    moments = (modes.moments @ body.rotation.T).reshape(len(rates), -1)
+    kept, count = supply.kept(rates), modes.sources
+
+    def fluxes(u: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Rotation, arms (k, 3), B and its gradient at the dipoles for 1 A, and G (states, sources)."""
+        turn = _turn(u[6:10])
+        arms = places @ turn.T
+        b, slope = modes.fields(u[:3] + arms)
+        return turn, arms, b, slope, moments @ (b @ turn).reshape(count, -1).T
+
+    def slope(u: Array, now: Array, change: Array) -> Array:
+        turn, arms, b, slopes, flux = fluxes(u)
+        velocity, (w, x, y, z), spin = u[3:6], u[6:10], u[10:13]
+        field, slope = np.tensordot(now, b, 1), np.tensordot(now, slopes, 1)
+        moving = np.einsum("kij,kj->ki", slope, velocity + np.cross(turn @ spin, arms)) @ turn
+        driven, motional = flux @ change, moments @ (moving - np.cross(spin, field @ turn)).ravel()
+        own = np.where(kept, 0.0, -(driven + motional) / rates)
+        own[kept] = u[13:-2] - (flux @ now)[kept]
+        decay, dipoles = rates * own, (own @ moments).reshape(-1, 3) @ turn.T
+        each = np.einsum("ki,kij->kj", dipoles, slope)
+        torque = (np.cross(dipoles, field) + np.cross(arms, each)).sum(axis=0) @ turn - scene.drag.angular * spin
+        found = np.empty(len(u))
+        found[:3], found[3:6] = velocity, (each.sum(axis=0) - scene.drag.linear * velocity) / mass + scene.gravity
+        found[6], found[7:10] = -0.5 * np.dot([x, y, z], spin), 0.5 * (w * spin + np.cross([x, y, z], spin))
+        found[10:13] = (torque - np.cross(spin, inertia * spin)) / inertia
+        found[13:-2] = -decay[kept]
+        found[-2] = decay @ own
+        air = scene.drag.linear * velocity @ velocity + scene.drag.angular * spin @ spin
+        found[-1] = found[-2] + air + own @ driven
+        return found
+
+    def above(u: Array) -> float:
+        down = -_turn(u[6:10])[2]
+        return float(u[2] - body.center @ down - body.support(down[None])[0] - floor)
+
+    def within(u: Array) -> float:
+        return float(min(*(u[:2] - box[0][:2]), *(box[1] - u[:3])))
+
+    axes = floater.axes(start.moment, start.body_x)
+    turning = np.array(quaternions_of(axes))
+    state = np.concatenate([start.position, start.velocity, turning, axes.T @ start.spin, np.zeros(kept.sum() + 2)])
+    state[13:-2] = (fluxes(state)[-1] @ supply.first)[kept]
+    gap, pull = (box[1][2] - box[0][2]) / (FARTHEST - LEAST), float(np.linalg.norm(scene.gravity)) or 9.81
+    energy = mass * pull * gap
+    sizes = [SMALL * gap] * 3, [SMALL * np.sqrt(pull * gap)] * 3, [SMALL] * 4, [SMALL * np.sqrt(pull / gap)] * 3
+    allowed = np.concatenate([*sizes, np.full(kept.sum(), np.sqrt(energy)), [energy] * 2])
+    time, path, ended = _integrated(
+        supply, state, slope, [("contact", above), ("lost", within)], allowed, duration, samples
+    )
+    amperes = np.stack([coil.amperes(time) for coil in supply.leaders], axis=1)
+    own = path[:, 13:-2] - [(fluxes(u)[-1] @ now)[kept] for u, now in zip(path, amperes, strict=True)]
+    parts = [mass * np.sum(path[:, 3:6] ** 2, axis=1) / 2, -mass * path[:, :3] @ scene.gravity,
+             path[:, 10:13] ** 2 @ inertia / 2, np.sum(np.square(own), axis=1) / 2, path[:, -1]]  # fmt: skip
+    error = float(np.ptp(np.sum(parts, axis=0))) / max(energy, float(np.ptp(path[:, -2])))
+    turned = matrices_of(path[:, 6:10] / np.linalg.norm(path[:, 6:10], axis=1)[:, None])
+    place, velocity, spin, heat = path[:, :3], path[:, 3:6], path[:, 10:13], path[:, -2]
+    return ConductorMotion(time, place, velocity, turned, spin, heat, ended, error, process_time() - begun)

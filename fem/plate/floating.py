@@ -1,4 +1,4 @@
-"""Currents of a conductor that moves along the axis of coils, as states in its own frame.
+"""Currents of a conductor that moves over coils, along their axis or freely, as states in its own frame.
 
 With the network of `network`, p_i is the flux that a perfect conductor would keep, and G_is(z) that of mode i for a
 current of 1 A in source s:
@@ -8,15 +8,23 @@ current of 1 A in source s:
 so that motional and transformer EMF are one term, and the force is the exact gradient of the same G: with it the energy
 ½ Σ x² changes by -Σ λ x² - Σ x G dI/dt - F dz/dt. G is the couplings of the mode with the coils' vector potential, as
 Chebyshev series in z.
+
+Of one that moves freely G depends on its place x and its rotation R. There a mode's currents are, for any field from
+outside, a few dipoles m_ik at places ξ_k in the conductor:
+
+    G_is = Σ_k m_ik · Rᵀ B_s(x + R ξ_k),    force Σ_k (∇B)·M_k,  torque Σ_k M_k × B + R ξ_k × force,  M = R Σ_i x_i m_i,
+
+again the exact derivatives of one G, so that the energy balance closes whatever the fit misses.
 """
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 import scipy
+from scipy.spatial.transform import Rotation
 
 from ...geometry.common import Array
 from ...geometry.meshes.plate import MeshRule, plate_mesh
@@ -24,22 +32,31 @@ from ...geometry.scene.contents import Coil
 from ...geometry.solids import Solid
 from ..cache import TableKind
 from ..closed_forms.coil import CoilField
-from .currents import OtherSources, train
-from .eddy import EddySpace, Source
+from .currents import OtherSources, space_couplings, train
+from .eddy import EddySpace, Source, solve_eddy
 
 RADII, HEIGHTS = 96, 48  # Chebyshev points of the coils' potential, in the square of the radius and in height
 TRAINED, DEGREE = 9, 24  # Heights at which currents are trained, and of the series of G
 MOST = 1e3  # A state whose rate is so many times the highest angular frequency would be one of round-off
 SHARE = 0.1  # Part of the tolerance for missing states
+# Of a free conductor: poses at which currents are trained, and at which dipoles are fitted; dipoles; terms of the
+# potential left out of the motion, and combinations of dipoles that are, as shares of the largest.
+POSES, FITTED, DIPOLES, SHORTENED, REGULAR = 40, 240, 96, 1e-7, 1e-9
+PROBED, CHECKED = 12, 4  # Poses for errors of these, and of the finite elements
+
+
+Range = tuple[float, float]  # Lowest and highest height of a conductor's centre on the axis, m
+Room = tuple[tuple[Array, Array], float]  # Lowest and highest (3,) m of the centre, and a level it keeps above, m
 
 
 @dataclass(frozen=True, eq=False)
 class AxialPotential:
-    """A_φ = ρ Σ c_kl T_k(ρ²) T_l(z) of coaxial coils in a cylinder about their axis, which no winding touches."""
+    """A_φ = ρ a, a = Σ c_kl T_k(ρ²) T_l(z), of coaxial coils in a cylinder about their axis clear of windings."""
 
-    coefficients: Array  # (RADII, HEIGHTS) T
-    radius: float  # m
-    heights: tuple[float, float]  # m
+    coefficients: Array = field(metadata={"units": "T"})  # (k, l)
+    radius: float = field(metadata={"units": "m"})
+    heights: tuple[float, float] = field(metadata={"units": "m"})
+    axis: tuple[float, float] = field(default=(0.0, 0.0), metadata={"units": "m"})  # where it is, of the given frame
 
     @classmethod
     def of(cls, field: CoilField, radius: float, heights: tuple[float, float]) -> "AxialPotential":
@@ -60,22 +77,66 @@ class AxialPotential:
 
     def at(self, height: float) -> Source:
         """The coils as a source in a frame whose origin is at a height (m) on their axis."""
-        return _Seen(self, height)
+        return _Seen([self], np.array([0.0, 0.0, height]), np.eye(3))
+
+    def shortened(self, share: float) -> "AxialPotential":
+        """The potential without the highest terms, as long as all of them are below a share of the largest."""
+        sizes = np.abs(self.coefficients)
+        ends = [np.flatnonzero(sizes.max(axis=axis) > share * sizes.max())[-1] + 1 for axis in (1, 0)]
+        return replace(self, coefficients=self.coefficients[: ends[0], : ends[1]])
+
+    def _scaled(self, points: Array) -> tuple[Array, Array, Array, Array]:
+        """x and y (n,) m from the axis, and ρ² and z (n,) as the polynomials have them."""
+        low, high = self.heights
+        x, y = points[:, 0] - self.axis[0], points[:, 1] - self.axis[1]
+        return x, y, 2 * (x**2 + y**2) / self.radius**2 - 1, (2 * points[:, 2] - low - high) / (high - low)
+
+    def vector_potential(self, points: Array) -> Array:
+        """A (n, 3), T m, at points (n, 3), m."""
+        x, y, square, place = self._scaled(points)
+        rows, columns = self.coefficients.shape
+        across = np.polynomial.chebyshev.chebvander(square, rows - 1) @ self.coefficients
+        along = np.einsum("nl,nl->n", across, np.polynomial.chebyshev.chebvander(place, columns - 1))
+        return np.stack([-y * along, x * along, 0 * along], axis=1)
+
+    @cached_property
+    def _derivatives(self) -> Array:
+        """(k, 6 l) series of a and of ∂a/∂s, ∂a/∂z, ∂²a/∂s², ∂²a/∂s∂z and ∂²a/∂z², where s = ρ²."""
+        low, high = self.heights
+        found, shape = [], self.coefficients.shape
+        for s, z in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)):
+            part = np.polynomial.chebyshev.chebder(self.coefficients, s) * (2 / self.radius**2) ** s
+            part = np.polynomial.chebyshev.chebder(part, z, axis=1) * (2 / (high - low)) ** z
+            found.append(np.pad(part, [(0, whole - size) for whole, size in zip(shape, part.shape, strict=True)]))
+        return np.concatenate(found, axis=1)
+
+    def field(self, points: Array) -> tuple[Array, Array]:
+        """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m: B = (-x a_z, -y a_z, 2a + 2s a_s)."""
+        x, y, square, place = self._scaled(points)
+        rows, columns = self.coefficients.shape
+        across, along = (np.cos(np.arccos(np.clip(t, -1, 1))[:, None] * np.arange(n))  # T_k = cos kθ
+                         for t, n in ((square, rows), (place, columns)))  # fmt: skip
+        a, s, z, ss, sz, zz = np.einsum("ndl,nl->dn", (across @ self._derivatives).reshape(len(x), 6, -1), along)
+        rho = x**2 + y**2
+        b = np.stack([-x * z, -y * z, 2 * (a + rho * s)], axis=1)
+        up, out = 4 * (2 * s + rho * ss), 2 * (z + rho * sz)
+        slope = [[-z - 2 * x * x * sz, -2 * x * y * sz, -x * zz],
+                 [-2 * x * y * sz, -z - 2 * y * y * sz, -y * zz], [x * up, y * up, out]]  # fmt: skip
+        return b, np.moveaxis(np.array(slope), -1, 0)
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    potential: AxialPotential
-    height: float
+    """Coils as a source in a frame with a place (3,) m and a rotation (3, 3)."""
+
+    parts: Sequence[AxialPotential]
+    place: Array
+    rotation: Array
 
     def vector_potential(self, points: Array) -> Array:
         """A (n, 3), T m, at points (n, 3), m."""
-        table, (low, high) = self.potential, self.potential.heights
-        place = (2 * (points[:, 2] + self.height) - low - high) / (high - low)
-        square = 2 * (points[:, 0] ** 2 + points[:, 1] ** 2) / table.radius**2 - 1
-        across = np.polynomial.chebyshev.chebvander(square, RADII - 1) @ table.coefficients
-        along = np.einsum("nl,nl->n", across, np.polynomial.chebyshev.chebvander(place, HEIGHTS - 1))
-        return np.stack([-points[:, 1] * along, points[:, 0] * along, 0 * along], axis=1)
+        places = self.place + points @ self.rotation.T
+        return np.asarray(np.sum([part.vector_potential(places) for part in self.parts], axis=0) @ self.rotation)
 
 
 def _nodes(count: int) -> Array:
@@ -147,6 +208,14 @@ class FloatingModes:
         return total
 
 
+def _windings(coils: Sequence[Coil], end: float) -> Array:
+    """(n, 3) m: edges of the windings at the level of the highest, from an angle of 0 to one (rad)."""
+    top = max(coil.center[2] + coil.height / 2 for coil in coils)
+    edges = [(coil.center, coil.radius + side * coil.width / 2) for coil in coils for side in (-1, 1)]
+    angles = np.linspace(0.0, end, 13)
+    return np.array([[c[0] + r * np.cos(a), c[1] + r * np.sin(a), top] for c, r in edges for a in angles])
+
+
 def floating_modes(
     body: Solid,
     conductivity: float,
@@ -175,10 +244,7 @@ def floating_modes(
     reach = (low - half, high + half)
     outer = float(body.half_edges[:2].max())
     sources = [AxialPotential.of(CoilField(coils, share), outer, reach) for share in shares]
-    top = max(coil.center[2] + coil.height / 2 for coil in coils) - low
-    radii = np.array([coil.radius + side * coil.width / 2 for coil in coils for side in (-1, 1)])
-    angles = np.linspace(0.0, np.pi / 2, 13)
-    windings = np.array([[r * np.cos(a), r * np.sin(a), top] for r in radii for a in angles])
+    windings = _windings(coils, np.pi / 2) - [0.0, 0.0, low]
     mesh = plate_mesh(body, conductivity, windings, frequency, rule or MeshRule())
     nodes = (low + high) / 2 + (high - low) / 2 * np.cos(np.pi * np.arange(TRAINED) / (TRAINED - 1))
     trained = [source.at(z) for z in nodes for source in sources]
@@ -205,7 +271,158 @@ def floating_modes(
     return FloatingModes(modes.rates, modes.series, heights, change + modes.error, time.perf_counter() - start)
 
 
+@dataclass(frozen=True, eq=False)
+class FreeModes:
+    """Modes of a conductor over coils, in any pose, and the field of the coils where it can be.
+
+    Parameters
+    ----------
+    rates : (states,) λ_i, 1/s
+    places : (k, 3) of the dipoles in the conductor, along its axes from its centre, m
+    moments : (states, k, 3) m_ik of a unit of x_i, A m²/√J
+    potentials, owners : those of the coils about each axis, and the number of the source of each
+    error : estimated relative error of couplings
+    seconds : time spent
+    """
+
+    rates: Array = field(metadata={"units": "1/s"})
+    places: Array = field(metadata={"units": "m"})
+    moments: Array = field(metadata={"units": "A m2 J^-1/2"})
+    potentials: tuple[AxialPotential, ...]
+    owners: tuple[int, ...]
+    error: float
+    seconds: float = field(metadata={"units": "s"})
+
+    @property
+    def sources(self) -> int:
+        return max(self.owners) + 1
+
+    def fields(self, points: Array) -> tuple[Array, Array]:
+        """B (sources, n, 3) T and its gradient (sources, n, 3, 3) T/m for 1 A of each source at points (n, 3) m."""
+        b, slope = np.zeros((self.sources, len(points), 3)), np.zeros((self.sources, len(points), 3, 3))
+        for number, part in zip(self.owners, self.potentials, strict=True):
+            field, steepness = part.field(points)
+            b[number] += field
+            slope[number] += steepness
+        return b, slope
+
+    def flux(self, place: Array, rotation: Array) -> Array:
+        """G (states, sources), √J/A, of the conductor with its centre at a place (3,) m and a rotation (3, 3)."""
+        local = self.fields(place + self.places @ rotation.T)[0] @ rotation
+        return np.asarray(self.moments.reshape(len(self.rates), -1) @ local.reshape(self.sources, -1).T)
+
+    def mean_force(self, place: Array, rotation: Array, amplitudes: Array, frequency: float) -> Array:
+        """Force (3,) N at rest in the mean of a period, of currents e^{iωt} of one frequency (Hz).
+
+        Parameters
+        ----------
+        place, rotation : of the conductor
+        amplitudes : (sources,) complex, A
+        frequency : Hz
+        """
+        _, slopes = self.fields(place + self.places @ rotation.T)
+        rate = 2j * np.pi * frequency
+        own = -rate / (self.rates + rate) * (self.flux(place, rotation) @ amplitudes)
+        dipoles = np.tensordot(own, self.moments, 1) @ rotation.T
+        slope = np.tensordot(amplitudes, slopes, 1)
+        return np.asarray(0.5 * np.einsum("ka,kab->b", dipoles.conj(), slope).real)
+
+
+def sampled_poses(body: Solid, room: Room, count: int, seed: int) -> list[tuple[Array, Array]]:
+    """Places (3,) m and rotations (3, 3) of a body in a room, at random."""
+    box, floor = room
+    draw, found = np.random.default_rng(seed), list[tuple[Array, Array]]()
+    while len(found) < count:
+        place, axis, angle = draw.uniform(*box), draw.normal(size=3), draw.uniform(0.0, np.pi)
+        while True:
+            turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+            turn = turn @ Rotation.from_euler("z", 7.0 * len(found)).as_matrix()
+            if place[2] - float(body.support(-turn[2:3])[0]) > floor or angle < 1e-3:
+                break
+            angle /= 2
+        found.append((place, turn))
+    return found
+
+
+def free_modes(
+    body: Solid,
+    conductivity: float,
+    coils: Sequence[Coil],
+    shares: Sequence[Sequence[float]],
+    room: Room,
+    frequency: float,
+    rtol: float = 1e-3,
+    order: int = 4,
+) -> FreeModes:
+    """Modes of a conductor in any pose over coils whose axes are along z.
+
+    Parameters
+    ----------
+    body, conductivity : the conductor, its centre at the origin, and S/m
+    coils, shares : as of `floating_modes`
+    room : lowest and highest (3,) m of its centre, and a height (m) above all windings under which no point of it comes
+    frequency, rtol, order : as of `floating_modes`
+    """
+    start, (box, floor) = time.perf_counter(), room
+    low, high = box
+    around = body.circumradius
+    potentials, owners = list[AxialPotential](), list[int]()
+    for number, share in enumerate(shares):
+        used = [k for k, part in enumerate(share) if part]
+        for axis in dict.fromkeys((float(coils[k].center[0]), float(coils[k].center[1])) for k in used):
+            here = [k for k in used if tuple(coils[k].center[:2]) == axis]
+            corners = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]) - axis
+            reach = float(np.linalg.norm(corners, axis=1).max()) + around
+            own = [replace(coils[k], center=coils[k].center * [0, 0, 1]) for k in here]
+            made = AxialPotential.of(CoilField(own, [share[k] for k in here]), reach, (floor, high[2] + around))
+            potentials.append(replace(made, axis=axis))
+            owners.append(number)
+
+    def seen(poses: list[tuple[Array, Array]]) -> list[_Seen]:
+        each = [
+            [part for part, owner in zip(potentials, owners, strict=True) if owner == k] for k in range(len(shares))
+        ]
+        return [_Seen(parts, *pose) for pose in poses for parts in each]
+
+    trained, probed, fitted = (
+        seen(sampled_poses(body, room, count, seed)) for seed, count in enumerate((POSES, PROBED, FITTED))
+    )
+    mesh = plate_mesh(body, conductivity, _windings(coils, 2 * np.pi) - [*(low + high)[:2] / 2, low[2]], frequency)
+    band, space = (0.1 * frequency, 4 * frequency), EddySpace(mesh, order)
+    nothing = np.zeros((0, 3))
+    states, missed, *_ = train(space, nothing, nothing, OtherSources(trained, probed), band, SHARE * rtol)
+    rates, weighted = [], []
+    tests = states.couplings([*fitted, *probed])
+    for induct, b in zip(states.inductances, tests, strict=True):
+        times, vectors = np.linalg.eigh(induct)
+        kept = times * 2 * np.pi * band[1] * MOST > 1
+        rates.append(1 / times[kept])
+        weighted.append(b @ vectors[:, kept] / np.sqrt(times[kept]))
+    wanted, every = np.concatenate(weighted, axis=1), np.concatenate(rates)
+    # dipoles as far from each other as can be among the quadrature points and their images
+    points = np.concatenate([space.points * flip for flip in space.parity.flips])
+    chosen, apart = [int(np.argmax(np.linalg.norm(points, axis=1)))], np.full(len(points), np.inf)
+    while len(chosen) < DIPOLES:
+        apart = np.minimum(apart, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(apart)))
+    places, end, rate = points[chosen], len(fitted), 2j * np.pi * frequency
+    fields = [sum(part.field(one.place + places @ one.rotation.T)[0] for part in one.parts) @ one.rotation
+              for one in [*fitted, *probed]]  # fmt: skip
+    rows, scale = np.array(fields).reshape(len(fields), -1), 1 / np.sqrt(1 + (every / abs(rate)) ** 2)
+    moments = np.linalg.lstsq(rows[:end], wanted[:end], rcond=REGULAR)[0]
+    left, whole = (np.linalg.norm(part[end:] * scale, axis=1) for part in (rows @ moments - wanted, wanted))
+    rough, fine = (np.diag(found) for found in (
+        solve_eddy(mesh, order - 1, frequency, probed[:CHECKED]).couplings,
+        space_couplings([b[end : end + CHECKED] for b in tests], states.inductances, rate),
+    ))  # fmt: skip
+    error = missed + float(np.max(left / whole) + np.max(np.abs(rough - fine) / np.abs(fine)))
+    parts = tuple(potential.shortened(SHORTENED) for potential in potentials)
+    moments = moments.T.reshape(len(every), -1, 3)
+    return FreeModes(every, places, moments, parts, tuple(owners), error, time.perf_counter() - start)
+
+
 FLOATING = TableKind("floating", FloatingModes, "Modes of a conductor on the axis of coils")
+FREE = TableKind("floating-free", FreeModes, "Modes of a conductor in any pose over coils")
 
 
 def cached_floating_modes(
@@ -213,27 +430,23 @@ def cached_floating_modes(
     conductivity: float,
     coils: Sequence[Coil],
     shares: Sequence[Sequence[float]],
-    heights: tuple[float, float],
+    region: Range | Room,
     frequency: float,
     rtol: float,
     report: Callable[[str], None],
-) -> tuple[FloatingModes, bool]:
-    """`floating_modes` from the cache if they are there, and whether they were.
+) -> tuple[FloatingModes | FreeModes, bool]:
+    """`floating_modes` or `free_modes`, by what the region is, from the cache if they are there, and whether they were.
 
     Parameters
     ----------
-    body, conductivity, coils, shares, heights, frequency, rtol : as of `floating_modes`
+    body, conductivity, coils, shares, region, frequency, rtol : as of these
     report : gets messages
     """
     windings = [(coil.center, coil.radius, coil.width, coil.height, coil.turns) for coil in coils]
-    inputs = (
-        body.shape_numbers,
-        conductivity,
-        windings,
-        [list(map(float, share)) for share in shares],
-        heights,
-        frequency,
-        rtol,
-    )
-    make = lambda: floating_modes(body, conductivity, coils, shares, heights, frequency, rtol)  # noqa: E731
-    return FLOATING.cached(inputs, make, report)
+    inputs = (body.shape_numbers, conductivity, windings, [list(map(float, share)) for share in shares], region,
+              frequency, rtol)  # fmt: skip
+    given = body, conductivity, coils, shares
+    if isinstance(region[0], float):
+        make = partial(floating_modes, *given, region, frequency, rtol)  # type: ignore[arg-type]
+        return FLOATING.cached(inputs, make, report)
+    return FREE.cached(inputs, partial(free_modes, *given, region, frequency, rtol), report)  # type: ignore[arg-type]

@@ -103,8 +103,10 @@ class Coil:
         """The current, A, at each `time`, s."""
         if isinstance(self.current, np.ndarray):
             return np.asarray(np.interp(np.asarray(time, float), *self.current.T))
-        wave = np.sin(2 * np.pi * self.frequency * np.asarray(time, float) + self.phase) if self.frequency else 1.0
-        return np.asarray(self.current * wave)
+        time = np.asarray(time, float)
+        if not self.frequency:
+            return np.full(time.shape, self.current)
+        return np.asarray(self.current * np.sin(2 * np.pi * self.frequency * time + self.phase))
 
 
 @dataclass(frozen=True)

@@ -160,6 +160,7 @@ def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     """Rows of problem 28, and the trajectory's data."""
     scene = parse_scene(TEAM28)
     modes, _ = modes_of(scene)
+    assert isinstance(modes, FloatingModes)
     half = float(scene.floater.bodies[0].half_edges[2])
     time, measured = measured_heights()
     rest, computed = float(measured[time > SETTLED].mean()), resting_height(scene, modes)

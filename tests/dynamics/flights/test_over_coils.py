@@ -1,4 +1,4 @@
-"""A conductor over coils: TEAM problem 28 against coaxial rings, its energy, a table of time, and what is refused."""
+"""Conductors over coils: TEAM problem 28 against coaxial rings, motion in six degrees, energy, and what is refused."""
 
 from dataclasses import replace
 
@@ -6,19 +6,29 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 from second_opinions.coaxial_rings import Rings
 
 from spinlev.dynamics.flights.conductor import (
     Supply,
     conductor_motion,
+    free_motion,
     heights_over,
     levitation_height,
+    room_over,
     sources_of,
 )
-from spinlev.fem.plate.floating import floating_modes
+from spinlev.fem.closed_forms.coil import CoilField
+from spinlev.fem.closed_forms.eddy_bodies import thin_field_torque
+from spinlev.fem.plate.eddy import solve_eddy
+from spinlev.fem.plate.floating import AxialPotential, _Seen, floating_modes, free_modes
 from spinlev.geometry.common import InputError
+from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.scene.contents import AbsoluteStart
 from spinlev.geometry.scene.files import parse_scene
+from spinlev.geometry.scene.making import assemble
+from spinlev.geometry.shapes import Box
 from spinlev.studies.catalogue.measured import TEAM28
 
 SetNumThreads(1)
@@ -89,10 +99,107 @@ def test_without_current_it_falls_onto_the_coils(modes):
     ("changes", "said"),
     [
         ({"floater": replace(SCENE.floater, conductivity=None)}, "conductivity_S_m"),
-        ({"start": AbsoluteStart(np.array([1e-3, 0, 5e-3]), np.zeros(3), np.eye(3)[2], np.zeros(3))}, "one vertical"),
+        ({"rotor": (Magnet(Box([0.01, 0.01, 0.01]), np.zeros(3)),)}, "no rotor and no plate"),
         ({"start": AbsoluteStart(np.array([0, 0, -5e-3]), np.zeros(3), np.eye(3)[2], np.zeros(3))}, "above all coils"),
     ],
 )
 def test_scenes_that_it_cannot_move_are_refused(changes, said):
     with pytest.raises(InputError, match=said):
         heights_over(replace(SCENE, **changes))
+
+
+PAIR = """
+[floater]
+shape = "cylinder"
+diameter_mm = 40.0
+height_mm = 3.0
+remanence_T = 0.0
+density_kg_m3 = 2700.0
+conductivity_S_m = 3.4e7
+[start]
+position_mm = [0.0, 0.0, 3.5]
+[[coils]]
+radius_mm = 12.0
+width_mm = 8.0
+height_mm = 16.0
+center_mm = [0.0, 0.0, -10.0]
+turns = 500.0
+current_A = 14.0
+frequency_hz = 100.0
+[[coils]]
+radius_mm = 28.0
+width_mm = 8.0
+height_mm = 16.0
+center_mm = [0.0, 0.0, -10.0]
+turns = 300.0
+current_A = -10.0
+frequency_hz = 100.0
+"""
+DISC = parse_scene(PAIR)
+
+
+@pytest.fixture(scope="module")
+def free():
+    shares = Supply(DISC.coils, sources_of(DISC.coils)).shares
+    return free_modes(DISC.floater.bodies[0], 3.4e7, DISC.coils, shares, room_over(DISC), 100.0, order=3)
+
+
+@pytest.mark.slow
+def test_free_motion_along_the_axis_is_that_along_the_axis(free):
+    """Both have finite elements of order 3 on other meshes: nearest to the coils 2e-3 of the force are between them."""
+    shares = Supply(DISC.coils, sources_of(DISC.coils)).shares
+    axial = floating_modes(DISC.floater.bodies[0], 3.4e7, DISC.coils, shares, heights_over(DISC), 100.0, order=3)
+    for height in (2.5e-3, 6e-3, 15e-3):
+        force = free.mean_force(np.array([0.0, 0.0, height]), np.eye(3), np.array([14.0]), 100.0)
+        assert np.hypot(*force[:2]) < 1e-3 * abs(force[2])
+        assert force[2] == pytest.approx(axial.mean_force(height, np.array([14.0]), np.array([100.0])), rel=3e-3)
+    ways = [move(DISC, modes, 0.04) for move, modes in ((conductor_motion, axial), (free_motion, free))]
+    fallen = [3.5e-3 - way.height for way in ways]
+    assert fallen[1] == pytest.approx(fallen[0], abs=4e-3 * fallen[0].max())
+    assert max(way.energy_error for way in ways) < 1e-8
+
+
+@pytest.mark.slow
+def test_free_force_is_the_slope_of_couplings_solved_for_directly(free):
+    """Aside, tilted and by finite elements alone: F = ½ Re ∂/∂x' ∫ J(x)·A(x') dV, by differences."""
+    body, tilt = DISC.floater.bodies[0], Rotation.from_rotvec([0.02, 0.05, 0.0]).as_matrix()
+    coils = [AxialPotential.of(CoilField(DISC.coils, [1.0, -10 / 14]), 0.04, (0.0, 0.04))]
+    place, step = np.array([1e-3, 5e-4, 5e-3]), 2e-4
+    mesh = plate_mesh(body, 3.4e7, [[0.0, 0.0, -5e-3]], 100.0, MeshRule(distance_share=0.8))
+    ends = [_Seen(coils, place + sign * step * axis, tilt) for axis in np.eye(3) for sign in (1, -1)]
+    found = solve_eddy(mesh, 3, 100.0, [_Seen(coils, place, tilt)]).couplings_to(ends)[:, 0].real
+    exact = 14.0**2 / 2 * (found[::2] - found[1::2]) / (2 * step)
+    force = free.mean_force(place, tilt, np.array([14.0]), 100.0)
+    assert force == pytest.approx(exact, abs=3e-3 * np.linalg.norm(exact))
+
+
+@pytest.mark.slow
+def test_free_motion_keeps_its_energy_aside_and_tilted(free):
+    """It slides off, as nothing holds it above two coils that are opposed."""
+    start = replace(DISC.start, position=np.array([1e-3, 5e-4, 3.5e-3]), moment=np.array([0.02, 0.0, 1.0]))
+    motion = free_motion(replace(DISC, start=start), free, 0.05)
+    assert motion.energy_error < 1e-8
+    assert np.hypot(*motion.position[-1, :2]) > np.hypot(*motion.position[0, :2])
+    assert np.abs(motion.spin[-1]).max() > 0.1
+
+
+def test_sphere_that_spins_over_a_steady_coil_slows_down_as_in_a_uniform_field():
+    """By (2π/15) σ R⁵ B × (Ω × B): to 1e-3 the field is uniform over it and the slowing slow."""
+    wide = {"radius_mm": 300.0, "width_mm": 10.0, "height_mm": 10.0, "center_mm": [0.0, 0.0, 0.0]}
+    coil = wide | {"turns": 1000.0, "current_A": 15.0}
+    ball = {"diameter_mm": 20.0, "remanence_T": 0.0, "density_kg_m3": 2700.0, "conductivity_S_m": 3.4e7}
+    drag, start = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}, {"position_mm": [1.0, 2.0, 20.0], "spin_hz": [2.0, 0, 1]}
+    scene = assemble(
+        {"floater": ball, "coils": [coil], "start": start, "drag": drag, "gravity_m_s2": [0.0] * 3}, "spun"
+    )
+    shares = Supply(scene.coils, sources_of(scene.coils)).shares
+    modes = free_modes(scene.floater.bodies[0], 3.4e7, scene.coils, shares, room_over(scene), 50.0, order=2)
+    motion = free_motion(scene, modes, 0.03)
+    field = CoilField(scene.coils).flux_density(motion.position[:1])[0, 2] * 15.0
+    rate = thin_field_torque(0.01, 3.4e7) * field**2 / scene.floater.inertia
+    spin = np.einsum("nab,nb->na", motion.axes, motion.spin)
+    settled = motion.time > 2e-3
+    slope = np.polyfit(motion.time[settled], np.log(spin[settled, 0]), 1)[0]
+    assert slope == pytest.approx(-rate, rel=5e-3)
+    assert spin[-1, 2] == pytest.approx(spin[0, 2], rel=1e-3)  # about the field it goes on
+    assert motion.energy_error < 1e-8
