@@ -18,11 +18,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from ..dynamics.continuation.branch import BranchPoint
+from ..dynamics.continuation.frequencies import BORDER, CONTACT, stable_ranges
 from ..dynamics.equilibria.derivatives import Implicit, Nearby, Setting, Tangent
-from ..dynamics.equilibria.equilibrium import AVERAGED, LOCKED, Equilibrium, EquilibriumError
+from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, LOCKED, Equilibrium, EquilibriumError
 from ..dynamics.motion.effect import Interaction, interaction_of
 from ..dynamics.motion.effects import mean_over_turns, with_effects
 from ..dynamics.motion.equations import parameters
+from ..dynamics.motion.events import rotor_gap
 from ..dynamics.motion.plate import PlateForce, PlateMemory
 from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..dynamics.motion.state import Scales
@@ -79,6 +82,7 @@ class Gradient:
             raise InputError("Input rotor.field_map must be left out for derivatives; instead the field is a map.")
         # why derivatives are not known, and what is left out of those that are
         self.reasons: dict[str, str] = {}
+        self._end: list[tuple[Equilibrium, _Changed, Implicit, list[Nearby]]] = []
 
     def checked_keys(self, by: Sequence[str] | None, name: str = "by") -> list[str]:
         """The keys asked for, all of the scene's where none are. Raises InputError for one that is no number of it."""
@@ -114,10 +118,7 @@ class Gradient:
             if base.with_plate and (why := unknown_over_plate(key)):
                 self.reasons[why] = why
                 continue
-            step = base.step(key, self.numbers[key])
-            found[key] = implicit.by(
-                [Nearby(k * step, weight, setting) for k, weight, setting in self._around(base, key)]
-            )
+            found[key] = implicit.by(self._nearby(base, key))
         return found, implicit, base
 
     def _around(self, base: _Changed, key: str) -> list[tuple[int, float, Setting]]:
@@ -131,9 +132,43 @@ class Gradient:
             return [(sign * k, sign * weight / step, base.at(scenes[k], {key: sign * k * step})) for k, weight in steps]
         raise InputError(f"Input {key} must have room to change for a derivative; instead it has none.")
 
+    def end_by(self, point: BranchPoint, key: str) -> float:
+        """Derivative of the frequency of a range's end, at which the scene is, by a number of the scene."""
+        if key == "frequency_hz":
+            return 0.0
+        if not self._end:
+            known = equilibrium_at(self.levitation, point)
+            base = _Changed(self.levitation, self.scene, False, False)
+            implicit = Implicit(known, base.setting)
+            self._end.append((known, base, implicit, self._nearby(base, "frequency_hz")))
+        known, base, implicit, by_frequency = self._end[0]
+        nearby = self._nearby(base, key)
+        if point.kind == FOLD:
+            return implicit.fold_by(implicit.missed(nearby), implicit.missed(by_frequency))
+
+        def excess(tangent: Tangent, some: Sequence[Nearby]) -> float:
+            if point.kind != CONTACT:
+                return float(np.real(derivative(known, tangent, "growth")))
+            moved = tangent.of(lambda e: rotor_gap(self.scene, e.position, e.state.orientation))
+            return float(moved) + self._gap_by(known, key if some is nearby else "frequency_hz")
+
+        ways = (implicit.by(nearby), nearby), (implicit.by(by_frequency), by_frequency)
+        return -excess(*ways[0]) / excess(*ways[1])
+
+    def _gap_by(self, known: Equilibrium, key: str) -> float:
+        """Derivative of the gap between floater and rotor by a number, the floater where it is."""
+        step = _Changed(self.levitation, self.scene, False, False).step(key, self.numbers[key])
+        gaps = [(weight, changed(self.scene, {key: self.numbers[key] + k * step})) for k, weight in CENTRAL]
+        return sum(w * rotor_gap(scene, known.position, known.state.orientation) for w, scene in gaps) / step
+
+    def _nearby(self, base: _Changed, key: str) -> list[Nearby]:
+        step = base.step(key, self.numbers[key])
+        return [Nearby(k * step, weight, setting) for k, weight, setting in self._around(base, key)]
+
     def dataset(self, equilibria: Sequence[Equilibrium], of: Sequence[str], by: Sequence[str]) -> xr.Dataset:
         """Derivatives over `equilibrium` and `key`; NaN where they do not exist, with the reasons as an attribute."""
         sizes = {"axis": 3, "mode": len(MODES)}
+        ends, of = [name for name in of if name in ENDS], [name for name in of if name not in ENDS]
         columns = {
             name: np.full((len(equilibria), len(by), *(sizes[d] for d in ANSWERS[name][2])), np.nan) for name in of
         }
@@ -148,6 +183,10 @@ class Gradient:
             )
             for name, values in columns.items()
         }
+        slopes = range_ends(self, by)[1] if ends else np.zeros((2, 0))
+        for name in ends:
+            row = slopes[list(ENDS).index(name)]
+            data[name] = variable(("key",), row, "Hz", f"derivative: {ENDS[name]}")
         data["number"] = variable(("key",), [self.numbers[key] for key in by], "as the key", "number of the scene")
         units = [label_of_key(key)["units"] for key in by]
         return xr.Dataset(
@@ -170,6 +209,45 @@ def unknown_over_plate(key: str) -> str:
     if key.startswith(("rotor.", "plate.center_mm", "plate.rotation_deg")) and not key.startswith("rotor.remanence_T"):
         return "derivatives by what moves rotor or plate against each other are not known where its currents act"
     return ""
+
+
+# Ends of the stable range of the levitating branch, Hz, without a plate's currents
+ENDS = {"lowest_frequency": "lowest stable frequency", "highest_frequency": "highest stable frequency"}
+
+
+def range_ends(gradient: Gradient, keys: Sequence[str]) -> tuple[Array, Array]:
+    """Ends (2,) Hz of the stable range that a scene's frequency is in, and their derivatives (2, key) by key.
+
+    A fold moves so that F stays singular, a change of stability so that the growth rate stays what is tolerated, and a
+    contact so that the bodies touch. Raises EquilibriumError: the scene's equilibrium is in no such range.
+    """
+    levitation = gradient.levitation
+    runs = [
+        run
+        for run in stable_ranges(levitation.branch)
+        if run.low.parameter <= gradient.scene.frequency <= run.high.parameter
+    ]
+    if not runs:
+        raise EquilibriumError(
+            "The equilibrium is in no range of stable frequencies, whose ends would have derivatives."
+        )
+    ends = runs[0].low, runs[0].high
+    found = np.full((2, len(keys)), np.nan)
+    for row, point in zip(found, ends, strict=True):
+        if point.kind == BORDER:
+            gradient.reasons[BORDER] = f"nothing ends at {point.parameter:.4g} Hz, beyond which nobody looked"
+            continue
+        there = Gradient(levitation.elsewhere(frequency=point.parameter))
+        row[:] = [there.end_by(point, key) for key in keys]
+    return np.array([point.parameter for point in ends]), found
+
+
+def equilibrium_at(levitation: Levitation, point: BranchPoint) -> Equilibrium:
+    """The equilibrium of a point of a branch, at whose frequency the scene is."""
+    scales = Scales.of(levitation.still)
+    return Equilibrium(
+        scales.unpack(point.state), point.spin, residual=0.0, position_error=0.0, **point.motion.in_seconds(scales.time)
+    )
 
 
 def answer_of(known: Equilibrium, name: str) -> ArrayLike:
@@ -380,8 +458,8 @@ def gradient(
     Parameters
     ----------
     of : sequence of str, optional
-        "distance", "lateral_offset", "polar_angle", "lag", "position", "growth", "mode_growth" and "mode_frequency";
-        left out, all.
+        "distance", "lateral_offset", "polar_angle", "lag", "position", "growth", "mode_growth" and "mode_frequency",
+        left out, all these; "lowest_frequency" and "highest_frequency", ends of the stable range (Hz, over `key`).
     by : sequence of str, optional
         Dotted keys of numbers, as `rotor.edge_mm` or `plate.center_mm.2`; left out, all that the scene has.
 
@@ -415,15 +493,16 @@ def gradient(
 
 
 def checked_answers(of: Sequence[str] | None) -> list[str]:
-    """The answers asked for, all where none are. Raises InputError for one that has no derivatives."""
+    """The answers asked for, or all of an equilibrium. Raises InputError for one that has no derivatives."""
+    known = [*ANSWERS, *ENDS]
     if of is None:
         return list(ANSWERS)
     if isinstance(of, str) or not of or not all(isinstance(name, str) for name in of):
         raise InputError(f"Input of must be a list of answers; instead received {shown(of)}.")
     for name in of:
-        if name not in ANSWERS:
-            close = difflib.get_close_matches(name, ANSWERS, n=1)
-            hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(ANSWERS)}"
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
             raise InputError(f"Input of: {shown(name)} has no derivatives ({hint})")
     return list(of)
 

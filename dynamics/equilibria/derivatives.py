@@ -128,6 +128,7 @@ class Implicit:
         _, self._pencil, rows, _ = setting.linear(turn, known.spin)
         left, values, right = np.linalg.svd(np.vstack([self._pencil.matrix(0.0), rows]), full_matrices=False)
         self.conditioning = float(values[-1] / values[0])  # zero at a fold
+        self._lost = left[:, -1]  # what balances no change of the state there
         self._inverse = (right.T / values) @ left.T
 
     @property
@@ -161,14 +162,22 @@ class Implicit:
         ends = [self._pencil.applied(right, value + s * STEP) for s in (1, -1)]
         return complex(np.vdot(left, (ends[0] - ends[1]) / (2 * STEP)))
 
+    def missed(self, nearby: Sequence[Nearby]) -> Array:
+        """F_p (12 n + 2,) by a number, from the equations at some values of it."""
+        turn, found = self.setting.scales.unpack(self.start), np.zeros(self._inverse.shape[1])
+        for there in nearby:
+            residual, _, _, aims = there.setting.linear(turn, self.known.spin)
+            found = found + there.weight * np.append(residual, aims)
+        return found
+
+    def fold_by(self, missed: Array, by_parameter: Array) -> float:
+        """Derivative of the parameter of a fold, here, by a number, from what both have `missed`."""
+        return float(-(self._lost @ missed) / (self._lost @ by_parameter))
+
     def by(self, nearby: Sequence[Nearby]) -> Tangent:
         """The way by a number, from the equations at some values of it."""
         scales, spin = self.setting.scales, self.known.spin
-        turn = scales.unpack(self.start)
-        missed: Array = np.zeros(self._inverse.shape[1])
-        for there in nearby:
-            residual, _, _, aims = there.setting.linear(turn, spin)
-            missed = missed + there.weight * np.append(residual, aims)
+        missed = self.missed(nearby)
         change = (np.nan if self.at_fold else -1.0) * (self._inverse @ missed).reshape(self.start.shape)
         by = {mode.name: 0j if not self.at_fold and mode.speed else complex(np.nan, np.nan) for mode in self.modes}
         faster = 0.0  # derivative of the unit of the eigenvalues

@@ -14,10 +14,11 @@ from article import BALL
 from places import HORIZONTAL, OVER_PLATE
 
 import spinlev as sl
+from spinlev.dynamics.continuation.frequencies import stable_ranges
 from spinlev.dynamics.equilibria import derivatives
 from spinlev.geometry.scene.files import changed
 from spinlev.studies.cli.main import run
-from spinlev.studies.gradient import Gradient
+from spinlev.studies.gradient import Gradient, range_ends
 from spinlev.studies.levitation import Levitation
 
 CUBE = {"edge_mm": 10.0, "remanence_T": 1.305}
@@ -140,6 +141,29 @@ def test_gradient_over_a_plate_moves_with_its_conductivity():
             ends[k] = answers(there, known)
         wanted = (ends[1] - ends[-1]) / (2e-3 * value)
         assert got == pytest.approx(wanted, rel=2e-5, abs=1e-9)  # of second order
+
+
+@pytest.mark.parametrize("name", ["displaced", pytest.param("tilted, finite", marks=pytest.mark.slow)])
+def test_ends_of_stable_frequencies_move_as_branches_say(name):
+    """A fold below and a change of stability above, against whole branches at both sides (of second order)."""
+    scene, model, _ = CASES[name]
+    scene = changed(scene, {})
+    levitation = Levitation(scene, sl.Models(model, "none"))
+    gradient = Gradient(levitation)
+    keys = ["rotor.edge_mm", "gravity_m_s2.2", "floater.density_kg_m3", "frequency_hz"]
+    (low, high), slopes = range_ends(gradient, keys)
+    assert low < scene.frequency < high
+    for key, got in zip(keys[:3], slopes.T, strict=False):
+        step = 5e-4 * gradient.numbers[key]
+        ends = []
+        for sign in (1, -1):
+            there = Levitation(changed(gradient.scene, {key: gradient.numbers[key] + sign * step}), levitation.models)
+            runs = [r for r in stable_ranges(there.branch) if r.low.parameter < scene.frequency < r.high.parameter]
+            ends.append([runs[0].low.parameter, runs[0].high.parameter])
+        assert got == pytest.approx((np.array(ends[0]) - ends[1]) / (2 * step), rel=3e-5)
+    assert slopes[:, 3].tolist() == [0.0, 0.0]
+    found = sl.gradient(scene, ["lowest_frequency"], keys[:1], model=model)
+    assert float(found.lowest_frequency[0]) == pytest.approx(slopes[0, 0])
 
 
 def test_gradient_is_labelled_and_lazy_users_get_all():
