@@ -86,6 +86,7 @@ class Study:
     prepared: Prepared | None = None
     # Which of the numbered points are computed together, with `prepared`
     batches: Callable[[Batch], Sequence[Sequence[int]]] | None = None
+    quick: str = ""  # what `--quick` leaves out of it, in words
     timed: bool = False  # whether it measures times, for which its points must have the machine for themselves
     settings: Point = field(default_factory=dict)  # what all points have in common, if they do not say it themselves
     # What else `--json` prints, by key, from the joined result alone

@@ -134,6 +134,7 @@ def _components_lines(result: xr.Dataset) -> list[str]:
 FIELD_COMPONENTS = Study(
     name="field-components",
     summary="off-axis and on-axis field against the parameter of each rotor of the article, by four models",
+    quick="all but three rotors of each kind",
     points=field_points,
     compute=field_components,
     figures={"field-components": components_figure, "field-components-differences": differences_figure},
@@ -304,6 +305,7 @@ def _force_lines(result: xr.Dataset) -> list[str]:
 FORCE_CURVE = Study(
     name="force-curve",
     summary="force along the axis with its parts, stable and tipping points; the article's formulas and full fields",
+    quick="all but one of four frequencies; distances 0.5 mm apart instead of 0.1 mm",
     points=force_points,
     compute=force_curve,
     figures={"force-curve-parts": parts_figure, "force-curve-net": net_figure},
@@ -431,6 +433,7 @@ def _side_lines(result: xr.Dataset) -> list[str]:
 SIDE_MODE = Study(
     name="side-mode",
     summary="the circle on which the floater goes with the rotor, and the article's formula for its radius",
+    quick="all but one rotor of each kind; frequencies 10 Hz apart instead of 2.5 Hz",
     points=side_points,
     compute=side_mode,
     figures={"side-mode-orbit": orbit_figure, "side-mode-radius": radius_figure},

@@ -215,6 +215,7 @@ def _distance_lines(result: xr.Dataset) -> list[str]:
 LEVITATION_DISTANCE = Study(
     name="levitation-distance",
     summary="distance against frequency for every rotor of the article: equilibria, its formulas, simulations",
+    quick="all but one rotor of each kind, mutual magnetisation, two of three trajectories; steps of 10 not 2.5 Hz",
     points=distance_points,
     compute=levitation_distance,
     figures={"levitation-distance-models": models_figure, "levitation-distance-formulas": formulas_figure},
@@ -347,6 +348,7 @@ def _flight_lines(result: xr.Dataset) -> list[str]:
 TRAJECTORIES = Study(
     name="trajectories",
     summary="linear fall, stable and unstable trajectory: the distance against time, simulated and averaged",
+    quick="finite elements (point dipoles instead), eddy currents in the rotor, real air, mutual magnetisation",
     points=flight_points,
     compute=trajectories,
     figures={"trajectories": flight_figure},

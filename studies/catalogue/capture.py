@@ -357,6 +357,7 @@ def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
 STUDY = Study(
     name="capture",
     summary="capture probability: floaters let go over the plate in many ways, for every rotor that was tried",
+    quick="all but three rotors at one frequency each; fewer launches",
     points=capture_points,
     compute=capture,
     figures={"capture": share_figure, "capture-from-where": place_figure},

@@ -470,6 +470,7 @@ def experiment_numbers(result: xr.Dataset) -> dict[str, Any]:
 STUDY = Study(
     name="experiment",
     summary="what must be true for all of the article's facts at once: posterior and evidence",
+    quick="all but four facts, two models and 28 rotors",
     points=experiment_points,
     compute=experiment,
     gather=gather_experiment,

@@ -137,6 +137,7 @@ def validity_figure(result: xr.Dataset) -> Figure:
 DIPOLE_VALIDITY = study_of_one(
     name="dipole-validity",
     summary="where the dipole and each further model are good to 10, 1, 0.1 and 0.01 %",
+    quick="all but 12 of 60 distances and 5 of 21 lateral offsets",
     compute=dipole_validity,
     figures={"dipole-validity": validity_figure},
     report=_validity_lines,
@@ -365,6 +366,7 @@ def hard_case_lines(result: xr.Dataset) -> list[str]:
 FIELD_HARD_CASES = study_of_one(
     name="field-hard-cases",
     summary="true and stated error of the rotor's table in hard cases: contact, extensions, flat, touching, many",
+    quick="all but the cases that are quick, half of the distances; references of order 4 at most",
     compute=field_hard_cases,
     figures={"field-hard-cases": hard_case_figure},
     report=hard_case_lines,

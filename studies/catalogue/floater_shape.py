@@ -121,6 +121,7 @@ def shape_numbers(result: xr.Dataset) -> dict[str, Any]:
 STUDY = Study(
     name="floater-shape",
     summary="limits of stable frequency by the floater's shape at equal volume: discs, rods, a cube and a sphere",
+    quick="all rotors but δx = 2 mm, all cylinders but 1 : 2, 1 : 1 and 2 : 1",
     points=shape_points,
     compute=limits,
     figures={"floater-shape": shape_figure},

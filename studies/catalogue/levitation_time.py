@@ -281,6 +281,7 @@ def time_lines(result: xr.Dataset) -> list[str]:
 STUDY = Study(
     name="levitation-time",
     summary="levitation time against frequency by the slow drift of the floater's spin",
+    quick="all but two rotors and six variants, two thirds of the frequencies; point dipoles instead of cuboids",
     points=time_points,
     compute=levitation_times,
     gather=gather_times,

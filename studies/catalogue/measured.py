@@ -347,6 +347,7 @@ def measured_figure(result: xr.Dataset) -> Figure:
 MEASURED = study_of_one(
     name="measured",
     summary="what is computed beside what was measured or is known in closed form, one row an experiment",
+    quick="ten of twelve phases of the current, changes that need other modes; TEAM 7 by order 2 instead of 3",
     compute=measured,
     figures={"measured": measured_figure},
     report=_measured_lines,

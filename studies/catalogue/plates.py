@@ -303,6 +303,7 @@ def sentence(result: xr.Dataset) -> str:
 PLATE_DAMPING = Study(
     name="plate-damping",
     summary="what a plate does to each mode, against its place, conductivity and thickness",
+    quick="nine of twelve rotors, the real plate, most points of each sweep, eddy currents in rotor and floater",
     points=lambda quick: [asdict(case) for case in cases(quick)],
     compute=plate_damping,
     figures={
@@ -449,6 +450,7 @@ def team7_figure(result: xr.Dataset) -> Figure:
 TEAM7 = study_of_one(
     name="team7",
     summary="eddy currents against the measurement of TEAM workshop problem 7",
+    quick="elements of order 3 (order 2 instead)",
     compute=team7,
     figures={"team7": team7_figure},
     report=team7_lines,

@@ -112,6 +112,7 @@ def ramps_numbers(result: xr.Dataset) -> dict[str, Any]:
 STUDY = Study(
     name="ramps",
     summary="how far a rotor can be turned down and up until its floater is lost",
+    quick="finite elements (point dipoles instead), all losses, mutual magnetisation",
     points=ramp_points,
     compute=ramps,
     figures={"ramps": ramps_figure},

@@ -212,6 +212,7 @@ def _map_lines(result: xr.Dataset) -> list[str]:
 STABILITY_MAP = Study(
     name="stability-map",
     summary="regions of stable levitation in frequency and displacement, their boundaries, with and without a plate",
+    quick="all but three rotors, trajectories, mutual magnetisation; two instead of five frequencies over the plate",
     points=map_points,
     compute=stability_map,
     figures={"stability-map": map_figure},
@@ -340,6 +341,7 @@ def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
 UPPER_LIMIT = Study(
     name="upper-limit",
     summary="until which frequency trajectories last, below rotors that do and do not conduct",
+    quick="all rotors but δx = 2 mm; conducting spacers",
     points=limit_points,
     compute=upper_limit,
     figures={"upper-limit": limit_figure},

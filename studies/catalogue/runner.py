@@ -102,7 +102,8 @@ FOR_A_FIGURE = 1e-3  # relative error of the field that no figure shows
 def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Answer:
     """Compute a study of the catalogue; writes NAME.nc and its figures. Errors: those of `swept`."""
     study = CATALOGUE[name]
-    return _studied(study, study.points(quick), engine, out)
+    values, lines = _studied(study, study.points(quick), engine, out)
+    return values, [*lines, f"Left out by --quick: {study.quick}."] if quick and study.quick else lines
 
 
 def question_job(question: Question, values: dict[str, list[Any]], engine: Workers, out: Path) -> Answer:

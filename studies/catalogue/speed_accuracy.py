@@ -331,6 +331,7 @@ def speed_figure(result: xr.Dataset) -> Figure:
 STUDY = study_of_one(
     name="speed-accuracy",
     summary="error of B and of its gradient against time, unknowns and memory, for every way to the rotor's field",
+    quick="orders above 3, cells below 0.5 mm, all tolerances but 1e-3 and 1e-5",
     compute=speed_accuracy,
     figures={"speed-accuracy": speed_figure},
     report=_speed_lines,
