@@ -23,6 +23,7 @@ from .catalogue.entries import CATALOGUE
 from .catalogue.runner import figures_of, question_study
 from .cli.console import missing_extra
 from .cli.options import (
+    COMPARE_RTOL,
     FieldModel,
     InteractionModel,
     Models,
@@ -92,7 +93,7 @@ def compare(
     frequencies_hz: Sequence[float] | None = None,
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    rtol: float = Models.rtol,
+    rtol: float = COMPARE_RTOL,
     plate_rtol: float = Models.plate_rtol,
     progress: bool | None = None,
 ) -> xr.Dataset:

@@ -15,6 +15,7 @@ from cyclopts import Parameter
 from ...geometry.common import InputError
 from .console import note
 from .options import (
+    COMPARE_RTOL,
     Answer,
     FieldModel,
     Flag,
@@ -185,7 +186,7 @@ def compare(
     *,
     frequency_hz: str | None = None,
     plate_model: PlateModel = "auto",
-    rtol: float = Models.rtol,
+    rtol: float = COMPARE_RTOL,
     plate_rtol: float = Models.plate_rtol,
     spin: Spin = 0.0,
     output: Output = Output(),

@@ -163,14 +163,18 @@ class Heartbeat(threading.Thread):
             self.join()
 
     def run(self) -> None:
+        last = ("", "")
         while not self._over.wait(self._pause / 5):
             now, began = time.monotonic(), self._began
             if began is not None and now - self._said > max(self._pause, (now - began) / 60):
                 self._said = now
                 # The last of a hundred parts may take long: 100 % would look like the end.
                 known = 0.01 <= self._fraction < 0.995
-                share = f"{self._fraction:.0%}" if known else f"{now - began:.0f} s so far"
-                self._say(f"  {', '.join(filter(None, (self._stage, share)))}")
+                share, taken = f"{self._fraction:.0%}" if known else "", f"{now - began:.0f} s so far"
+                # A share that stands still says that nothing happens, which is not so.
+                parts = (self._stage, share, taken if (self._stage, share) == last or not share else "")
+                last = self._stage, share
+                self._say(f"  {', '.join(filter(None, parts))}")
 
 
 LOG = logging.getLogger("spinlev")

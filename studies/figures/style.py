@@ -61,7 +61,7 @@ class _Looks(dict[str, str]):
 
 NAMES = _Looks(
     dipole="point dipole",
-    cuboid="cuboid, closed form (μr = 1)",
+    cuboid="closed form (μr = 1)",
     fem="finite elements",
     moments="moments",
     map="map",
