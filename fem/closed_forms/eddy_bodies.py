@@ -9,11 +9,13 @@ and where skin depth is large against R: α = -iω (2π/15) σ R⁵.  In a field
 it feels the torque -Im α B⊥² along the turn, and loses the power ω times that.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import iv, kv
 
-from ...geometry.common import MU_0
+from ...geometry.common import MU_0, Array
 from ..harmonics.solid import gauss_legendre
 
 ComplexArray = NDArray[np.complex128]
@@ -66,17 +68,40 @@ def skin_number(radius: float, conductivity: float, frequency: float) -> float:
 def tube_reaction(inner: float, outer: float, conductivity: float, frequency: float) -> complex:
     """G_zz, T/(A m²), of an infinite tube at its axis.
 
-    Of each harmonic e^{ikz} of a dipole's A_φ, k K₁(kρ), C I₁(kρ) comes back, with A and H continuous at both walls.
-
     Parameters
     ----------
     inner, outer : radii, m
     conductivity : S/m
     frequency : Hz
     """
+    k, dk, back = _tube_harmonics(inner, outer, conductivity, lambda k: 2 * np.pi * frequency + 0 * k)
+    return complex(MU_0 / (2 * np.pi**2) * np.sum(dk * k**2 * back))
+
+
+def tube_drag(inner: float, outer: float, conductivity: float, speed: float) -> float:
+    """Drag on a dipole of 1 A m² along an infinite tube, in which it moves on the axis, N/(A m²)².
+
+    Each harmonic e^{ik(z-vt)} is one of the frequency kv in the tube.
+
+    Parameters
+    ----------
+    inner, outer, conductivity : as of `tube_reaction`
+    speed : m/s
+    """
+    k, dk, back = _tube_harmonics(inner, outer, conductivity, lambda k: k * speed)
+    return float(-MU_0 / (2 * np.pi**2) * np.sum(dk * k**3 * back.imag))
+
+
+def _tube_harmonics(
+    inner: float, outer: float, conductivity: float, rates: Callable[[Array], Array]
+) -> tuple[Array, Array, ComplexArray]:
+    """Wave numbers k, 1/m, their weights and what comes back of each at an angular frequency (rad/s) of its own.
+
+    Of a harmonic e^{ikz} of a dipole's A_φ, k K₁(kρ), C I₁(kρ) comes back, with A and H continuous at both walls.
+    """
     nodes, weights = gauss_legendre(400)
     k, dk = 20 / inner * (nodes + 1), 20 / inner * weights
-    within = np.sqrt(k**2 + 2j * np.pi * frequency * MU_0 * conductivity)
+    within = np.sqrt(k**2 + 1j * rates(k) * MU_0 * conductivity)
     rows = np.zeros((len(k), 4, 4), complex)
     for row, radius, outside, at in ((0, inner, iv, 0), (2, outer, kv, 3)):
         x, y, sign = k * radius, within * radius, 1.0 if at == 0 else -1.0
@@ -84,5 +109,4 @@ def tube_reaction(inner: float, outer: float, conductivity: float, frequency: fl
         rows[:, row + 1, at] = sign * k * outside(0, x)
         rows[:, row + 1, 1], rows[:, row + 1, 2] = -within * iv(0, y), within * kv(0, y)
     source = np.stack([-kv(1, k * inner), k * kv(0, k * inner), 0 * k, 0 * k], axis=1)
-    back = np.linalg.solve(rows, source[:, :, None])[:, 0, 0]
-    return complex(MU_0 / (2 * np.pi**2) * np.sum(dk * k**2 * back))
+    return k, dk, np.linalg.solve(rows, source[:, :, None])[:, 0, 0]

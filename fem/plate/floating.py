@@ -27,7 +27,7 @@ import scipy
 from scipy.spatial.transform import Rotation
 
 from ...geometry.common import Array
-from ...geometry.meshes.plate import MeshRule, plate_mesh
+from ...geometry.meshes.plate import ConductorMesh, MeshRule, plate_mesh
 from ...geometry.scene.contents import Coil
 from ...geometry.solids import Solid
 from ..cache import TableKind
@@ -246,10 +246,31 @@ def floating_modes(
     sources = [AxialPotential.of(CoilField(coils, share), outer, reach) for share in shares]
     windings = _windings(coils, np.pi / 2) - [0.0, 0.0, low]
     mesh = plate_mesh(body, conductivity, windings, frequency, rule or MeshRule())
+    made = modes_along(mesh, [source.at for source in sources], heights, frequency, rtol, order)
+    return replace(made, seconds=time.perf_counter() - start)
+
+
+def modes_along(
+    mesh: ConductorMesh,
+    sources: Sequence[Callable[[float], Source]],
+    heights: tuple[float, float],
+    frequency: float,
+    rtol: float,
+    order: int,
+) -> FloatingModes:
+    """Modes of a conductor that moves along an axis beside any sources.
+
+    Parameters
+    ----------
+    mesh : of the conductor
+    sources : at each height (m) of the conductor, in its frame
+    heights, frequency, rtol, order : as of `floating_modes`
+    """
+    start, (low, high) = time.perf_counter(), heights
     nodes = (low + high) / 2 + (high - low) / 2 * np.cos(np.pi * np.arange(TRAINED) / (TRAINED - 1))
-    trained = [source.at(z) for z in nodes for source in sources]
-    probes = [source.at(z) for z in (nodes[1:] + nodes[:-1]) / 2 for source in sources]
-    everywhere = [source.at(z) for z in (low + high) / 2 + (high - low) / 2 * _nodes(DEGREE + 1) for source in sources]
+    trained = [at(z) for z in nodes for at in sources]
+    probes = [at(z) for z in (nodes[1:] + nodes[:-1]) / 2 for at in sources]
+    everywhere = [at(z) for z in (low + high) / 2 + (high - low) / 2 * _nodes(DEGREE + 1) for at in sources]
     band = (0.1 * frequency, 4 * frequency)
     found: list[FloatingModes] = []
     for each in (order - 1, order):

@@ -17,18 +17,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from scipy.optimize import brentq
 
 from ...dynamics.flights.conductor import (
+    ConductorMotion,
     Supply,
     conductor_motion,
     heights_over,
     levitation_height,
     sources_of,
 )
-from ...fem.closed_forms.eddy_bodies import polarizability, tube_reaction
+from ...fem.closed_forms.eddy_bodies import polarizability, tube_drag, tube_reaction
 from ...fem.closed_forms.potentials import Dipole, HomogeneousField
 from ...fem.plate.eddy import plate_reaction, solve_eddy
-from ...fem.plate.floating import FloatingModes, floating_modes
+from ...fem.plate.floating import FloatingModes, floating_modes, modes_along
 from ...geometry.common import MU_0, Array
 from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Plate, Scene
@@ -183,7 +185,7 @@ def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
         "change": list(changes), "shift": np.array(shifts), "missing": rest - computed,
         "time": time, "measured_height": measured, "computed_height": below[best], "phase": phases,
         "rms": np.array(errors), "height": computed, "energy_error": max(motion.energy_error for motion in motions),
-        "seconds": max(motion.seconds for motion in motions),
+        "seconds": max(motion.seconds for motion in motions), "heat": motions[best].heat[-1],
     }  # fmt: skip
     return rows, data
 
@@ -205,8 +207,53 @@ def closed_rows() -> list[Row]:
     lost = -float(tube.tensors[0, 2, 2].imag)
     size = float(tube.error_estimate[0] * abs(series))
     rows.append(("dipole in a copper tube, 50 Hz: loss", "series", -series.imag, lost, size, "T/(A m²)"))
-    rows.append(plate_drag())
+    rows += [falling_magnet()[0], plate_drag()]
     return rows
+
+
+FALL = """
+frequency_hz = 0.0
+gravity_m_s2 = [0.0, 0.0, 9.81]
+[floater]
+diameter_mm = 12.7
+remanence_T = 1.3
+recoil_permeability = 1.0
+density_kg_m3 = 7500.0
+[drag]
+linear_N_s_m = 0.0
+angular_N_m_s = 0.0
+[start]
+position_mm = [0.0, 0.0, -15.0]
+[[coils]]
+radius_mm = 1.0
+width_mm = 1.0
+height_mm = 1.0
+center_mm = [0.0, 0.0, -100.0]
+current_A = 1.0
+"""
+
+
+def falling_magnet() -> tuple[Row, ConductorMotion]:
+    """The terminal speed of a spherical magnet that falls in a copper tube, and its fall.
+
+    The tube moves in the frame of the magnet, which has the mass and is a dipole: a source with a steady current.
+    """
+    scene, inner, outer, travel = parse_scene(FALL), 0.01, 0.0125, 0.015
+    scene = replace(scene, coils=(replace(scene.coils[0], current=scene.floater.moment),))
+    tube, way = ring(outer, inner, 12 * inner), np.linspace(-travel, travel, 4)
+    mesh = plate_mesh(tube, COPPER, np.outer(way, [0, 0, 1]), 50.0, MeshRule(distance_share=0.8))
+    moving = [lambda height: Dipole(np.array([0.0, 0.0, -height]), np.array([0.0, 0.0, 1.0]))]
+    speeds = []
+    for order in (2, 3):
+        modes = modes_along(mesh, moving, (-1.05 * travel, 1.05 * travel), 20.0, 1e-6, order)
+        motion = conductor_motion(scene, modes, 10.0)
+        middle = np.abs(motion.height) < inner / 2
+        speeds.append(float(np.ptp(motion.height[middle]) / np.ptp(motion.time[middle])))
+    weight, moment = scene.floater.mass * GRAVITY, scene.floater.moment
+    exact = brentq(lambda v: moment**2 * tube_drag(inner, outer, COPPER, v) - weight, 1e-3, 1.0)
+    name = "magnet that falls in a copper tube: terminal speed"
+    uneven = float(np.ptp(motion.velocity[middle, 2])) / 2  # along an endless tube the speed is the same
+    return (name, "series", float(exact), speeds[1], abs(speeds[1] - speeds[0]) + uneven, "m/s"), motion
 
 
 @dataclass(frozen=True)
@@ -281,7 +328,7 @@ def measured(quick: bool) -> xr.Dataset:
         "time": variable(("time",), data["time"], "s", "time"),
         "phase": variable(("phase",), data["phase"], "rad", "phase"),
     }
-    said = {name: float(data[name]) for name in ("height", "missing", "energy_error", "seconds")}
+    said = {name: float(data[name]) for name in ("height", "missing", "energy_error", "seconds", "heat")}
     return xr.Dataset(made, axes, said)
 
 
@@ -296,6 +343,8 @@ def measured_numbers(result: xr.Dataset) -> dict[str, Any]:
         "rms_best_phase_mm": float(rms.min()),
         "best_phase_deg": float(np.degrees(result["phase"].values[int(rms.argmin())])),
         "energy_error": float(result.attrs["energy_error"]),
+        "processor_s": float(result.attrs["seconds"]),
+        "heat_J": float(result.attrs.get("heat", np.nan)),
         "missing_mm": 1e3 * float(result.attrs["missing"]),
         "sensitivities": [
             {"change": change, "shift_mm": 1e3 * shift}
@@ -317,7 +366,9 @@ def _measured_lines(result: xr.Dataset) -> list[str]:
     own = found["team28"]
     lines.append(
         f"TEAM 28: rms of the height {own['rms_mm']:.2f} mm with the current's phase 0 at the start, "
-        f"{own['rms_best_phase_mm']:.2f} mm at {own['best_phase_deg']:.0f}°, which fits best."
+        f"{own['rms_best_phase_mm']:.2f} mm at {own['best_phase_deg']:.0f}°, which fits best; energy balance to "
+        f"{own['energy_error']:.0e}, {own['processor_s']:.2g} s of processor time for {DURATION:g} s, {own['heat_J']:.3g} J "
+        "of heat in the disc."
     )
     lines.append(f"Of its height {own['missing_mm']:.3f} mm are missing. Changes of one thing move it by:")
     for row in own["sensitivities"]:

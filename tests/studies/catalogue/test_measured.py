@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from ngsolve import SetNumThreads
 
+from spinlev.fem.closed_forms.eddy_bodies import tube_drag
 from spinlev.geometry.scene.files import parse_scene, scene_text
 from spinlev.studies.catalogue.measured import (
     TEAM28,
     closed_rows,
+    falling_magnet,
     in_phase,
     measured_heights,
     resting_height,
@@ -36,6 +38,16 @@ def test_known_answers_are_met():
         assert found == pytest.approx(known, rel=2e-3), name
         assert kind in ("series", "closed form")
         assert 0 < error < 5e-3 * known
+
+
+def test_magnet_falls_in_a_tube_as_it_does_by_the_series():
+    """From rest to its terminal speed, in 1e-3 of the infinite tube's: of this one's ends 4 cm are left beyond it."""
+    (_, _, exact, found, error, _), motion = falling_magnet()
+    assert found == pytest.approx(exact, rel=1e-3)
+    assert error < 2e-3 * exact
+    assert motion.energy_error < 1e-8
+    assert motion.velocity[5, 2] < 0.9 * exact  # it begins at rest
+    assert tube_drag(0.01, 0.0125, 5.96e7, 1e-3) / 1e-3 > tube_drag(0.01, 0.0125, 5.96e7, 5.0) / 5.0  # skin effect
 
 
 @pytest.mark.slow
