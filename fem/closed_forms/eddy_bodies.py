@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import iv, kv
+from scipy.special import iv, ive, kv
 
 from ...geometry.common import MU_0, Array
 from ..harmonics.solid import gauss_legendre
@@ -63,6 +63,23 @@ def thin_field_torque(radius: float, conductivity: float) -> float:
 def skin_number(radius: float, conductivity: float, frequency: float) -> float:
     """ωμ0σR² of a `radius` (m), `conductivity` (S/m) and `frequency` (Hz): twice the square of radius by skin depth."""
     return float(2 * np.pi * frequency * MU_0 * conductivity * radius**2)
+
+
+def sphere_reaction(radius: float, conductivity: float, frequency: float, distance: float) -> complex:
+    """G_rr, T/(A m²), of a sphere at a dipole that points at its centre.
+
+    Of each harmonic r^l the part l/(l+1) R^(2l+1) I_(l+3/2)(x)/I_(l-1/2)(x) comes back as r^-(l+1), whose first is α.
+
+    Parameters
+    ----------
+    radius, conductivity, frequency : m, S/m and Hz
+    distance : of the dipole from the centre, m
+    """
+    degrees = np.arange(1, 1 + int(np.ceil(40 / np.log(distance / radius))))
+    x = np.sqrt(2j * np.pi * frequency * MU_0 * conductivity) * radius
+    back = ive(degrees + 1.5, x) / ive(degrees - 0.5, x)
+    terms = degrees * (degrees + 1) * (radius / distance) ** (2 * degrees + 1) * back
+    return complex(-MU_0 / (4 * np.pi * distance**3) * np.sum(terms))
 
 
 def tube_reaction(inner: float, outer: float, conductivity: float, frequency: float) -> complex:
