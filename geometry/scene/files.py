@@ -226,8 +226,9 @@ def scene(
     frequency_hz : float
         Turns of the rotor per second about +z, Hz.
     rotor, floater, plate : dict
-        `horizontal`, `vertical`, `tilt` or `magnets`; `sphere`; `plate` (left out, none); or mappings with the keys of
-        a scene file, as of a floater with shape "cuboid" (and size_mm) or "cylinder" (and diameter_mm, height_mm).
+        `horizontal`, `vertical`, `tilt` or `magnets`; `sphere`; `plate` (left out, none) or a list of such; or
+        mappings with the keys of a scene file, as of a floater with shape "cuboid" (and size_mm) or "cylinder" (and
+        diameter_mm, height_mm).
     gravity_m_s2 : sequence of 3 floats
         In the laboratory frame, m/s².
     drag : dict, optional
