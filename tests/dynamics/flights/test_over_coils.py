@@ -21,7 +21,7 @@ from spinlev.dynamics.flights.conductor import (
 from spinlev.fem.closed_forms.coil import CoilField
 from spinlev.fem.closed_forms.eddy_bodies import thin_field_torque
 from spinlev.fem.plate.eddy import solve_eddy
-from spinlev.fem.plate.floating import AxialPotential, _Seen, floating_modes, free_modes
+from spinlev.fem.plate.floating import AxialPotential, _Seen, floating_modes, free_modes, sampled_poses
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
@@ -171,6 +171,15 @@ def test_free_force_is_the_slope_of_couplings_solved_for_directly(free):
     exact = 14.0**2 / 2 * (found[::2] - found[1::2]) / (2 * step)
     force = free.mean_force(place, tilt, np.array([14.0]), 100.0)
     assert force == pytest.approx(exact, abs=3e-3 * np.linalg.norm(exact))
+
+
+@pytest.mark.slow
+def test_free_conductor_takes_power_in_a_thousand_poses(free):
+    """In any direction and at any frequency: -Im of couplings, ω Σ λ G²/(λ² + ω²)."""
+    omega = 2 * np.pi * np.array([1.0, 100.0, 1e4])
+    for pose in sampled_poses(DISC.floater.bodies[0], room_over(DISC), 1000, 7):
+        power = omega / (free.rates[:, None] ** 2 + omega**2) * (free.rates * free.flux(*pose)[:, 0] ** 2)[:, None]
+        assert power.sum(axis=0).min() > 0
 
 
 @pytest.mark.slow
