@@ -36,7 +36,7 @@ from ..fem.rotor.table import RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses
 from ..geometry.common import Array, InputError, shown
 from ..geometry.magnets import Magnet
-from ..geometry.scene.contents import Scene
+from ..geometry.scene.contents import Plate, Scene
 from ..geometry.scene.files import changed, scene_numbers, scene_text
 from ..geometry.scene.messages import SceneError
 from .cli.console import note
@@ -114,6 +114,7 @@ class Gradient:
         if implicit.at_fold:
             self.reasons["fold"] = AT_FOLD
         found = {}
+        base.prepare(keys)
         for key in keys:
             if base.with_plate and (why := unknown_over_plate(key)):
                 self.reasons[why] = why
@@ -206,9 +207,13 @@ def unknown_over_plate(key: str) -> str:
     """Why derivatives by a key are not known where a plate's currents act; empty where they are."""
     if key.startswith("plate.") and not key.startswith(("plate.center_mm", "plate.rotation_deg", "plate.conductivity")):
         return "derivatives by sizes of a plate whose currents act are not known"
-    if key.startswith(("rotor.", "plate.center_mm", "plate.rotation_deg")) and not key.startswith("rotor.remanence_T"):
-        return "derivatives by what moves rotor or plate against each other are not known where its currents act"
     return ""
+
+
+def _moves_rotor(key: str) -> bool:
+    """Whether a number changes the rotor's field in the plate in more than its strength."""
+    still = ("rotor.remanence_T", "rotor.conductivity_S_m")
+    return key.startswith(("rotor.", "plate.center_mm", "plate.rotation_deg")) and not key.startswith(still)
 
 
 # Ends of the stable range of the levitating branch, Hz, without a plate's currents
@@ -363,7 +368,39 @@ class _Changed:
             memory = replace(memory, share=replace(memory.share, series=strong * memory.share.series))
         if any(key.startswith(("plate.center_mm", "plate.rotation_deg")) for key in offsets):
             memory = replace(memory, plate=replace(memory.plate, body=scene.plate.body))
+        moves = {key: offset for key, offset in offsets.items() if _moves_rotor(key)}
+        if moves:  # about a plate that has not gone down
+            series = memory.share.series @ memory.share.by_depth(0.0)
+            series = series + sum(offset * self._shares[key] for key, offset in moves.items())
+            memory = replace(memory, share=replace(memory.share, distance=0.0, series=series[:, :, None]))
         return memory
+
+    @cached_property
+    def _shares(self) -> dict[str, Array]:
+        return {}
+
+    def prepare(self, keys: Sequence[str]) -> None:
+        """Differentiate the rotor's share of the plate's signals by keys that move both against each other."""
+        asked = [key for key in keys if _moves_rotor(key)] if self.with_plate else []
+        memory, requested = self.levitation.plate, self.levitation.requested_plate
+        table = self.levitation.table
+        if not asked or memory is None or requested is None or not isinstance(table, RotorTable):
+            return
+        numbers, others, widths = scene_numbers(self.scene)[1], list[tuple[Plate, RotorTable]](), list[float]()
+        for key in asked:
+            step = 2 * self.step(key, numbers[key])
+            try:
+                ends = [changed(self.scene, {key: numbers[key] + sign * step}) for sign in (1, -1)]
+            except SceneError:  # it has an end here
+                ends, step = [changed(self.scene, {key: numbers[key] + step}), self.scene], step / 2
+            widths.append(2 * step)
+            for scene in ends:
+                assert scene.plate is not None
+                others.append((replace(memory.plate, body=scene.plate.body), changed_table(table, scene.rotor)))
+        note("The rotor's share of the plate's currents by what moves both ...")
+        found = requested.changed_shares((memory.table, memory.share), others, note)
+        for key, width, above, below in zip(asked, widths, found[::2], found[1::2], strict=True):
+            self._shares[key] = (above - below) / width
 
     def _ends_of(self, name: str, key: str, base: Any, make: Callable[[Scene], Any]) -> tuple[Any, Any, float]:
         """Tables that are made at `WIDE` steps to both sides of a number, and the way between."""

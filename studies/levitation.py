@@ -25,7 +25,7 @@ from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..dynamics.motion.state import Scales
 from ..fem.mutual.making import cached_mutual_table, mutual_key
 from ..fem.mutual.table import MutualTable
-from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
+from ..fem.plate.choice import PlateAround, plate_around, rotor_nearby, wider_region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
 from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rotor_table
@@ -94,6 +94,7 @@ class Levitation:
         self._tables = SharedTables()
         # The plate's currents for all of a trajectory's way, where it left the range of `plate`.
         self.wider: PlateMemory | None = None
+        self.requested_plate: PlateAround | None = None  # what the last table of the plate was made of
         self.no_wider = ""  # why they could not be known, if so
         self._nearest: Array | None = None  # to the plate, of a trajectory that had begun without its currents
         self.simulated: dict[float, Trajectory] = {}  # by duration, s: those simulated together with others
@@ -389,6 +390,7 @@ class Levitation:
             detail(f"  {len(made.rates)} states, estimated relative error {made.errors.total:.1e}.")
             return (made, share), found
 
+        self.requested_plate = requested
         made, share = self._tables.table(requested.key, "plate", "Eddy currents in the plate", make)
         return PlateMemory(requested.plate, made, share, plan.model, plan.edges)
 

@@ -25,6 +25,7 @@ SOLVERS = {
     "map": "fem/maps_of_B/table.py",
     "plate": "fem/plate/tables.py",
     "driven-plate": "fem/plate/tables.py",
+    "changed-share": "fem/plate/tables.py",
     "plate-currents": "fem/plate/currents.py",
     "slab": "fem/plate/tables.py",
     "edges": "fem/plate/slab.py",

@@ -193,13 +193,16 @@ class Implicit:
         rates = {mode.name: by[mode.name] / scales.time + mode.value * faster for mode in self.modes}
         return Tangent(self.start, change, rates, self._equilibrium)
 
-    def moved(self, setting: Setting, tangents: Sequence[tuple[float, Tangent]]) -> Equilibrium | None:
+    def moved(
+        self, setting: Setting, tangents: Sequence[tuple[float, Tangent]], with_modes: bool = True
+    ) -> Equilibrium | None:
         """The equilibrium that equations nearby have, by Newton's method from where tangents lead; None where none is.
 
         Parameters
         ----------
         setting : the equations
         tangents : steps of numbers with the way by each
+        with_modes : whether its modes are computed, or left as they are
         """
         spin, scales = self.known.spin, setting.scales
         begun = self.start + sum((step * way.change for step, way in tangents), np.zeros_like(self.start))
@@ -215,6 +218,8 @@ class Implicit:
                 break
         else:
             return None
+        if not with_modes:
+            return self._equilibrium(self.setting.scales.pack(scales.unpack(states)))
         modes, pencil = [], setting.linear(scales.unpack(states), spin)[1]
         for mode in self.modes:
             rate = mode.value / self.setting.scales.time + sum(step * way.modes[mode.name] for step, way in tangents)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from .currents import cached_currents
 from .rotor_share import DOWN
 from .slab import cached_edge_error, edge_error
 from .table import PlateTable, Region, RotorShare
-from .tables import DRIVEN, SLAB, deciding, plate_and_rotor_table, slab_and_rotor_table
+from .tables import CHANGED, DRIVEN, SLAB, changed_shares, deciding, plate_and_rotor_table, slab_and_rotor_table
 
 NEGLIGIBLE = 1e-6  # Part of the floater's weight below which the largest conceivable force of the plate is left out
 REACH = 0.003  # The floater may move so far from where it begins, along each axis, m
@@ -119,6 +119,21 @@ class PlateAround:
             make = partial(plate_and_rotor_table, *self._requested, solve=solve, watch=watch)
         (table, share), cached = self._kind.cached(deciding(*self._requested), make, report)
         return table, share, cached
+
+    def changed_shares(
+        self,
+        known: tuple[PlateTable, RotorShare],
+        others: Sequence[tuple[Plate, RotorTable]],
+        report: Callable[[str], None],
+    ) -> Array:
+        """`tables.changed_shares` of what was `made`, from the cache if they are there; `report` gets messages."""
+        solve, slab = partial(cached_currents, report=report), self.model == "slab"
+        more = tuple((plate.body, rotor.uniform, rotor.expansions) for plate, rotor in others)
+
+        def make() -> tuple[Array, float]:
+            return changed_shares(known, self._requested, others, slab, solve), 0.0
+
+        return CHANGED.cached((self.key, more), make, report)[0][0]
 
     @property
     def _kind(self) -> TableKind[tuple[PlateTable, RotorShare]]:

@@ -129,8 +129,13 @@ class RotorShare:
 
     def signals(self, angle: ArrayLike, depth: float) -> Array:
         """s_i (..., states), √J, at angles (...) of the rotor (rad) and a depth of the plate (m)."""
-        factors = np.polynomial.chebyshev.chebvander(np.array([self._place(depth)]), self.series.shape[2] - 1)[0]
-        return np.asarray(turn_harmonics(angle, len(self.series)) @ (self.series @ factors))
+        return np.asarray(turn_harmonics(angle, len(self.series)) @ (self.series @ self.by_depth(depth)))
+
+    def by_depth(self, depth: float) -> Array:
+        """Polynomials (k,) of the series at a depth of the plate (m)."""
+        return np.asarray(
+            np.polynomial.chebyshev.chebvander(np.array([self._place(depth)]), self.series.shape[2] - 1)[0]
+        )
 
     def _place(self, depth: float) -> float:
         return 2 * depth / self.distance - 1 if self.distance else 0.0

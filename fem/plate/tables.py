@@ -1,28 +1,39 @@
 """Tables of a plate: finite elements or an infinite slab, the network of its currents, then its field functions."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ...geometry.common import Watch, unwatched
+from ...geometry.common import Array, ComputationError, Watch, unwatched, watched
 from ...geometry.meshes.plate import MeshRule
 from ...geometry.scene.contents import Plate
 from ..cache import TableKind
 from ..rotor.table import RotorTable
 from .currents import OtherSources, PlateSolution, error_of, outer_box, outer_frequencies, solve_currents
 from .network import CONDUCTOR, NETWORK_SHARE, PassiveNetwork, Reduction, checked_ranges, from_elements
-from .rotor_share import MISSED, SHARE_PART, rotor_box, rotor_share, turning_rotor, without_high_harmonics
+from .rotor_share import (
+    MISSED,
+    SHARE_PART,
+    UNNOTICED,
+    posed_rotor,
+    rotor_box,
+    rotor_parts,
+    rotor_share,
+    turning_rotor,
+    without_high_harmonics,
+)
 from .slab import rotor_reach, slab_frame
-from .table import PlateErrors, PlateTable, Region, RotorShare
+from .table import PlateErrors, PlateTable, Region, RotorShare, turn_harmonics
 from .waves import from_slab
 
 TITLE = "Eddy currents of a plate: passive network with harmonic field functions, in the plate's frame"
 PLATE = TableKind("plate", PlateTable, TITLE)
 DRIVEN = TableKind("driven-plate", tuple[PlateTable, RotorShare], f"{TITLE}, and the rotor's share of their signals")
 SLAB = TableKind("slab", tuple[PlateTable, RotorShare], "Eddy currents of an infinite slab, with the rotor's share")
+CHANGED = TableKind("changed-share", tuple[Array, float], "Signals of changed rotors in the currents of a plate")
 # Share of what the finite elements leave of the tolerance for what dipoles around the rotor miss of it; the rest is the
 # left-out states'. Above, the rotor itself is solved for, which takes as long again: a few more states cost less.
 OTHERS_SHARE = 0.65
@@ -83,6 +94,20 @@ def plate_and_rotor_table(
     that neighbours of the scene and other models of the rotor need the same ones.  A rotor that these dipoles do not
     stand for gets its own.
     """
+    reduced = _reduction(plate, rotor, region, frequencies, rtol, rule, solve, watch)
+    return _with_share(reduced, plate, rotor, rtol, CONDUCTOR, watch)
+
+
+def _reduction(
+    plate: Plate,
+    rotor: RotorTable,
+    region: Region,
+    frequencies: tuple[float, float],
+    rtol: float,
+    rule: MeshRule | None,
+    solve: Callable[..., PlateSolution],
+    watch: Watch,
+) -> Reduction:
     others = turning_rotor(plate, rotor)
     boxes = [outer_box(region, plate.body), outer_box(rotor_box(plate, rotor), plate.body)]
     outer = outer_frequencies(frequencies)
@@ -94,8 +119,7 @@ def plate_and_rotor_table(
         error = solution.space_error
     watch("reduced plate model", 0.5)
     missed = max(error, solution.space_error)
-    reduced = from_elements(plate, solution, region, frequencies, rtol, others, missed)
-    return _with_share(reduced, plate, rotor, rtol, CONDUCTOR, watch)
+    return from_elements(plate, solution, region, frequencies, rtol, others, missed)
 
 
 def slab_and_rotor_table(
@@ -108,11 +132,66 @@ def slab_and_rotor_table(
     AccuracyError: `rtol` not reached.
     """
     far = rotor_reach(plate, rotor, slab_frame(plate, region))
-    size = np.where(np.arange(3) == np.argmin(plate.box.size), plate.box.size, ENDLESS)
-    endless = replace(plate, body=replace(plate.box, size=size))
+    endless = _endless(plate)
     reduced = from_slab(plate, region, frequencies, rtol, turning_rotor(endless, rotor), far)
     conductor = "this plate, taken as an infinite slab, and this place of the floater"
     return _with_share(reduced, endless, rotor, rtol, conductor, unwatched)
+
+
+def _endless(plate: Plate) -> Plate:
+    size = np.where(np.arange(3) == np.argmin(plate.box.size), plate.box.size, ENDLESS)
+    return replace(plate, body=replace(plate.box, size=size))
+
+
+SEEN = 8  # angles of a turn at which changed rotors are looked at: what they alias are harmonics from the seventh on
+
+
+def changed_shares(
+    known: tuple[PlateTable, RotorShare],
+    requested: tuple[Plate, RotorTable, Region, tuple[float, float], float],
+    others: Sequence[tuple[Plate, RotorTable]],
+    slab: bool,
+    solve: Callable[..., PlateSolution] = solve_currents,
+    watch: Watch = unwatched,
+) -> Array:
+    """Series (k, 2H+1, states) √J in the angle of k other rotors and poses of a plate that has not gone down.
+
+    Parameters
+    ----------
+    known : the table and the share, of whose network and harmonics they are
+    requested : what these were made of, see `plate_and_rotor_table`
+    others : the plate in another pose, and another rotor
+    slab : whether the table is an infinite slab's
+    solve, watch : as there
+
+    Raises
+    ------
+    ComputationError : the network comes out otherwise than when the table was made
+    """
+    (table, share), (plate, rotor, region, frequencies, rtol) = known, requested
+    seen = _endless if slab else (lambda plate: plate)
+    if slab:
+        far = rotor_reach(plate, rotor, slab_frame(plate, region))
+        reduced = from_slab(plate, region, frequencies, rtol, turning_rotor(seen(plate), rotor), far)
+    else:
+        reduced = _reduction(plate, rotor, region, frequencies, rtol, None, solve, watch)
+    network = reduced(0.0)
+    if network.rates.shape != table.rates.shape:
+        network = _reduced_table(reduced, rtol, CONDUCTOR, watch)[0]
+    angles = 2 * np.pi * np.arange(SEEN) / SEEN
+    fourier = np.linalg.pinv(turn_harmonics(angles, SEEN - 1))[: len(share.series)]
+
+    def series(plate: Plate, rotor: RotorTable) -> Array:
+        parts = rotor_parts(rotor, seen(plate), UNNOTICED * SHARE_PART * rtol)
+        return fourier @ network.couplings([posed_rotor(parts, seen(plate), angle, 0.0) for angle in angles])
+
+    first, stored = series(plate, rotor), share.series @ share.by_depth(0.0)
+    if first.shape != stored.shape or np.abs(first - stored).max() > rtol * np.abs(stored).max():
+        raise ComputationError("The network of the plate's currents comes out otherwise than when its table was made.")
+    found = []
+    for place in watched(range(len(others)), watch, "changed rotors in the plate"):
+        found.append(stored + series(*others[place]) - first)
+    return np.array(found)
 
 
 def _with_share(

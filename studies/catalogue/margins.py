@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,7 @@ from scipy.special import ndtri
 
 from ...dynamics.continuation.branch import BranchPoint
 from ...dynamics.continuation.frequencies import (
+    BORDER,
     HIGHEST,
     LONG_STEPS,
     LOWEST,
@@ -21,19 +22,24 @@ from ...dynamics.continuation.frequencies import (
     at_frequency,
     by_frequency,
     levitates,
+    levitating_ranges,
     stability_end,
 )
 from ...dynamics.equilibria.balance import AXIAL, LATERAL, Balance, solve
-from ...dynamics.equilibria.equilibrium import EquilibriumError
+from ...dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
+from ...dynamics.equilibria.orbits import ForcedMotion
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.events import rotor_gap
 from ...dynamics.motion.state import Scales
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
+from ...geometry.scene.files import scene as written_scene
 from ...geometry.scene.floater import Floater
+from ...geometry.scene.making import sphere
 from ..cli.console import note
 from ..cli.options import FieldModel
 from ..figures.style import PALETTE, plain_log
+from ..gradient import Gradient, equilibrium_at
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
 from . import article, showing
@@ -65,7 +71,6 @@ NORMAL = np.array([known.normal for known in PARAMETERS.values()])
 TILT_SPREAD = 0.5
 TILTS = (0.0, 1.0, 2.0)  # Of the axis from the vertical, degrees
 QUANTITIES = ("lowest", "highest", *(f"distance at {f:.0%}" for f in FRACTIONS))
-STEP = 1e-3  # Relative step of the central differences; twice that for their error
 SEED = 20250706
 COLUMNS: Columns = {
     "nominal": (("quantity",), "Hz or m", "as it should be"),
@@ -109,74 +114,131 @@ def nominal(configuration: str, measure: float, model: FieldModel = "cuboid") ->
     """The rotor as it should be, its field by `model`. Raises EquilibriumError where it does not levitate."""
     values = {name: known.nominal for name, known in PARAMETERS.items()} | {"measure": measure}
     scene = scene_of(configuration, values)
-    stable = article.stable_frequencies(scene, article.levitation_of(scene, model).rates)
+    levitation = article.levitation_of(scene, model)
+    found = levitating_ranges(scene, levitation.table, levitation.rates)
+    if not found:
+        raise EquilibriumError("The rotor levitates stably at no frequency.")
+    stable = found[0]
     grid = article.within(stable, FRACTIONS)
     return Nominal(configuration, model, values | {"frequency": float(grid[1])}, stable, grid)
 
 
-def levitation(base: Nominal, off: Mapping[str, float]) -> Array:
-    """Lowest and highest frequency (Hz) and the distances (m) with parameters `off` by so much; NaN where none."""
-    scene = scene_of(base.configuration, {name: value + off.get(name, 0.0) for name, value in base.values.items()})
-    rates = article.levitation_of(scene, base.model).rates
-    middle = base.stable.near(base.grid[1])
-    family, row = by_frequency(scene, rates), np.full(len(QUANTITIES), np.nan)
-    with suppress(EquilibriumError):
-        row[:2] = [
-            stability_end(scene, family, middle.state, middle.parameter, end, LONG_STEPS).parameter
-            for end in (LOWEST, HIGHEST)
-        ]
-    for k, frequency in enumerate(base.grid + off.get("frequency", 0.0), 2):
-        if row[0] < frequency < row[1]:
-            row[k] = at_frequency(scene, rates, middle, float(frequency), LONG_STEPS).distance
-    return row
+def _keyed(base: Nominal) -> dict[str, tuple[str, float]]:
+    """Key of the scene file of each parameter, and its unit by that of the parameter."""
+    measure = "rotor.angle_deg" if base.configuration == "tilt" else "rotor.displacement_mm"
+    return {
+        "measure": (measure, 1.0),
+        "rotor_remanence": ("rotor.remanence_T", 1.0),
+        "floater_remanence": ("floater.remanence_T", 1.0),
+        "density": ("floater.density_kg_m3", 1.0),
+        "edge": ("rotor.edge_mm", 1e3),
+        "diameter": ("floater.diameter_mm", 1e3),
+        "gravity": ("gravity_m_s2.2", -1.0),
+        "frequency": ("frequency_hz", 1.0),
+    }
 
 
-def slope_by(base: Nominal, name: str, step: float) -> Array:
-    """Derivatives (quantity,) by one parameter, as a central difference of `step` (SI; measure: mm or °)."""
-    return np.asarray((levitation(base, {name: step}) - levitation(base, {name: -step})) / (2 * step))
+def _written(base: Nominal, frequency: float) -> Scene:
+    """The scene of the rotor as it should be, of keys that derivatives are by."""
+    cube = {"edge_mm": 1e3 * base.values["edge"], "remanence_T": base.values["rotor_remanence"]}
+    measure = _keyed(base)["measure"][0].removeprefix("rotor.")
+    rotor = {"configuration": base.configuration, measure: base.values["measure"], "recoil_permeability": 1.0, **cube}
+    ball = sphere(
+        diameter_mm=1e3 * base.values["diameter"],
+        remanence_T=base.values["floater_remanence"],
+        density_kg_m3=base.values["density"],
+    )
+    still = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}
+    down = [0.0, 0.0, -base.values["gravity"]]
+    return written_scene(frequency_hz=frequency, rotor=rotor, floater=ball, gravity_m_s2=down, drag=still)
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """A rotor's quantities, their derivatives by all parameters, and what they are with parameters that are off."""
+
+    base: Nominal
+    derivatives: Array  # (parameter, quantity)
+    ways: tuple[Any, ...]  # `Gradient.ways` at each of the frequencies
+
+    @classmethod
+    def of(cls, base: Nominal) -> Self:
+        levitation = article.levitation_of(_written(base, float(base.grid[1])), base.model)
+        keys, found, ways = _keyed(base), np.zeros((len(PARAMETERS), len(QUANTITIES))), []
+        for k, end in enumerate((base.stable.low, base.stable.high)):
+            gradient = Gradient(levitation.elsewhere(frequency=end.parameter))
+            for row, (key, unit) in zip(found, keys.values(), strict=True):
+                row[k] = 0.0 if end.kind == BORDER else unit * gradient.end_by(end, key)
+        for k, frequency in enumerate(base.grid, 2):
+            there = levitation.elsewhere(frequency=float(frequency))
+            middle = base.stable.near(frequency)
+            known = equilibrium_at(there, at_frequency(there.scene, there.rates, middle, float(frequency), LONG_STEPS))
+            ways.append((known, *Gradient(there).ways(known, [key for key, _ in keys.values()])))
+            for row, (key, unit) in zip(found, keys.values(), strict=True):
+                row[k] = unit * float(ways[-1][1][key].of(lambda equilibrium: equilibrium.distance))
+        return cls(base, found, tuple(ways))
+
+    def off(self, draw: Array) -> Array:
+        """Quantities with parameters off by a `draw`: ends to first order, distances of whole equilibria."""
+        base, keys = self.base, _keyed(self.base)
+        row = np.append(
+            [base.stable.low.parameter, base.stable.high.parameter] + draw @ self.derivatives[:, :2], [np.nan] * 3
+        )
+        values = {name: base.values[name] + by for name, by in zip(PARAMETERS, draw, strict=True)}
+        offsets = {key: unit * float(by) for (key, unit), by in zip(keys.values(), draw, strict=True)}
+        for k, (frequency, (_, tangents, implicit, nearby)) in enumerate(zip(base.grid, self.ways, strict=True), 2):
+            if row[0] < frequency + offsets["frequency_hz"] < row[1]:
+                scene = scene_of(base.configuration, values, float(frequency) + offsets["frequency_hz"])
+                moved = implicit.moved(
+                    nearby.at(scene, offsets), [(by, tangents[key]) for key, by in offsets.items()], False
+                )
+                row[k] = np.nan if moved is None else moved.distance
+        return row
+
+    def leaning(self) -> Array:
+        """Distance (m) and largest growth (1/s) in the middle of the range with the axis tilted (2, tilt)."""
+        _, tangents, implicit, nearby = self.ways[1]
+        found = []
+        for tilt in np.radians(TILTS):
+            down = 9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
+            scene = replace(nearby.scene, gravity=down)
+            less = {"gravity_m_s2.2": float(down[2] - nearby.scene.gravity[2])}
+            setting = nearby.at(scene, less)
+            fixed = implicit.moved(setting, [(by, tangents[key]) for key, by in less.items()])
+            motion = ForcedMotion(scene, setting.rates, setting.values, None)
+            forced = None if fixed is None else motion.equilibrium(fixed)
+            found.append(
+                (forced.distance, forced.growth_per_s) if isinstance(forced, Equilibrium) else (np.nan, np.nan)
+            )
+        return np.array(found).T
+
+
+DERIVATIVE_ERROR = 1e-6  # relative, to which derivatives agree with differences of whole branches
 
 
 def sensitivity_points(quick: bool) -> list[Point]:
-    """The rotors that levitated, how many samples of the tolerances are drawn, and steps of the differences.
-
-    One step alone gives derivatives without an estimate of their error, which is then NaN.
-    """
-    more = {"field": "cuboid", "samples": 4 if quick else 32, "steps": [1] if quick else [1, 2]}
+    """The rotors that levitated, and how many samples of the tolerances are drawn."""
+    more = {"field": "cuboid", "samples": 4 if quick else 32}
     return [{**rotor, **more} for rotor in article.levitated_rotors(quick)]
 
 
 def sensitivity(point: Point) -> xr.Dataset:
     """Derivatives, tolerance band and tilt of one rotor."""
     base, samples = nominal(point["configuration"], point["measure"], point["field"]), point["samples"]
-    slopes = [
-        np.array([slope_by(base, name, STEP * base.values[name] * factor) for name in PARAMETERS])
-        for factor in point["steps"]
-    ]
-    # of second order: with twice the step the error is four times as large
-    error = np.abs(slopes[1] - slopes[0]) / 3 if len(slopes) > 1 else np.full_like(slopes[0], np.nan)
+    slopes = Slopes.of(base)
     # a Latin hypercube: each parameter's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239)
     generator = np.random.default_rng(SEED)
     ranks = generator.permuted(np.tile(np.arange(samples)[:, None], len(PARAMETERS)), axis=0)
     levels = (ranks + generator.random(ranks.shape)) / samples
     draws = spreads(base.configuration) * np.where(NORMAL, ndtri(levels), 2 * levels - 1)
-    sample = [levitation(base, dict(zip(PARAMETERS, draw, strict=True))) for draw in draws]
+    sample = [slopes.off(draw) for draw in draws]
     lean = variable(("lean",), np.array(TILTS), "°", "tilt of the axis from the vertical")
     axes = {"parameter": list(PARAMETERS), "quantity": list(QUANTITIES), "fraction": list(FRACTIONS), "lean": lean}
-    found = (levitation(base, {}), slopes[0], error, sample, draws, base.grid, *leaning(base))
+    distances = [known.distance for known, *_ in slopes.ways]
+    row = np.array([base.stable.low.parameter, base.stable.high.parameter, *distances])
+    error = DERIVATIVE_ERROR * np.abs(slopes.derivatives)
+    found = (row, slopes.derivatives, error, sample, draws, base.grid, *slopes.leaning())
     return recorded(point, COLUMNS, found, axes)
-
-
-def leaning(base: Nominal) -> Array:
-    """Distance (m) and largest growth (1/s) in the middle of the range with the axis tilted (2, tilt)."""
-    scene = scene_of(base.configuration, base.values, float(base.grid[1]))
-    levitation = article.levitation_of(scene, base.model)
-    here = at_frequency(scene, levitation.rates, base.stable.near(scene.frequency), scene.frequency)
-    found = []
-    for tilt in np.radians(TILTS):
-        there = levitation.elsewhere(gravity=9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)]))
-        near = (e for e in there.equilibria if abs(e.distance - here.distance) < 1e-3)
-        found.append(next(((e.distance, e.growth_per_s) for e in near), (np.nan, np.nan)))
-    return np.array(found).T
 
 
 MIDDLE = QUANTITIES[3]

@@ -21,7 +21,7 @@ from spinlev.fem.mutual.response import two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.studies.catalogue.article import FLOATER, rotor_scene
 from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem
-from spinlev.studies.catalogue.margins import PARAMETERS, QUANTITIES, designed, levitation, nominal, scene_of, slope_by
+from spinlev.studies.catalogue.margins import PARAMETERS, QUANTITIES, Slopes, designed, nominal, scene_of
 from spinlev.studies.catalogue.regions import stability_map
 
 
@@ -85,16 +85,18 @@ def test_vertical_range_against_known_numbers():
 def test_remanence_and_density_enter_only_as_a_ratio(horizontal):
     """Accelerations are those of gravity and Br Br'/density: their logarithmic derivatives are one number."""
     names = "rotor_remanence", "floater_remanence", "density"
-    rows = [slope_by(horizontal, n, 1e-3 * horizontal.values[n]) * horizontal.values[n] for n in names]
-    np.testing.assert_allclose(rows[1], rows[0], rtol=1e-5)
-    np.testing.assert_allclose(rows[2], -rows[0], rtol=1e-4)  # steps of 1 and 1/(1 ± 0.001) differ in second order
+    slopes = dict(zip(PARAMETERS, Slopes.of(horizontal).derivatives, strict=True))
+    rows = [slopes[name] * horizontal.values[name] for name in names]
+    np.testing.assert_allclose(rows[1], rows[0], rtol=1e-6)
+    np.testing.assert_allclose(rows[2], -rows[0], rtol=1e-6)
 
 
 @pytest.mark.slow
 def test_distance_of_a_sample_is_that_of_a_survey(horizontal):
     off = {"measure": 0.05, "edge": 0.03e-3, "density": -50.0}
     values = horizontal.values | {name: horizontal.values[name] + by for name, by in off.items()}
-    found = dict(zip(QUANTITIES, levitation(horizontal, off), strict=True))
+    draw = np.array([off.get(name, 0.0) for name in PARAMETERS])
+    found = dict(zip(QUANTITIES, Slopes.of(horizontal).off(draw), strict=True))
     scene = scene_of("horizontal", values, float(horizontal.grid[1]))
     expected = next(e for e in find_equilibria(scene, rotor_table(scene.rotor, "cuboid")) if e.stable)
     assert found["distance at 50%"] == pytest.approx(expected.distance, abs=1e-10)
