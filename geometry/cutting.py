@@ -1,20 +1,64 @@
-"""Magnets cut into pieces so compact that a multipole expansion about each converges where it is needed."""
+"""Magnets cut into pieces so compact that a multipole expansion about each converges where it is needed; or united."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .common import Array, InputError
 from .magnets import Magnet
-from .shapes import Box
+from .overlap import TOUCHING
+from .shapes import Box, Cylinder
 from .solids import Solid
 
 CONVERGENCE = 1.3  # Least distance of a point from a piece's centre, in circumradii of the piece
 MOST = 300  # Pieces of a body
 SAMPLES = 12  # Places along each edge of a cell at which it is looked at
 MARGIN = 1.0 + 1e-6
+SAME = 1e-9  # Of polarisations that differ by round-off alone
+
+
+def united(magnets: Sequence[Magnet]) -> tuple[Magnet, ...]:
+    """The `magnets` where those that have a whole face in common, one material and one polarisation are one.
+
+    Cuboids join at any face, cylinders and rings at their ends; one that is made so has no conductivity.
+    """
+    found = list(magnets)
+    while pair := next(
+        ((i, k, one) for i, k in combinations(range(len(found)), 2) if (one := _joined(found[i], found[k]))), None
+    ):
+        i, k, found[i] = pair
+        del found[k]
+    return tuple(found)
+
+
+def _joined(first: Magnet, second: Magnet) -> Magnet | None:
+    """Both as one along the axes of the `first`, or None where they are two."""
+    body, other = first.body, second.body
+    if not isinstance(body, Box | Cylinder) or type(body) is not type(other):
+        return None
+    turn, offset, is_round = body.rotation.T @ other.rotation, body.to_body(other.center), isinstance(body, Cylinder)
+    along = 2 if is_round else int(np.argmax(np.abs(offset)))
+    apart, size = np.abs(offset), np.array(body.size)
+    apart[along] -= (size + other.size)[along] / 2
+    unlike = np.delete(size - other.size, along)
+    if isinstance(body, Cylinder) and isinstance(other, Cylinder):
+        unlike = np.append(unlike, body.inner_radius - other.inner_radius)
+    jump = first.polarization_in_rotor - second.polarization_in_rotor
+    if (
+        np.abs([*apart, *unlike]).max() > TOUCHING
+        or np.abs((turn - np.eye(3))[2 if is_round else slice(None)]).max() > SAME
+        or np.linalg.norm(jump) > SAME * np.linalg.norm(first.polarization)
+        or (first.recoil_permeability, first.transverse_permeability)
+        != (second.recoil_permeability, second.transverse_permeability)
+    ):
+        return None
+    size[along] += other.size[along]
+    center = body.center + body.rotation[:, along] * np.sign(offset[along]) * other.size[along] / 2
+    changed = {"height": size[2]} if is_round else {"size": size}
+    return replace(first.magnetic, body=replace(body, center=center, **changed))
 
 
 def cut_magnets(

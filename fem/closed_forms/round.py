@@ -250,7 +250,7 @@ def _segment_kernel(order: int) -> Any:
     outputs = _straight_segment(variables[:3], variables[3:])
     known = dict(zip(entries(2), outputs[3:], strict=True))
     outputs += differentiated(known, variables[:3], order)
-    return hy.cfunc(outputs, variables, fast_math=True)
+    return hy.cfunc(outputs[: order * (order + 2)], variables, fast_math=True)
 
 
 def _straight_segment(position: Sequence[Expression], segment: Sequence[Any]) -> list[Expression]:

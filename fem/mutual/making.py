@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from ...geometry.common import Array, InputError, Watch, unwatched, watched
+from ...geometry.cutting import united
 from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Part, places_off
@@ -19,6 +20,7 @@ from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
 from .response import COARSE, FINE, OF_MANY, OWN, ChargeResponse, enough_degree, two_body
 from .samples import (
+    CHUNK,
     NEAR_GAPS,
     ROTOR_GAPS,
     SPHERE_GAPS,
@@ -119,7 +121,9 @@ OBLIQUE = (
 EACH, EACH_OF_MANY = 16, 6  # places of dipoles for each gap and magnet; of rotors of `MANY` magnets
 # Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
 # many places the rotor's response to the sphere's is
-EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE = 8000, 5.0, 6, 6
+EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
+# Places at each gap of `SPHERE_GAPS` and of `NEAR_GAPS` where the sphere's response is: of one magnet, few, and many
+SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
 INNER = 2  # points along each axis at which magnets beside each other respond beyond their direct response
 
 
@@ -142,8 +146,7 @@ def mutual_table(
     ------
     InputError : a magnet's permeability has other axes than its body, or it is a part from a file
     """
-    started = time.perf_counter()
-    grids = []
+    started, magnets, grids = time.perf_counter(), united(magnets), list[ResponseGrid]()
     for k, magnet in enumerate(magnets):
         if reason := without_response(magnet):
             raise InputError(
@@ -167,17 +170,14 @@ def mutual_table(
         grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, places), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
-        number = 30 if len(magnets) == 1 else 120 // len(magnets)
-        places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, number, 2)])
-        near = (
-            places_around(magnets, floater.radius, NEAR_GAPS, 180 // len(magnets), 3)
-            if len(magnets) > 1
-            else places[:0]
-        )
+        around, beside = SAMPLES[0 if len(magnets) == 1 else 1 if len(magnets) < MANY else 2] // len(magnets)
+        places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, around, 2)])
+        near = places_around(magnets, floater.radius, NEAR_GAPS, beside, 3)
         both = np.concatenate([places, near])
         grids, pairs = sphere_fit(grids, images, both, sphere_samples(rotor, floater, both, watch))
         if rotor.permeable:
-            fewer = np.concatenate([facing, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
+            before = facing[:: FACING if len(magnets) > 1 else 1]
+            fewer = np.concatenate([before, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
             returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
             grids, mixed = returned_fit(grids, inner, images, fewer, returned)
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, floater.polarizability)
@@ -192,7 +192,7 @@ def _counts(magnet: Magnet, radius: float) -> tuple[int, int, int]:
 
 def most_points(magnets: Sequence[Magnet], radius: float) -> int:
     """Largest number of points in one of the `magnets` of a table for a floater of this `radius`, m."""
-    return max(int(np.prod(_counts(magnet, radius))) for magnet in magnets)
+    return max(int(np.prod(_counts(magnet, radius))) for magnet in united(magnets))
 
 
 def without_response(magnet: Magnet) -> str:
@@ -231,10 +231,13 @@ def _rotor_fit(
     whole = (unit_dipole_fields(np.concatenate(inner), places) * size[:, None, None]).reshape(len(size), -1)
     # a lone magnet's points do it alone; the coupling is symmetric, and counted once
     a, b = np.triu_indices(whole.shape[1] if len(grids) > 1 else 0)
-    together = whole[first][:, a] * whole[second][:, b] + (a != b) * whole[first][:, b] * whole[second][:, a]
-    rows = np.concatenate([*columns, together], axis=1) * counts[:, None]
-    direct, beyond = (part[first, second] * size[first] * size[second] * counts for part in (direct, beyond))
+    rows = np.concatenate([*columns, np.empty((len(first), len(a)))], axis=1)
     alone = rows.shape[1] - len(a)
+    for start in range(0, len(rows), CHUNK):  # together they would take a gigabyte
+        one, other = (whole[ends[start : start + CHUNK]] for ends in (first, second))
+        rows[start : start + CHUNK, alone:] = one[:, a] * other[:, b] + (a != b) * one[:, b] * other[:, a]
+    rows *= counts[:, None]
+    direct, beyond = (part[first, second] * size[first] * size[second] * counts for part in (direct, beyond))
     small = np.arange(rows.shape[1]) >= alone
     found = least_squares(rows, beyond, small)
     found[:alone] += least_squares(rows[:, :alone], direct, small[:alone])
@@ -254,7 +257,7 @@ MUTUAL = TableKind("mutual", MutualTable, "Energies of the mutual magnetisation 
 
 def mutual_key(magnets: tuple[Magnet, ...], floater: Floater) -> str:
     """SHA-256 of all that decides a mutual table, and of what computes it."""
-    return MUTUAL.key(*_inputs(tuple(magnet.magnetic for magnet in magnets), floater))
+    return MUTUAL.key(*_inputs(tuple(magnet.magnetic for magnet in united(magnets)), floater))
 
 
 def _inputs(magnets: tuple[Magnet, ...], floater: Floater) -> tuple[tuple[Magnet, ...], float, float, float]:
@@ -273,6 +276,7 @@ def cached_mutual_table(
     magnets, floater, watch : see `mutual_table`
     report : called with a message where the cache is damaged
     """
+    magnets = united(magnets)
     upright = alike(magnets)
     table, found = MUTUAL.cached(_inputs(upright, floater), lambda: mutual_table(upright, floater, watch=watch), report)
     return moved_mutual(table, magnets), found

@@ -7,6 +7,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from ...geometry.common import Watch, unwatched
+from ...geometry.cutting import united
 from ...geometry.magnets import Magnet
 from ..elements.surface import smooth
 from .models import (
@@ -33,7 +34,7 @@ MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
 # Models that know the permeability, and what they are by
 PERMEABLE = {"surface": "charges on the magnets' surfaces", "fem": "finite elements"}
 # Magnets, and accuracy, from which on charges on the surfaces are far quicker than finite elements
-MANY, ROUGH = 4, 1e-5
+MANY, ROUGH = 3, 1e-5
 SURELY = 10  # what permeability does to the moments, by the tolerance, from which on it surely matters
 FEW_MOMENTS = 16  # coefficients per magnet up to which moments are quicker to evaluate than the closed form
 
@@ -58,7 +59,7 @@ def resolve_model(
         return model, "as requested"
     if model != "auto":
         raise ValueError(f"Input model must be one of {', '.join([*MODELS, 'auto'])}; instead received {model!r}.")
-    accuracy = Accuracy(rtol, nearest)
+    rotor, accuracy = united(rotor), Accuracy(rtol, nearest)
     clearance = accuracy.clearance(rotor)
     points, scale = error_points(rotor, clearance)
     where = f"at {clearance * 1e3:.3g} mm from the magnets' faces and beyond, where {rtol:.1e} is asked for"
@@ -116,6 +117,7 @@ def rotor_table(
     if not rotor:
         raise ValueError("Input rotor must hold at least one magnet; instead received none.")
     name, _ = resolve_model(rotor, model, rtol, nearest)
+    rotor = rotor if name == "dipole" else united(rotor)  # each magnet has a dipole of its own
     lone = alike(rotor)
     if name == "surface":
         return surface_table(lone, accuracy, watch).posed(rotor)
@@ -154,6 +156,7 @@ def cached_rotor_table(
     rotor, model, rtol, nearest, watch : as of `rotor_table`
     report : called with a message where the cache is damaged
     """
+    rotor = united(rotor)
     lone = alike(rotor)
     make = partial(rotor_table, lone, model, rtol, nearest, watch)
     table, found = ROTOR.cached((lone, model, rtol, nearest), make, report)

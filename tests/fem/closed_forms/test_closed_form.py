@@ -11,7 +11,7 @@ from spinlev.fem.harmonics.expressions import CompiledField
 from spinlev.fem.rotor.table import RangeError, RotorTable
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.rotor import horizontal, tilt, vertical
-from spinlev.geometry.shapes import Box, rotation_matrix
+from spinlev.geometry.shapes import Box, Cylinder, Sphere, rotation_matrix
 
 ROTORS = {
     "horizontal": horizontal(0.002, 0.01, 1.305, 1.0),
@@ -112,3 +112,14 @@ def test_inside_a_cube_it_is_the_demagnetising_field():
     magnet = Magnet(Box((0.01, 0.01, 0.01)), (1.0, 0.0, 0.0))
     h = CompiledField(UniformField(magnet).expressions)([[0.0, 0.0, 0.0]])[0][0]
     assert h == pytest.approx([-1 / 3, 0.0, 0.0], abs=1e-15)  # a cube's demagnetising factor at its centre
+
+
+@pytest.mark.parametrize(
+    "body", [Box([8e-3, 9e-3, 10e-3]), Cylinder(5e-3, 8e-3), Cylinder(5e-3, 8e-3, inner_radius=2e-3), Sphere(5e-3)]
+)
+def test_the_field_alone_is_that_beside_its_gradient(body):
+    points = np.array([[0.0, 2e-3, 9e-3], [0.011, -3e-3, 1e-3], [0.3, 0.1, 0.2]])
+    formula = UniformField(Magnet(body, [0.3, -0.4, 1.2]))
+    alone, both = formula.derivatives(points, 1), formula.derivatives(points, 2)
+    assert alone == pytest.approx(both[:, :3], rel=1e-13)
+    assert alone == pytest.approx(formula.evaluate(points)[0], rel=1e-9)
