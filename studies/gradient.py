@@ -35,6 +35,7 @@ from ..fem.rotor.models import changed_table, magnified
 from ..fem.rotor.table import RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses
 from ..geometry.common import Array, InputError, shown
+from ..geometry.cutting import united
 from ..geometry.magnets import Magnet
 from ..geometry.scene.contents import Plate, Scene
 from ..geometry.scene.files import changed, scene_numbers, scene_text
@@ -80,6 +81,11 @@ class Gradient:
             raise InputError("Input frequency_hz must be positive for derivatives; instead the rotor is at rest.")
         if self.scene.field_map:
             raise InputError("Input rotor.field_map must be left out for derivatives; instead the field is a map.")
+        if len(united(self.scene.rotor)) < len(self.scene.rotor):  # by what parts them nothing is smooth
+            raise InputError(
+                "Input rotor.magnets must not be parts of one magnet for derivatives; instead some that touch have one "
+                "material and one polarisation. Give them as one."
+            )
         # why derivatives are not known, and what is left out of those that are
         self.reasons: dict[str, str] = {}
         self._end: list[tuple[Equilibrium, _Changed, Implicit, list[Nearby]]] = []

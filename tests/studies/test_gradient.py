@@ -229,6 +229,13 @@ def test_where_nothing_levitates_or_the_rotor_rests_there_is_no_derivative():
         sl.gradient(changed(scene, {"frequency_hz": 0.0}), model="dipole")
 
 
+def test_of_a_magnet_in_two_blocks_there_is_no_derivative():
+    block = {"size_mm": [5.0, 10.0, 10.0], "polarization_T": [1.3, 0.0, 0.0], "recoil_permeability": 1.05}
+    rotor = {"magnets": [block | {"center_mm": [x, 0.0, 0.0]} for x in (-0.5, 4.5)]}
+    with pytest.raises(sl.InputError, match="Give them as one"):
+        sl.gradient(scene(110.0, rotor), model="dipole")
+
+
 def test_at_a_fold_there_are_no_derivatives(monkeypatch):
     """A fold cannot be met to round-off by a frequency in double precision; one that is near counts as met here."""
     scene, _, _ = CASES["displaced"]
