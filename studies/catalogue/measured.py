@@ -390,7 +390,6 @@ def measured_figure(result: xr.Dataset) -> Figure:
     left.plot(result["time"], 1e3 * result["measured_height"], "o", ms=2, color=PALETTE[1], label="measured")
     left.plot(result["time"], 1e3 * result["computed_height"], color=PALETTE[0], lw=0.9, label="computed")
     left.set(xlabel="time (s)", ylabel="height over the windings (mm)")
-    left.legend()
     off = 100 * (result["computed"] / result["measured"] - 1).values
     right.barh(range(len(off)), off, color=PALETTE[0])
     right.set_yticks(range(len(off)), [str(name) for name in result["name"].values], fontsize=6)
