@@ -73,7 +73,10 @@ class Plate:
         return self.lowering.distance if self.lowering else 0.0
 
     def __repr__(self) -> str:
-        text = f"Plate {self.body.described_size} at {millimetres(self.body.center)}, {self.conductivity:.3g} S/m"
+        text = "Plate " + " and ".join(
+            f"{body.described_size} at {millimetres(body.center)}, {metal:.3g} S/m"
+            for body, metal in zip(self.body.placed, self.each or [self.conductivity], strict=True)
+        )
         down = self.lowering
         if down is None:
             return text
