@@ -122,7 +122,7 @@ EACH, EACH_OF_MANY = 16, 6  # places of dipoles for each gap and magnet; of roto
 # Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
 # many places the rotor's response to the sphere's is
 EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
-# Places at each gap of `SPHERE_GAPS` and of `NEAR_GAPS` where the sphere's response is: of one magnet, few, and many
+# Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, two, and more
 SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
 INNER = 2  # points along each axis at which magnets beside each other respond beyond their direct response
 
@@ -170,7 +170,7 @@ def mutual_table(
         grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, places), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
-        around, beside = SAMPLES[0 if len(magnets) == 1 else 1 if len(magnets) < MANY else 2] // len(magnets)
+        around, beside = SAMPLES[min(len(magnets), len(SAMPLES)) - 1] // len(magnets)
         places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, around, 2)])
         near = places_around(magnets, floater.radius, NEAR_GAPS, beside, 3)
         both = np.concatenate([places, near])
@@ -412,9 +412,8 @@ def least_squares(columns: Array, values: Array, small: Array, cost: float = PEN
     """
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
-    scaled = columns / size
     if not small.any():
-        return np.asarray(np.linalg.lstsq(scaled, values, rcond=SMALL)[0] / size)
-    square = scaled.T @ scaled
+        return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
+    square = columns.T @ columns / np.outer(size, size)  # a copy of the columns would take hundreds of megabytes
     square[np.diag_indices_from(square)] += np.where(small, cost, FREE) ** 2
-    return np.asarray(scipy.linalg.solve(square, scaled.T @ values, assume_a="pos") / size)
+    return np.asarray(scipy.linalg.solve(square, columns.T @ values / size, assume_a="pos") / size)
