@@ -14,11 +14,13 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.files import load_scene
-from spinlev.studies.cli.options import Models, default_scene
+from spinlev.studies.cli.options import Models, default_scene, shipped_scene
+from spinlev.studies.gradient import ANSWERS, Gradient
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.page.state import first_state
 from spinlev.studies.page.work import preview
 
+HORIZONTAL = shipped_scene("horizontal")
 PEER = "least squares + magpylib, no stability"
 MODELS = ["dipole", "cuboid", "fem"]
 ONE, ALL, MAP = (
@@ -63,6 +65,18 @@ def test_equilibria(benchmark, model):
     below = [equilibrium for equilibrium in found if equilibrium.position[2] < -0.011]
     benchmark.extra_info["error"] = f"{len(found)} found, {len(below)} below the rotor"
     assert any(equilibrium.stable for equilibrium in found)
+
+
+@pytest.mark.benchmark(group=ALL)
+@pytest.mark.parametrize("model", ["dipole", "cuboid"])
+def test_gradient(benchmark, model):
+    """Derivatives of all these equilibria and their modes by all numbers of the scene file."""
+    levitation = Levitation(HORIZONTAL, Models(model, "none"))
+    gradient, known = Gradient(levitation), levitation.equilibria
+    keys = gradient.checked_keys(None)
+    found = benchmark.pedantic(lambda: gradient.dataset(known, list(ANSWERS), keys), rounds=3, warmup_rounds=1)
+    benchmark.extra_info["error"] = f"by {len(keys)} numbers, of {len(known)}"
+    assert np.isfinite(found.distance).all()
 
 
 @pytest.mark.benchmark(group=ONE)
