@@ -22,6 +22,7 @@ from .plan import SceneLike
 from .result import AXIS, IN_JSON, MODES, variable, write_dataset
 
 DRAWS, SEED = 200, 20250701  # of the check, by default
+FEW_DRAWS = 20  # of commands where a plate's currents act: each takes half a second
 PERCENTILES = (5.0, 95.0)
 CHECKED = 0.2  # Relative difference of the two error bars from which on the first order is said not to do
 
@@ -73,7 +74,10 @@ def error_bars(
                 ("equilibrium", "percentile", *dims), np.array([s[1] for s in some]), unit, label
             )
     if draws:
-        lost = [np.isnan(row[2][0]).mean() for row in rows]
+        known_draws = [np.isfinite(row[1][0]).all() for row in rows]
+        lost = [
+            np.isnan(row[2][0]).mean() if drawn_at else np.nan for drawn_at, row in zip(known_draws, rows, strict=True)
+        ]
         data["lost"] = variable(("equilibrium",), lost, "1", "part of the draws that have no such equilibrium")
     data["tolerance"] = variable(("key",), wide, "as the key", "how far the number may be off")
     return xr.Dataset(
@@ -193,7 +197,8 @@ def uncertainty_job(levitation: Levitation, out: Path) -> Answer:
     tolerances = dict(levitation.scene.tolerances)
     if not tolerances or not levitation.equilibria:
         return {}, []
-    found = error_bars(levitation, tolerances)
+    over_plate = any(one.currents is not None for one in levitation.equilibria)
+    found = error_bars(levitation, tolerances, FEW_DRAWS if over_plate else DRAWS)
     write_dataset(found, out / "uncertainty.nc", levitation.scene)
     rows = []
     for number in range(found.sizes["equilibrium"]):
@@ -208,21 +213,17 @@ def uncertainty_job(levitation: Levitation, out: Path) -> Answer:
                 }
         rows.append(row | {"lost": float(one["lost"])})
     first = found.isel(equilibrium=0)
+    if not np.isfinite(first["distance_error"]):
+        lines = [f"Within the tolerances: not known, as {found.attrs['not_known']}."]
+        return {"uncertainty": rows, "draws": int(found.attrs["draws"])}, lines
     growth = ("growth", "growth rate", 1.0, " s⁻¹")
     shown_as = (("distance", "distance", 1e3, " mm"), ("polar_angle", "polar angle", 1.0, "°"), growth)
     said = [
         f"{words} {scale * float(first[name]):.4g} ± {scale * float(first[f'{name}_error']):.2g}{unit}"
         for name, words, scale, unit in shown_as
     ]
-    largest = (
-        str(first["key"].values[int(np.nanargmax(np.abs(first["distance_share"].values)))])
-        if np.isfinite(first["distance_error"])
-        else ""
-    )
-    lines = [
-        f"Within the tolerances (standard deviations): {', '.join(said)}."
-        + (f" Most of it by {largest}." if largest else "")
-    ]
+    largest = first["key"].values[int(np.argmax(np.abs(first["distance_share"].values)))]
+    lines = [f"Within the tolerances (standard deviations): {', '.join(said)}. Most of it by {largest}."]
     ratio = float(first["distance_drawn_error"] / first["distance_error"])
     lost = float(first["lost"])
     if lost or not abs(ratio - 1) < CHECKED:

@@ -3,16 +3,18 @@
 import json
 import re
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from places import HORIZONTAL
+from places import HORIZONTAL, OVER_PLATE
 
 import spinlev as sl
 from spinlev.geometry.scene.files import changed, scene_text
 from spinlev.studies.cli.main import run
 from spinlev.studies.gradient import Gradient
 from spinlev.studies.levitation import Levitation
+from spinlev.studies.uncertainty import uncertainty_job
 
 FEW = {"model": "dipole", "plate_model": "none"}
 TOLERANCES = {"rotor.edge_mm": 0.05, "frequency_hz": 0.5, "floater.diameter_mm": 0.05}
@@ -101,6 +103,21 @@ def test_a_tolerance_that_cannot_be_is_one_clear_message(number, said):
 def test_bad_requests_are_refused(tolerances, more, said):
     with pytest.raises(sl.InputError, match=said):
         sl.uncertainty(HORIZONTAL, tolerances, **FEW, **more)
+
+
+def test_what_is_not_known_over_a_plate_is_said(tmp_path):
+    """Of a plate's sizes no derivatives are known, hence no error bars; draws of its place are whole motions."""
+    scene = sl.load_scene(OVER_PLATE)
+    for key, known in (("plate.size_mm.2", False), ("plate.center_mm.2", True)):
+        said = replace(scene, tolerances=((key, 0.2),))
+        levitation = Levitation(said, sl.Models("dipole", "slab", plate_rtol=5e-2))
+        values, (line, *more) = uncertainty_job(levitation, tmp_path)
+        assert ("not known, as derivatives by sizes" in line) == (not known)
+        bar = values["uncertainty"][0]["distance_mm"]
+        assert not more
+        assert np.isfinite(bar["error"]) == known
+        if known:
+            assert bar["drawn_error"] == pytest.approx(bar["error"], rel=0.2)  # of 20 draws
 
 
 def test_the_command_line_prints_error_bars(tmp_path):
