@@ -69,11 +69,11 @@ SLOW = ("real air and currents in the floater", "stacked", "sphere as rotor", "t
         "mutual", "currents in the rotor", "cylinder as floater")  # fmt: skip
 # Numbers whose tables are made anew: there differences of whole equilibria are of tables that err by themselves, as
 # finite elements from 6.35 mm off on and from a little less, which differ by 3e-6, losses, by 1e-2, and multipoles
-# of a shape, whose quadrature makes 1e-4 of a derivative by its sizes
+# of a shape, which make 4e-4 of a derivative by its sizes and permeability
 BY_A_FIT = {
     "by charges": ("rotor.displacement_mm", "rotor.edge_mm", "rotor.recoil_permeability"),
     "elements": ("rotor.edge_mm", "rotor.recoil_permeability", "floater.diameter_mm"),
-    "cylinder as floater": ("floater.diameter_mm", "floater.height_mm"),
+    "cylinder as floater": ("floater.diameter_mm", "floater.height_mm", "floater.recoil_permeability"),
     "currents in the rotor": ("rotor.angle_deg", "rotor.edge_mm"),
     "mutual": ("rotor.edge_mm", "rotor.recoil_permeability", "floater.diameter_mm", "floater.recoil_permeability"),
 }
