@@ -21,6 +21,7 @@ from ..fem.rotor.models import of_true_moment
 from ..geometry.common import Array, InputError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
+from ..geometry.solids import Part
 from .cli.console import note, to_json
 from .cli.options import Answer, FieldModel, Models
 from .figures.style import COLORS, NAMES, PALETTE, legend_below, panels, save_figures, styled
@@ -31,6 +32,7 @@ from .words import bracketed, worth_a_row
 
 TRUE_MOMENT, MUTUAL = "dipole, true moment", "{} + mutual"
 BESIDE = 0.1  # of the frequency: how far beyond the ranges of stability the branches are drawn
+PART_RTOL = 1e-4  # a hundredth of what models differ by
 GRID = 41  # frequencies at which they are, where none are asked for
 END = ("low", "high")
 COLUMNS = (
@@ -94,6 +96,11 @@ def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str
         # The dipole's own position error says how wrong its field is, which is what is measured here.
         "difference_error_mm": true.position_error * 1e3 if true else None,
     }
+
+
+def field_rtol(scene: Scene) -> float:
+    """Relative error of the field in a comparison, where none is given; parts would take minutes to that of others."""
+    return PART_RTOL if any(isinstance(magnet.body, Part) for magnet in scene.rotor) else Models.rtol
 
 
 def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compared]:

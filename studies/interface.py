@@ -23,7 +23,6 @@ from .catalogue.entries import CATALOGUE
 from .catalogue.runner import figures_of, question_study
 from .cli.console import missing_extra
 from .cli.options import (
-    COMPARE_RTOL,
     FieldModel,
     InteractionModel,
     Models,
@@ -40,7 +39,7 @@ from .cli.options import (
     unknown_study,
 )
 from .coils import coils_summary, modes_of
-from .compare import compared, compared_dataset
+from .compare import compared, compared_dataset, field_rtol
 from .demagnetising import working_point_dataset
 from .exchange import PLANES, field_map as plane_map
 from .figures.run import scene_figure
@@ -93,7 +92,7 @@ def compare(
     frequencies_hz: Sequence[float] | None = None,
     plate_model: PlateModel = "auto",
     spin: float = 0.0,
-    rtol: float = COMPARE_RTOL,
+    rtol: float | None = None,
     plate_rtol: float = Models.plate_rtol,
     progress: bool | None = None,
 ) -> xr.Dataset:
@@ -131,8 +130,10 @@ def compare(
     grid = None if frequencies_hz is None else np.array(checked_values({name: frequencies_hz})[name])
     if grid is not None and grid.min() <= 0:
         raise InputError(f"Input frequencies_hz must be positive; instead received {grid.min():g}.")
-    requested = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
-    return compared_dataset(compared(given_scene(scene), requested, spin), grid)
+    known = given_scene(scene)
+    found = field_rtol(known) if rtol is None else rtol
+    requested = Models(plate_model=plate_model, rtol=found, plate_rtol=plate_rtol).checked()
+    return compared_dataset(compared(known, requested, spin), grid)
 
 
 @documented

@@ -15,7 +15,6 @@ from cyclopts import Parameter
 from ...geometry.common import InputError
 from .console import note
 from .options import (
-    COMPARE_RTOL,
     Answer,
     FieldModel,
     Flag,
@@ -186,7 +185,7 @@ def compare(
     *,
     frequency_hz: str | None = None,
     plate_model: PlateModel = "auto",
-    rtol: float = COMPARE_RTOL,
+    rtol: float | None = None,
     plate_rtol: float = Models.plate_rtol,
     spin: Spin = 0.0,
     output: Output = Output(),
@@ -203,16 +202,17 @@ def compare(
     plate_model
         none, slab, fem or reduced, or auto, of all field models alike.
     rtol
-        Relative accuracy of the field wherever the floater can be; 1e-3 is enough for a figure.
+        Relative accuracy of the field wherever the floater can be; left out: 3e-6, and 1e-4 for parts of STEP files.
     plate_rtol
         Relative accuracy of the plate's response.
     """
     check_spin("--spin", spin)
     frequencies = None if frequency_hz is None else frequency_grid(frequency_hz)
-    requested = Models(plate_model=plate_model, rtol=rtol, plate_rtol=plate_rtol).checked()
     loaded = _loaded(scene)
-    from ..compare import compare_job
+    from ..compare import compare_job, field_rtol
 
+    found = field_rtol(loaded) if rtol is None else rtol
+    requested = Models(plate_model=plate_model, rtol=found, plate_rtol=plate_rtol).checked()
     return compare_job(loaded, requested, spin, frequencies, output.folder)
 
 

@@ -175,11 +175,6 @@ def shipped_scene(name: str) -> Path:
     return Path(str(files("spinlev.scenes").joinpath(f"{name}.toml")))
 
 
-# Of the field in a comparison of models, which differ by a hundred times as much; a part of a STEP file takes minutes
-# to the tolerance of a trajectory.
-COMPARE_RTOL = 1e-4
-
-
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Models:
