@@ -126,10 +126,10 @@ def coils_figure(result: xr.Dataset) -> Figure:
     time = result["time"].values
     height.plot(time, 1e3 * result["position"].sel(axis="z"), color=PALETTE[0], lw=0.8)
     height.set(xlabel="time (s)", ylabel="height of the centre (mm)")
-    aside = result["position"].sel(axis=["x", "y"])
-    if float(np.ptp(aside.values, axis=0).max()) > 1e-6:
+    across = result["position"].sel(axis=["x", "y"])
+    if float(np.ptp(across.values, axis=0).max()) > 1e-6:
         for name, color in zip("xy", PALETTE[2:], strict=False):
-            height.plot(time, 1e3 * aside.sel(axis=name), color=color, lw=0.8, label=name)
+            height.plot(time, 1e3 * across.sel(axis=name), color=color, lw=0.8, label=name)
         height.lines[0].set_label("z")
         height.set_ylabel("place of the centre (mm)")
     heat.plot(time, result["heat"], color=PALETTE[1], lw=0.8)

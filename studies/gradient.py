@@ -100,7 +100,9 @@ class Gradient:
             if key not in self.numbers:
                 close = difflib.get_close_matches(key, self.numbers, n=1)
                 hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(self.numbers)}"
-                raise InputError(f"Input {name}: {shown(key)} is no number of this scene ({hint})")
+                raise InputError(
+                    f"Input {name} must name numbers of this scene; instead received {shown(key)} ({hint})"
+                )
         if len(set(by)) < len(by):
             raise InputError(f"Input {name} must name each key once; instead received {shown(list(by))}.")
         return list(by)
@@ -387,13 +389,13 @@ class _Changed:
 
     def prepare(self, keys: Sequence[str]) -> None:
         """Differentiate the rotor's share of the plate's signals by keys that move both against each other."""
-        asked = [key for key in keys if _moves_rotor(key)] if self.with_plate else []
+        wanted = [key for key in keys if _moves_rotor(key)] if self.with_plate else []
         memory, requested = self.levitation.plate, self.levitation.requested_plate
         table = self.levitation.table
-        if not asked or memory is None or requested is None or not isinstance(table, RotorTable):
+        if not wanted or memory is None or requested is None or not isinstance(table, RotorTable):
             return
         numbers, others, widths = scene_numbers(self.scene)[1], list[tuple[Plate, RotorTable]](), list[float]()
-        for key in asked:
+        for key in wanted:
             step = 2 * self.step(key, numbers[key])
             try:
                 ends = [changed(self.scene, {key: numbers[key] + sign * step}) for sign in (1, -1)]
@@ -405,7 +407,7 @@ class _Changed:
                 others.append((replace(memory.plate, body=scene.plate.body), changed_table(table, scene.rotor)))
         note("The rotor's share of the plate's currents by what moves both ...")
         found = requested.changed_shares((memory.table, memory.share), others, note)
-        for key, width, above, below in zip(asked, widths, found[::2], found[1::2], strict=True):
+        for key, width, above, below in zip(wanted, widths, found[::2], found[1::2], strict=True):
             self._shares[key] = (above - below) / width
 
     def _ends_of(self, name: str, key: str, base: Any, make: Callable[[Scene], Any]) -> tuple[Any, Any, float]:
@@ -546,7 +548,9 @@ def checked_answers(of: Sequence[str] | None) -> list[str]:
         if name not in known:
             close = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
-            raise InputError(f"Input of: {shown(name)} has no derivatives ({hint})")
+            raise InputError(
+                f"Input of must name answers that have derivatives; instead received {shown(name)} ({hint})"
+            )
     return list(of)
 
 

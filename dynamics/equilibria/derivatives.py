@@ -5,7 +5,7 @@ e^{λτ} v(τ) solves T(λ) v = 0 with the pencil of `orbits.Pencil`, and with i
 
     dλ/dp = -uᴴ (dT/dp) v / uᴴ T_λ v,
 
-where dT is taken along the tangent (x + h dx/dp, p + h), so that it has the shift of the equilibrium in it (A. Andrew,
+where dT is that along the tangent (x + h dx/dp, p + h), so that it has the shift of the equilibrium in it (A. Andrew,
 K.-W. E. Chu and P. Lancaster, SIAM J. Matrix Anal. Appl. 14 (1993) 903).  The plate's states are eliminated from both.
 
 Of p are differenced the equations at a fixed state alone, smooth functions of the step; no equilibrium is sought anew.

@@ -124,7 +124,7 @@ def conserved(states: Array, spin: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Pencil:
-    """T(λ) v = 0 of small motions e^{λτ} v(τ) about a periodic one, v at its n instants; T(0) is the orbit's own slope.
+    """T(λ) v = 0 of small deviations e^{λτ} v(τ) about a periodic one, v at its n instants; T(0) is the orbit's own slope.
 
     The plate's states are eliminated exactly, as from the orbit: their memory M depends on λ.
     """
@@ -176,7 +176,7 @@ class OrbitProblem:
         return residual, pencil.matrix(0.0)
 
     def linear(self, states: Array) -> tuple[Array, Pencil]:
-        """Residual (12 n,), and the equations of small motions about these states (n, 12)."""
+        """Residual (12 n,), and the equations of small deviations about these states (n, 12)."""
         n, change = self.count, differentiation(self.count)
         rates, slopes = self._floater(states)
         residual = change @ states - rates

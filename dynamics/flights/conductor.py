@@ -34,7 +34,7 @@ TOLERANCE = 1e-8  # Of the integration: heights are then right to 1e-13 m
 SMALL = 1e-3  # Height and its rate that absolute errors are relative to, in the height over the coils
 LEAST, FARTHEST = 0.5, 8.0  # Range of heights over the coils that is precomputed, in the one where a motion begins
 RASTER = 1e-4  # Ends of that range are multiples of this, m, so that motions that begin alike share it
-ASIDE = 4.0  # Of one that moves freely, how far aside of its start, in the height over the coils where it begins
+SIDEWAYS = 4.0  # Of one that moves freely, how far aside of its start, in the height over the coils where it begins
 
 
 def sources_of(coils: Sequence[Coil]) -> list[list[int]]:
@@ -126,8 +126,8 @@ def on_axis(scene: Scene) -> bool:
     start = scene.start
     assert isinstance(start, AbsoluteStart)
     axes = np.array([*(coil.center[:2] for coil in scene.coils), start.position[:2]])
-    aside = [np.ptp(axes, axis=0), scene.gravity[:2], start.velocity[:2], start.spin]
-    still = all(float(np.abs(part).max()) <= 1e-9 for part in aside)
+    across = [np.ptp(axes, axis=0), scene.gravity[:2], start.velocity[:2], start.spin]
+    still = all(float(np.abs(part).max()) <= 1e-9 for part in across)
     return still and start.moment[2] > 1 - 1e-12 and {0, 1} <= set(scene.floater.bodies[0].mirrors)
 
 
@@ -273,9 +273,9 @@ def room_over(scene: Scene) -> Room:
     assert isinstance(start, AbsoluteStart)
     top = max(coil.center[2] + coil.height / 2 for coil in scene.coils)
     gap = (high - low) / (FARTHEST - LEAST)
-    aside = np.ceil(ASIDE * gap / RASTER) * RASTER
+    sideways = np.ceil(SIDEWAYS * gap / RASTER) * RASTER
     corner = np.floor(start.position[:2] / RASTER) * RASTER
-    box = np.array([*(corner - aside), low]), np.array([*(corner + aside), high])
+    box = np.array([*(corner - sideways), low]), np.array([*(corner + sideways), high])
     return box, float(np.floor((top + LEAST * gap) / RASTER) * RASTER)
 
 

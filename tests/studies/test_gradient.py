@@ -206,7 +206,7 @@ def test_gradient_is_labelled_and_lazy_users_get_all():
     ("asked", "said"),
     [
         ({"by": ["rotor.edge"]}, "did you mean `rotor.edge_mm`"),
-        ({"by": ["rotor.configuration"]}, "is no number of this scene"),
+        ({"by": ["rotor.configuration"]}, "must name numbers of this scene"),
         ({"by": []}, "must be a list of keys"),
         ({"by": "frequency_hz"}, "must be a list of keys"),
         ({"by": ["frequency_hz", "frequency_hz"]}, "each key once"),

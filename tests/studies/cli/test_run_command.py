@@ -111,7 +111,7 @@ def test_a_quick_run_is_coarser_and_says_so(spinlev, monkeypatch, tmp_path):
     """What is asked for coarser still, or by name, stays as it is asked for."""
     seen = []
 
-    def job(scene, asked, spin, duration, out):
+    def job(scene, asked, spin, duration, out, gradient):
         seen.append(asked)
         return {}, ["the answer"]
 
