@@ -124,7 +124,7 @@ def conserved(states: Array, spin: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Pencil:
-    """T(λ) v = 0 of small deviations e^{λτ} v(τ) about a periodic one, v at its n instants; T(0) is the orbit's own slope.
+    """T(λ) v = 0 of small deviations e^{λτ} v(τ) about a periodic one, v at n instants; T(0) is the orbit's own slope.
 
     The plate's states are eliminated exactly, as from the orbit: their memory M depends on λ.
     """
