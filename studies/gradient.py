@@ -8,7 +8,7 @@ by `dynamics.equilibria.derivatives`.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -92,20 +92,7 @@ class Gradient:
 
     def checked_keys(self, by: Sequence[str] | None, name: str = "by") -> list[str]:
         """The keys asked for, all of the scene's where none are. Raises InputError for one that is no number of it."""
-        if by is None:
-            return list(self.numbers)
-        if isinstance(by, str) or not by or not all(isinstance(key, str) for key in by):
-            raise InputError(f"Input {name} must be a list of keys of the scene file; instead received {shown(by)}.")
-        for key in by:
-            if key not in self.numbers:
-                close = difflib.get_close_matches(key, self.numbers, n=1)
-                hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(self.numbers)}"
-                raise InputError(
-                    f"Input {name} must name numbers of this scene; instead received {shown(key)} ({hint})"
-                )
-        if len(set(by)) < len(by):
-            raise InputError(f"Input {name} must name each key once; instead received {shown(list(by))}.")
-        return list(by)
+        return list(self.numbers) if by is None else _checked(name, by, self.numbers, "keys of numbers in this scene")
 
     def ways(self, known: Equilibrium, keys: Sequence[str]) -> tuple[dict[str, Tangent], Implicit | None, _Changed]:
         """The way of one equilibrium by each key, with its equations and those of scenes nearby.
@@ -539,19 +526,21 @@ def gradient(
 
 def checked_answers(of: Sequence[str] | None) -> list[str]:
     """The answers asked for, or all of an equilibrium. Raises InputError for one that has no derivatives."""
-    known = [*ANSWERS, *ENDS]
-    if of is None:
-        return list(ANSWERS)
-    if isinstance(of, str) or not of or not all(isinstance(name, str) for name in of):
-        raise InputError(f"Input of must be a list of answers; instead received {shown(of)}.")
-    for name in of:
-        if name not in known:
-            close = difflib.get_close_matches(name, known, n=1)
+    return list(ANSWERS) if of is None else _checked("of", of, [*ANSWERS, *ENDS], "answers that have derivatives")
+
+
+def _checked(name: str, given: Sequence[str], known: Collection[str], what: str) -> list[str]:
+    """The names `given` as an argument; InputError unless each is `known`, which all are `what`."""
+    if isinstance(given, str) or not given or not all(isinstance(one, str) for one in given):
+        raise InputError(f"Input {name} must be a list of {what}; instead received {shown(given)}.")
+    for one in given:
+        if one not in known:
+            close = difflib.get_close_matches(one, known, n=1)
             hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
-            raise InputError(
-                f"Input of must name answers that have derivatives; instead received {shown(name)} ({hint})"
-            )
-    return list(of)
+            raise InputError(f"Input {name} must name {what}; instead received {shown(one)} ({hint})")
+    if len(set(given)) < len(given):
+        raise InputError(f"Input {name} must name each once; instead received {shown(list(given))}.")
+    return list(given)
 
 
 def gradient_job(levitation: Levitation, out: Path) -> Answer:

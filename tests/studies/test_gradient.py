@@ -206,10 +206,10 @@ def test_gradient_is_labelled_and_lazy_users_get_all():
     ("asked", "said"),
     [
         ({"by": ["rotor.edge"]}, "did you mean `rotor.edge_mm`"),
-        ({"by": ["rotor.configuration"]}, "must name numbers of this scene"),
+        ({"by": ["rotor.configuration"]}, "must name keys of numbers in this scene"),
         ({"by": []}, "must be a list of keys"),
         ({"by": "frequency_hz"}, "must be a list of keys"),
-        ({"by": ["frequency_hz", "frequency_hz"]}, "each key once"),
+        ({"by": ["frequency_hz", "frequency_hz"]}, "each once"),
         ({"of": ["distanse"]}, "did you mean `distance`"),
         ({"of": "distance"}, "must be a list of answers"),
         ({"model": "circle"}, "Input model must be one of"),

@@ -95,7 +95,7 @@ def test_a_tolerance_that_cannot_be_is_one_clear_message(number, said):
         ({"rotor.edge": 0.1}, {}, "did you mean `rotor.edge_mm`"),
         ({"rotor.edge_mm": -0.1}, {}, "must be a positive number"),
         ({"rotor.edge_mm": "a"}, {}, "must be a positive number"),
-        ({"rotor.configuration": 0.1}, {}, "must name numbers of this scene"),
+        ({"rotor.configuration": 0.1}, {}, "must name keys of numbers in this scene"),
         (TOLERANCES, {"draws": -1}, "draws must be a number"),
         (TOLERANCES, {"draws": 2.5}, "draws must be a number"),
     ],
