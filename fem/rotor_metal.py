@@ -276,6 +276,23 @@ class RotorLosses:
         return f"RotorLosses: {size}, error {self.errors[0]:.1e} in contact, {self.errors[-1]:.1e} far off"
 
 
+@dataclass(frozen=True, eq=False)
+class MovedLosses:
+    """Losses in a lone magnet that was moved, turned and magnified: patterns fall as the root of the size."""
+
+    table: RotorLosses
+    before: Magnet
+    after: Magnet
+    size: float
+
+    def fields(self, places: Array) -> tuple[Array, Array]:
+        """See `RotorLosses`."""
+        turn = self.after.body.rotation @ self.before.body.rotation.T
+        there = self.before.body.center + (places - self.after.body.center) @ turn / self.size
+        fields, slopes = self.table.fields(there)
+        return fields @ turn.T / self.size**0.5, turn @ slopes @ turn.T / self.size**1.5
+
+
 LOSSES = TableKind("rotor-losses", RotorLosses, "Dissipation in a rotor's metal: power Σ (d/dt m·c)²")
 
 

@@ -30,13 +30,12 @@ from ..dynamics.motion.plate import PlateForce, PlateMemory
 from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..dynamics.motion.state import Scales
 from ..fem.mutual.making import moved_mutual, mutual_table_beside
-from ..fem.mutual.table import MutualTable
+from ..fem.mutual.table import MutualTable, StrongerMutual
 from ..fem.rotor.models import changed_table, magnified
 from ..fem.rotor.table import RotorTable
-from ..fem.rotor_metal import RotorLosses, cached_rotor_losses
+from ..fem.rotor_metal import MovedLosses, RotorLosses, cached_rotor_losses
 from ..geometry.common import Array, InputError, shown
 from ..geometry.cutting import united
-from ..geometry.magnets import Magnet
 from ..geometry.scene.contents import Plate, Scene
 from ..geometry.scene.files import changed, scene_numbers, scene_text
 from ..geometry.scene.messages import SceneError
@@ -331,7 +330,7 @@ class _Changed:
                 "mutual", key, table, lambda there: mutual_table_beside(table, there.rotor, there.floater.ball, note)
             )
             found = _Line(found, *ends[:2], offset / ends[2])
-        return found if strong == 1.0 else _Stronger(found, strong)
+        return found if strong == 1.0 else StrongerMutual(found, strong)
 
     def _losses(self, losses: RotorLosses, scene: Scene, offsets: Mapping[str, float]) -> Any:
         before, after = self.scene.rotor, scene.rotor
@@ -342,7 +341,7 @@ class _Changed:
             ratio = float(after[0].conductivity / before[0].conductivity)  # type: ignore[operator]
             found = replace(losses, weights=losses.weights * np.sqrt(ratio))
         if lone:
-            return _MovedLosses(found, before[0], after[0], lone[0])
+            return MovedLosses(found, before[0], after[0], lone[0])
         for key, offset in offsets.items():
             if key.startswith("rotor.") and not key.endswith(
                 ("remanence_T", "recoil_permeability", "rotor.conductivity_S_m")
@@ -436,42 +435,6 @@ class _Line:
         """See `RotorCurrents`."""
         base, first, last = (RotorCurrents(table).entries(places) for table in (self.base, self.first, self.last))
         return base + self.share * (last - first)
-
-
-@dataclass(frozen=True, eq=False)
-class _Stronger:
-    """A mutual table of a rotor that is polarised more: u is quadratic in that, V linear, and H does not know it."""
-
-    base: Any
-    strong: float
-
-    @property
-    def polarizability(self) -> float:
-        return float(self.base.polarizability)
-
-    def derivatives(self, places: Array, moments: Array) -> tuple[Array, ...]:
-        """See `MutualTable`: the energy of M by J times s is s² that of M/s by J."""
-        energy, slope, second = self.base.derivatives(places, moments / self.strong)
-        units = np.repeat([1.0, 1 / self.strong], 3)
-        square = self.strong**2
-        return square * energy, square * slope * units, square * second * np.outer(units, units)
-
-
-@dataclass(frozen=True, eq=False)
-class _MovedLosses:
-    """Losses in a lone magnet that was moved, turned and magnified: patterns fall as the root of the size."""
-
-    table: RotorLosses
-    before: Magnet
-    after: Magnet
-    size: float
-
-    def fields(self, places: Array) -> tuple[Array, Array]:
-        """See `RotorLosses`."""
-        turn = self.after.body.rotation @ self.before.body.rotation.T
-        there = self.before.body.center + (places - self.after.body.center) @ turn / self.size
-        fields, slopes = self.table.fields(there)
-        return fields @ turn.T / self.size**0.5, turn @ slopes @ turn.T / self.size**1.5
 
 
 @documented

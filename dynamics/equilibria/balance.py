@@ -83,7 +83,7 @@ def place_error(
     pull = inertia * length
     unsure = np.abs(residual) + torque * np.array([pull * doubt[1]] * 3 + [doubt[0]] * len(directions))
     error = float(np.linalg.norm((np.abs(inverse) @ unsure)[:3]))
-    # What a model leaves out moves the place in a known direction: taken by sizes alone it would be 3 mm for 0.1.
+    # What a model leaves out moves the place in a known direction, and several causes may cancel; their sizes never do.
     left_out = doubt[2:].reshape(-1, 4, 3)
     forces, torques = pull * (left_out[:, 1:] @ moment), np.cross(moment, left_out[:, 0]) @ directions.T
     moved = (torque * np.concatenate([forces, torques], axis=1) @ inverse.T)[:, :3]

@@ -437,6 +437,25 @@ class MutualTable:
         return f"MutualTable: {points} points in {len(self.grids)} magnets; relative error {errors} from contact"
 
 
+@dataclass(frozen=True, eq=False)
+class StrongerMutual:
+    """A mutual table of a rotor that is polarised more: u is quadratic in that, V linear, and H does not know it."""
+
+    base: Any  # a `MutualTable`, or one between others
+    strong: float
+
+    @property
+    def polarizability(self) -> float:
+        return float(self.base.polarizability)
+
+    def derivatives(self, places: Array, moments: Array) -> tuple[Array, ...]:
+        """See `MutualTable`: the energy of M by J times s is s² that of M/s by J."""
+        energy, slope, second = self.base.derivatives(places, moments / self.strong)
+        units = np.repeat([1.0, 1 / self.strong], 3)
+        square = self.strong**2
+        return square * energy, square * slope * units, square * second * np.outer(units, units)
+
+
 def pair_sum(first: ResponseGrid, second: ResponseGrid, images: Array, weight: float = 1.0) -> EnergySum:
     """Minus `weight` (J) times the energy of the sphere by what the charges of `first` and `second` do in it together.
 

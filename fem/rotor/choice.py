@@ -117,13 +117,18 @@ def rotor_table(
     if not rotor:
         raise ValueError("Input rotor must hold at least one magnet; instead received none.")
     name, _ = resolve_model(rotor, model, rtol, nearest)
-    rotor = rotor if name == "dipole" else united(rotor)  # each magnet has a dipole of its own
+    rotor = _bodies(rotor, name)
     lone = alike(rotor)
     if name == "surface":
         return surface_table(lone, accuracy, watch).posed(rotor)
     if name == "fem":
         return fem_table(lone, accuracy, watch=watch).posed(rotor)
     return _simple_table(_Requested(ROTOR.key(lone, name, rtol, nearest), lone), name, accuracy).posed(rotor)
+
+
+def _bodies(rotor: tuple[Magnet, ...], model: str) -> tuple[Magnet, ...]:
+    """The magnets of a model's table: each has a dipole of its own, else those that are one are one."""
+    return rotor if model == "dipole" else united(rotor)
 
 
 @dataclass(frozen=True)
@@ -156,7 +161,7 @@ def cached_rotor_table(
     rotor, model, rtol, nearest, watch : as of `rotor_table`
     report : called with a message where the cache is damaged
     """
-    rotor = united(rotor)
+    rotor = _bodies(rotor, model)
     lone = alike(rotor)
     make = partial(rotor_table, lone, model, rtol, nearest, watch)
     table, found = ROTOR.cached((lone, model, rtol, nearest), make, report)

@@ -348,6 +348,7 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
 
 
 def hard_case_lines(result: xr.Dataset) -> list[str]:
+    """The report of `field-hard-cases`, a line a case."""
     keys, rows = tuple(LINES)[1::-1] + tuple(LINES)[2:], []
     for name in result["case"].values:
         row = result.sel(case=name)

@@ -358,6 +358,7 @@ def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, sta
 
 
 def in_the_horizontal_scene(quick: bool) -> xr.Dataset:
+    """`floater_permeability` in the scene `horizontal`."""
     return floater_permeability(load_scene(shipped_scene("horizontal")), quick=quick)
 
 
@@ -395,6 +396,7 @@ def floater_figure(result: xr.Dataset) -> Figure:
 
 
 def floater_lines(result: xr.Dataset) -> list[str]:
+    """The report of `floater-permeability`."""
     reach = 1e3 * result["sufficient_from"]
     rows = [(f"{100 * float(k):g} %", *reach.sel(level=k, quantity=["force", "torque"]).values) for k in reach["level"]]
     lines = showing.text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)

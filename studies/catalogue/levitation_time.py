@@ -260,6 +260,7 @@ def _rotors(result: xr.Dataset) -> dict[str, xr.Dataset]:
 
 
 def time_lines(result: xr.Dataset) -> list[str]:
+    """The report of `levitation-time`."""
     rows = []
     for case in result["case"].values.tolist():
         for variant in ("nominal", "permeable", "complete"):

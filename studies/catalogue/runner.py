@@ -172,6 +172,7 @@ def failed_points(result: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def failure_lines(result: xr.Dataset) -> list[str]:
+    """Which points failed, and why."""
     return [f"No value at {json.dumps(f['point'], ensure_ascii=False)}: {f['reason']}" for f in failed_points(result)]
 
 

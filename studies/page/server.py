@@ -267,7 +267,7 @@ class _Line(_Answer, WebSocketHandler):
         given = self.request.arguments.items()
         asked = {key: values[-1].decode(errors="replace") for key, values in given if key != "token" and values}
         self.page = Page(self._tell, self.application.begin)
-        opened.add(self.page)  # before it tells anything: who hears it finds it here
+        opened.add(self.page)  # before it tells anything, so that a reader's answer finds it
         self.page.begin(self.application.preview, asked)
 
     def on_message(self, message: str | bytes) -> None:

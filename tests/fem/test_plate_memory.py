@@ -73,7 +73,7 @@ def spinning(omega, angle):
     )
 
 
-def test_energy_ledger_closes_in_a_motion_that_spins_bounces_and_lowers(table):
+def test_energy_balance_closes_in_a_motion_that_spins_bounces_and_lowers(table):
     """Work on the dipole + stored + dissipated = 0 to 1e-10 of what is dissipated, in the frame of the plate."""
     omega, bounce = 2 * np.pi * 100, 2 * np.pi * 9
     moment = spinning(omega, 0.2)
@@ -160,7 +160,7 @@ def test_finite_elements_step_by_step_have_the_same_memory():
         assert difference.max() < 0.01 * size.max()
 
 
-def test_ledger_with_the_rotor_closes(made):
+def test_energy_balance_with_the_rotor_closes(made):
     """Rotor turns, floater spins and bounces, plate goes down: three works, energy and loss cancel to 1e-10."""
     table, share = made
     n, omega, slope = len(table.rates), 2 * np.pi * 100, 0.02

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.mutual.making import mutual_key
-from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.geometry.cutting import cut_magnets, united
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.scene.floater import Floater
@@ -70,5 +70,6 @@ def test_a_magnet_in_blocks_has_the_tables_of_the_whole_and_dipoles_of_its_own()
     for model in ("cuboid", "fem", "surface"):
         found, true = (rotor_table(rotor, model).evaluate(places)[0] for rotor in (pieces, (WHOLE,)))
         assert found == pytest.approx(true, abs=1e-12 * np.abs(true).max())
-    assert len(rotor_table(pieces, "dipole").expansions) == len(pieces)
+    for table in (rotor_table(pieces, "dipole"), cached_rotor_table(pieces, "dipole", 1e-5, print)[0]):
+        assert len(table.expansions) == len(pieces)
     assert mutual_key(pieces, floater) == mutual_key(united(pieces), floater)

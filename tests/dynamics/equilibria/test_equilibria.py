@@ -352,7 +352,7 @@ def test_the_same_of_random_rotors(number):
 
 @pytest.mark.slow
 def test_the_same_of_a_floating_cube():
-    """Locked and mean over its turns; by sizes alone, whatever their directions, it was up to 40 times too large."""
+    """Locked and mean over its turns."""
     cube = Floater(Box((0.011,) * 3).circumradius, 1.305, 1.0, 7500.0, None, Box((0.011,) * 3))
     magnets = tuple(replace(magnet, recoil_permeability=1.0) for magnet in ROTORS["tilt 10"])
     ratios = stated_by_true(magnets, 130.0, cube, "dipole", rotor_table(magnets, "cuboid"), 17e-3)
