@@ -49,6 +49,7 @@ from .plan import SceneLike, given_scene
 from .processes import mapped
 from .question import Question
 from .result import AXIS, Result, found_dataset, state_columns, variable
+from .several import several, several_dataset
 from .starts import drawn_starts, given_starts
 from .study import Point, Study
 from .sweep import forget, swept
@@ -186,8 +187,9 @@ def simulate(
     Returns
     -------
     xarray.Dataset
-        Over `time`, SI units; how it ended and the violation of the energy balance are attributes. With a drive also
-        the frequency, torque, power and work of the motor, and the equilibria at steady frequencies.
+        Over `time`, SI units, of several floaters over `floater`, too; how it ended and the violation of the energy
+        balance are attributes. With a drive also the frequency, torque, power and work of the motor, and the
+        equilibria at steady frequencies.
 
     Raises
     ------
@@ -198,7 +200,11 @@ def simulate(
     if given.coils:
         modes, _ = modes_of(given, requested.get("plate_rtol", 1e-3))
         return coils_summary(given, duration_s, modes)[0].assign_attrs(scene=scene_text(given))
-    levitation = Levitation(given if drive is None else driven(given, drive), Models(model, plate_model, **requested))
+    given = given if drive is None else driven(given, drive)
+    if given.companions:
+        together = several(given, Models(model, plate_model, **requested).checked(), duration_s)
+        return several_dataset(*together).assign_attrs(scene=scene_text(given))
+    levitation = Levitation(given, Models(model, plate_model, **requested))
     simulated = Result(levitation, flight=levitation.flight(duration_s)).dataset()
     return simulated.assign_attrs(scene=scene_text(levitation.scene))
 

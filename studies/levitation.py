@@ -86,6 +86,11 @@ class Levitation:
                 "Input scene must have no coils here; instead it has. Coils carry a conductor along their axis: "
                 "spinlev simulate computes that, and nothing else yet."
             )
+        if self.scene.companions:
+            raise InputError(
+                "Input floater must be one here; instead the scene has several, of which spinlev simulate computes the "
+                "trajectories and nothing else."
+            )
         self.still = replace(self.scene, drive=()) if self.scene.drive else self.scene
         """The scene with a rotor that keeps its first frequency, of which the equilibria are."""
         self.models = models.checked()

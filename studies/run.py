@@ -43,6 +43,7 @@ from .gradient import gradient_job
 from .levitation import Levitation
 from .plan import check_drive, sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
+from .several import several_job
 from .uncertainty import uncertainty_job
 from .words import flight_words, headline, left_out_words, note_details
 
@@ -221,6 +222,8 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
         checkpoint.remove()
     elif checkpoint.read() is None:
         note(f"No checkpoint in {out}: the trajectory begins at t = 0.")
+    if scene.companions:
+        return several_job(scene, requested, duration, out, checkpoint)
     check_drive(scene, duration)
     levitation = Levitation(scene, requested)
     if isinstance(scene.start, OffsetStart):

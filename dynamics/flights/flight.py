@@ -93,6 +93,7 @@ class Flight:
     compact : compile loops instead of straight code: sooner ready, up to twice as slow; None to choose
     memory : the plate's currents, if they are modelled; else the plate is only an obstacle
     in_balls : whether the rotor's field is expanded in balls about the floater; None: where its expressions are long
+    scales : units of the states; None: those of the scene
     """
 
     def __init__(
@@ -104,8 +105,9 @@ class Flight:
         compact: bool | None = None,
         memory: PlateMemory | None = None,
         in_balls: bool | None = None,
+        scales: Scales | None = None,
     ) -> None:
-        self.scene, self.memory, self.scales = scene, memory, Scales.of(scene)
+        self.scene, self.memory, self.scales = scene, memory, scales or Scales.of(scene)
         self.whole, self.tilted = with_effects(scene, table), bool(np.any(scene.gravity[:2]))
         self.balls = Balls(scene, self.whole) if (is_long(table) if in_balls is None else in_balls) else None
         self.first = self.balls.end if self.balls else len(Parameter)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -157,6 +157,15 @@ class OffsetStart:
     offset: Array = field(default_factory=lambda: frozen_array((0.0, 0.0, 1e-4), (3,)))
 
 
+@dataclass(frozen=True, eq=False)
+class Companion:
+    """A further floater beside the first, with its drag and where it begins."""
+
+    floater: Floater
+    drag: Drag
+    start: OffsetStart | AbsoluteStart
+
+
 @dataclass(frozen=True)
 class MapReading:
     """Reading of a map of the field where its file does not tell."""
@@ -189,6 +198,7 @@ class Scene:
     parts : the solids of the STEP files that its keys name, in canonical pose, also of those computed as another shape
     drive : what the rotor's frequency does in time, step by step; after the last it stays
     coils : that drive currents in the conductors
+    companions : further floaters beside the first, to which floater, drag and start belong
     keys : the tables of a scene file that it was made of, and the scene that they made: what of that was not replaced
         since is as they say. None of a scene that was put together from its parts
     tolerances : by dotted key of the scene file, in its units: how far its number may be off, either way
@@ -209,6 +219,7 @@ class Scene:
     parts: tuple[Part, ...] = field(default=(), compare=False)
     drive: tuple[DriveStep, ...] = ()
     coils: tuple[Coil, ...] = ()
+    companions: tuple[Companion, ...] = ()
     keys: tuple[Mapping[str, Any], Scene] | None = field(default=None, compare=False, repr=False)
     tolerances: tuple[tuple[str, float], ...] = field(default=(), compare=False)
 
@@ -216,6 +227,13 @@ class Scene:
     def angular_velocity(self) -> float:
         """ω = 2π frequency, rad/s; with a drive at t = 0."""
         return 2 * np.pi * self.frequency
+
+    @property
+    def each(self) -> tuple[Scene, ...]:
+        """The scene of each floater alone."""
+        first = replace(self, companions=()) if self.companions else self
+        alone = (replace(first, floater=c.floater, drag=c.drag, start=c.start) for c in self.companions)
+        return first, *alone
 
     @property
     def fastest(self) -> float:
@@ -256,7 +274,7 @@ class Scene:
         lines = [f"Scene at {self._frequencies}, gravity ({listed(self.gravity)}) m/s², {air}"]
         lines += [f"  {body!r}" for body in (*self.rotor, *self.conductors)]
         lines += [f"  Field from {self.field_map}"] if self.field_map else []
-        lines += [f"  {body!r}" for body in (self.floater, self.plate) if body]
+        lines += [f"  {body!r}" for body in (self.floater, *(c.floater for c in self.companions), self.plate) if body]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -327,7 +327,8 @@ def scene_numbers(scene: Scene) -> tuple[Scene, dict[str, float]]:
     """The scene with gravity and recoil permeabilities written out, and the numbers of its equilibria by dotted key."""
     keys = {"gravity_m_s2": [0.0, 0.0, -9.81]} | scene_keys(scene)
     rotor, floater = keys["rotor"], keys["floater"]
-    for table in rotor.get("magnets", [rotor]) + floater.get("magnets", [floater]):
+    floaters = floater if isinstance(floater, list) else [floater]
+    for table in rotor.get("magnets", [rotor]) + [m for one in floaters for m in one.get("magnets", [one])]:
         table.setdefault("recoil_permeability", schema.RECOIL_PERMEABILITY)
     found = dict(_flattened(keys))
     whole = replace(assemble(keys, "scene", Path()), tolerances=scene.tolerances)
@@ -409,6 +410,11 @@ def _magnet(magnet: Magnet) -> dict[str, Any]:
     keys = {**shape_keys(magnet.body), **pose_keys(magnet.body), **_said(schema.MagnetTable, magnet)}
     both = [magnet.recoil_permeability, magnet.transverse_permeability]
     return keys if magnet.isotropic else keys | {"recoil_permeability": both}
+
+
+def _of_each(write: Callable[[Scene], Any]) -> Callable[[Scene], Any]:
+    """What `write` makes of a scene, of one with several floaters a list with that of each."""
+    return lambda scene: [write(one) for one in scene.each] if scene.companions else write(scene)
 
 
 def _floater(scene: Scene) -> dict[str, Any]:
@@ -495,10 +501,10 @@ FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
 } | {
     "frequency_hz": (("frequency",), lambda scene: float(scene.frequency)),
     "rotor": (("rotor", "conductors", "field_map", "map_reading"), _rotor),
-    "floater": (("floater",), _floater),
+    "floater": (("floater", "companions"), _of_each(_floater)),
     "plate": (("plate",), _plate),
     "drag": (("drag", "floater"), _drag),
-    "start": (("start",), _start),
+    "start": (("start", "companions"), _of_each(_start)),
     "coils": (("coils",), _coils),
     "drive": (("drive",), _drive),
 }

@@ -15,8 +15,8 @@ from ..common import InputError, shown, spelled
 from ..files import regular_file
 from ..step_file import read_part
 from .contents import Scene
-from .messages import SceneError, described_faults, overlap_faults
-from .schema import ExplicitRotor, SceneTable, key_faults
+from .messages import SceneError, described_faults, key_faults, overlap_faults
+from .schema import FLOATER, ExplicitRotor, SceneTable
 
 LARGEST = 2**30  # Bytes of a file that a scene may name
 MAP = "rotor", -1  # the number of the map of the rotor's field among the files
@@ -70,9 +70,11 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     if field_map:
         own["rotor"]["field_map"] = str(field_map)
     for (owner, k), path in of_bodies.items():
-        of_owner = own[owner]
+        floater = FLOATER.fullmatch(owner)
+        of_owner = own["floater"] if floater else own[owner]
+        of_owner = of_owner[int(floater[1])] if floater and floater[1] else of_owner
         if k >= 0 and owner != "plate":
-            of_owner = of_owner.get("magnets", []) + (of_owner.get("bodies", []) if owner == "floater" else [])
+            of_owner = of_owner.get("magnets", []) + (of_owner.get("bodies", []) if floater else [])
         (of_owner if k < 0 else of_owner[k])["file"] = str(path)
     scene = replace(
         scene, files=tuple(files.items()), parts=tuple(parts.values()), tolerances=tuple(tolerances.items())
@@ -141,7 +143,7 @@ def _named_files(table: SceneTable, folder: Path, known: Scene | None) -> dict[t
     names |= {("plate", k): plate.file for k, plate in table.plates}
     if isinstance(rotor, ExplicitRotor):
         names |= {("rotor", k): magnet.file for k, magnet in enumerate(rotor.magnets)}
-    names |= {("floater", k): name for k, name in table.floater.named.items()}
+    names |= {(owner, k): name for owner, floater in table.floaters.items() for k, name in floater.named.items()}
     found = {key: folder / name for key, name in names.items() if name}
     for key, path in found.items() if known else ():
         assert known is not None

@@ -11,6 +11,7 @@ from pydantic_core import ErrorDetails
 
 from ..common import InputError, printable, shown
 from ..overlap import TOUCHING, apart, body_overlap, deepest_overlap_in_a_turn
+from ..solids import Solid
 from . import schema
 from .contents import AbsoluteStart, Scene
 from .schema import ExplicitRotor
@@ -56,6 +57,11 @@ RULES = {
     "model_type": "a table",
     "model_attributes_type": "a table",
 }
+
+
+# Tables of several kinds, and what pydantic calls the kind in the place of a fault.
+TAGGED = "rotor", "plate", "floater", "start"
+TAGS = "horizontal", "vertical", "tilt", "magnets", "one", "several"
 
 
 class SceneError(InputError):
@@ -118,8 +124,8 @@ def described_faults(details: Sequence[ErrorDetails]) -> list[str]:
 
 def _described(detail: ErrorDetails) -> str:
     place, kind, received = list(detail["loc"]), detail["type"], detail["input"]
-    if place[0] in ("rotor", "plate") and len(place) > 2:
-        del place[1]  # the tag of its kind
+    if place[0] in TAGGED and len(place) > 1 and place[1] in TAGS:
+        del place[1]
     key = "".join(f"[{p}]" if isinstance(p, int) else f".{_named(p)}" for p in place).removeprefix(".")
     if kind == "extra_forbidden":
         close = _close(detail["loc"])
@@ -159,8 +165,10 @@ def _allowed(place: Sequence[Any]) -> list[str]:
         return list(ExplicitRotor.model_fields)
     if place[0] == "plate":
         return list(TABLES["lowering" if "lowering" in place[1:-1] else "plate"].model_fields)
-    if len(place) == 4 and place[:2] == ("floater", "magnets"):
-        return list(TABLES["floater.magnets"].model_fields)
+    if place[0] in ("floater", "start"):
+        place = [p for p in place if p not in ("one", "several")]
+        if "magnets" in place[:-1]:
+            return list(TABLES["floater.magnets"].model_fields)
     return list(TABLES[next((p for p in reversed(place[:-1]) if isinstance(p, str)), "")].model_fields)
 
 
@@ -169,13 +177,189 @@ def _close(place: Sequence[Any]) -> list[str]:
     return difflib.get_close_matches(str(place[-1])[:LONGEST], _allowed(place), n=1)
 
 
+def key_faults(table: schema.SceneTable) -> list[str]:
+    """One sentence for each rule between keys that is broken."""
+    rotor, faults = table.rotor, []
+    for k, start in enumerate(table.starts):
+        faults += _start_faults(f"start[{k}]" if isinstance(table.start, list) else "start", start)
+    if drag := table.drag:
+        given = {key: getattr(drag, key) is not None for key in ("linear_N_s_m", "angular_N_m_s")}
+        faults += [
+            f"Input drag.{key} must be left out beside drag.model; instead received both."
+            if drag.model
+            else f"Input drag.{key} must be given; instead it is missing."
+            for key, there in given.items()
+            if there == bool(drag.model)
+        ]
+    magnets: dict[str, Any] = {"rotor": rotor}
+    if isinstance(rotor, ExplicitRotor):
+        magnets = {f"rotor.magnets[{k}]": magnet for k, magnet in enumerate(rotor.magnets)}
+    for place, magnet in magnets.items():
+        faults += _shape_faults(place, magnet)
+        key, (along, across) = "remanence_T" if magnet is rotor else "polarization_T", magnet.recoil_permeability
+        if along != across and not np.any(getattr(magnet, key)):
+            faults.append(
+                f"Input {place}.{key} must not be zero where recoil_permeability has an easy axis; instead it is zero."
+            )
+    for k, conductor in enumerate(rotor.conductors):
+        faults += _shape_faults(f"rotor.conductors[{k}]", conductor)
+    needed = () if table.coils and "rotor" not in table.model_fields_set else ("frequency_hz", "rotor")
+    missing = [key for key in needed if key not in table.model_fields_set]
+    faults += [f"Input {key} must be given; instead it is missing." for key in missing]
+    for k, coil in enumerate(table.coils or ()):
+        if coil.width_mm >= 2 * coil.radius_mm:
+            faults.append(
+                f"Input coils[{k}].width_mm must be less than twice radius_mm, of the middle of the winding; instead "
+                f"received {coil.width_mm:g}."
+            )
+        if isinstance(coil.current_A, list) and np.any(np.diff(np.array(coil.current_A)[:, 0]) <= 0):
+            faults.append(f"Input coils[{k}].current_A must have increasing times; instead they are not.")
+    for name, floater in table.floaters.items():
+        faults += [re.sub("(?<!the )floater", name, fault) for fault in _floater_faults(floater, table)]
+    faults += _several_faults(table)
+    for k, plate in table.plates:
+        faults += _shape_faults(f"plate[{k}]" if k >= 0 else "plate", plate)
+        if plate.lowering != table.plates[0][1].lowering:
+            faults.append(
+                f"Input plate[{k}].lowering must be that of plate[0], as all plates are lowered together; "
+                "instead it is another."
+            )
+    for k, step in enumerate(table.drive or ()):
+        kinds = [key for key in ("to_hz", "stop", "hold_s") if getattr(step, key) is not None]
+        if len(kinds) != 1:
+            received = " and ".join(kinds) or "none of them"
+            faults.append(f"Input drive[{k}] must have one of to_hz, stop and hold_s; instead received {received}.")
+        elif (step.in_s is None) != (kinds == ["hold_s"]):
+            rule, instead = ("be left out", "received both") if step.in_s else ("be given", "it is missing")
+            faults.append(f"Input drive[{k}].in_s must {rule} beside {kinds[0]}; instead {instead}.")
+    if rotor.field_map is None:
+        alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(rotor, k) is not None]
+        faults += [f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone]
+    return faults
+
+
+def _several_faults(table: schema.SceneTable) -> list[str]:
+    """Faults of a list of floaters, or of starts."""
+    number, starts = len(table.floaters), table.start if isinstance(table.start, list) else None
+    if not isinstance(table.floater, list):
+        said = "Input start must be one table beside one floater; instead received a list."
+        return [] if starts is None else [said]
+    if number < 2:
+        return [f"Input floater must be one table, or a list of two and more; instead received a list of {number}."]
+    given = 0 if table.start is None else len(table.starts)
+    if starts is None or given != number:
+        said = f"Input start must be a list of {number} tables [[start]], one for each floater; instead received"
+        return [f"{said} {given or 'none'}."]
+    return [
+        f"Input start[{k}].position_mm must be given where there are several floaters; instead it is missing."
+        for k, start in enumerate(starts)
+        if start.position_mm is None
+    ]
+
+
+def _floater_faults(floater: schema.FloaterTable, whole: schema.SceneTable) -> list[str]:
+    """Faults of a floater's keys among themselves and beside others of a scene's."""
+    single = [k for k in (*schema.SIZE_KEYS, "file", "remanence_T", "recoil_permeability", "density_kg_m3")
+              if getattr(floater, k, None) is not None]  # fmt: skip
+    faults = []
+    if floater.composite:
+        if single or floater.shape != "sphere":
+            beside = " and ".join([*([] if floater.shape == "sphere" else ["shape"]), *single])
+            faults.append(
+                "Input floater must have its sizes and materials in floater.magnets and floater.bodies alone where it "
+                f"has such; instead received {beside} beside them."
+            )
+        if not floater.magnets:
+            faults.append("Input floater.magnets must have at least one magnet; instead there is ballast alone.")
+        for name, tables in (("magnets", floater.magnets), ("bodies", floater.bodies)):
+            for k, table in enumerate(tables):
+                faults += _shape_faults(f"floater.{name}[{k}]", table)
+    else:
+        faults += _shape_faults("floater", floater)
+        faults += [
+            f"Input floater.{key} must be given; instead it is missing."
+            for key in ("remanence_T", "density_kg_m3")
+            if key not in single
+        ]
+    if floater.inertia_kg_m2 is not None:
+        if floater.shape == "sphere" and not floater.composite:
+            faults.append("Input floater.inertia_kg_m2 must be left out of a sphere; instead it is given.")
+        low, middle, high = sorted(floater.inertia_kg_m2)
+        if high > (low + middle) * (1 + 1e-9):
+            faults.append(
+                "Input floater.inertia_kg_m2 must be moments of inertia, of which none is larger than the other two "
+                f"together; instead received {high:g} beside {low:g} and {middle:g}."
+            )
+    sphere = floater.shape == "sphere" and not floater.composite
+    if not sphere and floater.conductivity_S_m is not None and not whole.coils:
+        faults.append(
+            "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
+            f"known then; instead received {floater.conductivity_S_m:g}."
+        )
+    if not sphere and whole.drag and whole.drag.model == "air":
+        faults.append(
+            'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
+            'sphere; instead received "air".'
+        )
+    return faults
+
+
+def _start_faults(place: str, start: schema.StartTable) -> list[str]:
+    faults = []
+    if start.offset_mm is not None and start.position_mm is not None:
+        faults.append(f"Input {place} must have offset_mm or position_mm; instead received both.")
+    if start.position_mm is None:
+        alone = [key for key in ("velocity_mm_s", "moment", "spin_hz", "body_x") if getattr(start, key) is not None]
+        faults += [
+            f"Input {place}.{key} must come with {place}.position_mm; instead received it alone." for key in alone
+        ]
+    for key in ("moment", "body_x"):
+        given = getattr(start, key)
+        if given is not None and not any(given):
+            faults.append(f"Input {place}.{key} must be a direction, not zero; instead received {given}.")
+    return faults
+
+
+def _shape_faults(place: str, table: Any) -> list[str]:
+    """Faults of the sizes of a shape at a place of the scene file."""
+    given = [key for key in schema.SIZE_KEYS if getattr(table, key, None) is not None]
+    file = getattr(table, "file", None)
+    if table.shape == "file" and not file:
+        return [f"Input {place}.file must be given, as the shape is 'file'; instead it is missing."]
+    if place == "floater" and file and table.shape != "file":
+        return ["Input floater.file must be left out, or shape be 'file'; instead it is given."]
+    if file:
+        if table.shape not in ("cuboid", "file"):
+            return [f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."]
+        sizes = " and ".join(given)
+        return [f"Input {place} must have no size beside file; instead received {sizes}."] if given else []
+    wanted = schema.SIZES[table.shape]
+    if place == "floater" and not given and table.shape == "sphere":
+        return ["Input floater.diameter_mm must be given; instead it is missing."]
+    if set(given) != set(wanted):
+        more = " and ".join(key for key in given if key not in wanted)
+        return [
+            f"Input {place} must have {' and '.join(wanted)}, as the shape is {table.shape!r}; "
+            f"instead received {' and '.join(given) or 'no size'}." + (f" Leave out {more}." if more else "")
+        ]
+    if table.shape == "ring" and table.inner_diameter_mm >= table.diameter_mm:
+        return [
+            f"Input {place}.inner_diameter_mm must be less than diameter_mm {table.diameter_mm:g}; "
+            f"instead received {table.inner_diameter_mm:g}."
+        ]
+    return []
+
+
 def unusual(scene: Scene) -> str:
     """A sentence about polarisations, sizes and distances that no magnet of a laboratory has; empty if all are usual.
 
     Mistaken units are most often the cause: all keys name theirs.
     """
-    strongest = max([scene.floater.remanence, *(float(np.linalg.norm(one.polarization)) for one in scene.rotor)])
-    sizes = [2 * scene.floater.radius, *(edge for one in scene.rotor for edge in one.box.size)]
+    floaters = [one.floater for one in scene.each]
+    strongest = max(
+        [*(one.remanence for one in floaters), *(float(np.linalg.norm(one.polarization)) for one in scene.rotor)]
+    )
+    sizes = [*(2 * one.radius for one in floaters), *(edge for one in scene.rotor for edge in one.box.size)]
     farthest = max((float(np.linalg.norm(one.body.center)) for one in scene.rotor), default=0.0)
     said = [f"a remanence of {strongest:.4g} T (NdFeB has up to 1.5 T)"] if strongest > STRONGEST else []
     said += [f"a size of {1e3 * size:.4g} mm" for size in (min(sizes), max(sizes)) if not SIZES[0] < size < SIZES[1]]
@@ -215,23 +399,28 @@ def overlap_faults(scene: Scene) -> list[str]:
         for (first, one), (second, other) in combinations(plates, 2)
         if (depth := body_overlap(one, other)) > -TOUCHING
     ]
-    if isinstance(start := scene.start, AbsoluteStart):
-        axes = scene.floater.axes(start.moment / np.linalg.norm(start.moment), start.body_x)
-        floater = scene.floater.placed(start.position, axes)
-        obstacles = [(f"rotor {name}", body) for name, body in bodies]
-        obstacles += [("the plate" if len(plates) == 1 else name, body) for name, body in plates]
-        place = ", ".join(f"{c * 1e3:g}" for c in start.position)
+    obstacles = [(f"rotor {name}", body) for name, body in bodies]
+    obstacles += [("the plate" if len(plates) == 1 else name, body) for name, body in plates]
+    placed: list[tuple[Solid, ...]] = []
+    for k, one in enumerate(scene.each):
+        start, number = one.start, f"[{k}]" if scene.companions else ""
+        parts = [(f"part {n}", part) for n, part in enumerate(one.floater.bodies, 1)]
         faults += [
-            f"Input start.position_mm must leave the floater clear of all bodies; instead received [{place}], where it "
-            f"overlaps {name} by {depth * 1e3:.4g} mm."
-            for name, body in obstacles
-            if (depth := max(body_overlap(body, part) for part in floater)) > TOUCHING
+            f"Input floater{number} must have magnets and bodies that do not overlap; instead {first} and {second} "
+            f"overlap by {depth * 1e3:.4g} mm; move them apart by as much."
+            for (first, part), (second, other) in combinations(parts, 2)
+            if not apart(part, other) and (depth := body_overlap(part, other)) > TOUCHING
         ]
-    parts = [(f"part {k}", part) for k, part in enumerate(scene.floater.bodies, 1)]
-    faults += [
-        f"Input floater must have magnets and bodies that do not overlap; instead {first} and {second} overlap by "
-        f"{depth * 1e3:.4g} mm; move them apart by as much."
-        for (first, one), (second, other) in combinations(parts, 2)
-        if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING
-    ]
+        if not isinstance(start, AbsoluteStart):
+            continue
+        axes = one.floater.axes(start.moment / np.linalg.norm(start.moment), start.body_x)
+        placed.append(one.floater.placed(start.position, axes))
+        place = ", ".join(f"{c * 1e3:g}" for c in start.position)
+        others = [(f"floater[{n}]", part) for n, other in enumerate(placed[:-1]) for part in other]
+        faults += [
+            f"Input start{number}.position_mm must leave the floater clear of all bodies; instead received [{place}], "
+            f"where it overlaps {name} by {depth * 1e3:.4g} mm."
+            for name, body in [*obstacles, *others]
+            if (depth := max(body_overlap(body, part) for part in placed[-1])) > TOUCHING
+        ]
     return faults

@@ -1,5 +1,6 @@
 """The scene file's keys, types and ranges, the rules between keys, and what they say in SI units."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from ..magnets import Magnet
 from ..rotor import Conductor, Rotor, horizontal, tilt, vertical
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix
 from ..solids import Part, Solid, known_shape
-from .contents import AbsoluteStart, Coil, Drag, DriveStep, Lowering, MapReading, OffsetStart, Plate, Scene
+from .contents import AbsoluteStart, Coil, Companion, Drag, DriveStep, Lowering, MapReading, OffsetStart, Plate, Scene
 from .floater import Floater, FloaterPart
 
 MILLI = 1e-3
@@ -396,6 +397,10 @@ class DriveTable(Table):
         return DriveStep(0.0 if self.stop else self.to_hz, self.in_s or self.hold_s or 0.0)
 
 
+ONE_OR_SEVERAL = Discriminator(lambda given: "several" if isinstance(given, list) else "one")
+FLOATER = re.compile(r"floater(?:\[(\d+)\])?")  # how messages call a floater's table, with its number among several
+
+
 class SceneTable(Table):
     """The whole file."""
 
@@ -408,14 +413,18 @@ class SceneTable(Table):
         | Annotated[ExplicitRotor, Tag("magnets")],
         Discriminator(_rotor_kind),
     ] = ExplicitRotor.model_construct(magnets=[])  # none, beside coils
-    floater: FloaterTable
+    floater: Annotated[
+        Annotated[FloaterTable, Tag("one")] | Annotated[list[FloaterTable], Tag("several")], ONE_OR_SEVERAL
+    ]
     plate: Annotated[
         Annotated[PlateTable | None, Tag("one")]
         | Annotated[Annotated[list[PlateTable], Field(min_length=1)], Tag("several")],
-        Discriminator(lambda plate: "several" if isinstance(plate, list) else "one"),
+        ONE_OR_SEVERAL,
     ] = None
     drag: DragTable | None = None
-    start: StartTable | None = None
+    start: Annotated[
+        Annotated[StartTable | None, Tag("one")] | Annotated[list[StartTable], Tag("several")], ONE_OR_SEVERAL
+    ] = None
     drive: list[DriveTable] | None = None
     coils: list[CoilTable] | None = None
 
@@ -424,171 +433,41 @@ class SceneTable(Table):
         """The plates by their number, -1 of a single one."""
         return list(enumerate(self.plate)) if isinstance(self.plate, list) else [(-1, self.plate)] if self.plate else []
 
+    @property
+    def floaters(self) -> dict[str, FloaterTable]:
+        """The floaters' tables by what messages call them."""
+        if isinstance(self.floater, list):
+            return {f"floater[{k}]": one for k, one in enumerate(self.floater)}
+        return {"floater": self.floater}
+
+    @property
+    def starts(self) -> list[StartTable]:
+        """Where the floaters begin."""
+        return self.start if isinstance(self.start, list) else [self.start or StartTable()]
+
     def scene(self, parts: Mapping[tuple[str, int], Part], field_map: Path | None) -> Scene:
         """The scene in SI units; `parts` by their tables' names and numbers, -1 that of a table in no list."""
-        of_rotor, of_floater = (
-            {k: part for (owner, k), part in parts.items() if owner == whose} for whose in ("rotor", "floater")
-        )
-        rotor, floater = self.rotor, self.floater.floater(of_floater)
+
+        def of(whose: str) -> dict[int, Part]:
+            return {k: part for (owner, k), part in parts.items() if owner == whose}
+
+        rotor, drag = self.rotor, self.drag or DragTable()
+        floater, *others = (table.floater(of(name)) for name, table in self.floaters.items())
+        start, *elsewhere = (table.start() for table in self.starts)
         return Scene(
             frequency=self.frequency_hz,
             gravity=np.array(self.gravity_m_s2),
-            rotor=rotor.in_si(of_rotor),
+            rotor=rotor.in_si(of("rotor")),
             floater=floater,
+            companions=tuple(
+                Companion(one, drag.drag(one), begins) for one, begins in zip(others, elsewhere, strict=True)
+            ),
             plate=Plate.of([table.plate(parts.get(("plate", k))) for k, table in self.plates]) if self.plate else None,
-            drag=(self.drag or DragTable()).drag(floater),
-            start=(self.start or StartTable()).start(),
+            drag=drag.drag(floater),
+            start=start,
             field_map=field_map,
             map_reading=MapReading(rotor.map_length_unit, rotor.map_field_unit, rotor.map_columns),
             conductors=tuple(conductor.conductor() for conductor in rotor.conductors),
             drive=tuple(step.step() for step in self.drive or ()),
             coils=tuple(coil.coil() for coil in self.coils or ()),
         )
-
-
-def key_faults(table: SceneTable) -> list[str]:
-    """One sentence for each rule between keys that is broken."""
-    rotor, floater, faults = table.rotor, table.floater, _start_faults(table.start or StartTable())
-    if drag := table.drag:
-        given = {key: getattr(drag, key) is not None for key in ("linear_N_s_m", "angular_N_m_s")}
-        faults += [
-            f"Input drag.{key} must be left out beside drag.model; instead received both."
-            if drag.model
-            else f"Input drag.{key} must be given; instead it is missing."
-            for key, there in given.items()
-            if there == bool(drag.model)
-        ]
-    magnets: dict[str, Any] = {"rotor": rotor}
-    if isinstance(rotor, ExplicitRotor):
-        magnets = {f"rotor.magnets[{k}]": magnet for k, magnet in enumerate(rotor.magnets)}
-    for place, magnet in magnets.items():
-        faults += _shape_faults(place, magnet)
-        key, (along, across) = "remanence_T" if magnet is rotor else "polarization_T", magnet.recoil_permeability
-        if along != across and not np.any(getattr(magnet, key)):
-            faults.append(
-                f"Input {place}.{key} must not be zero where recoil_permeability has an easy axis; instead it is zero."
-            )
-    for k, conductor in enumerate(rotor.conductors):
-        faults += _shape_faults(f"rotor.conductors[{k}]", conductor)
-    needed = () if table.coils and "rotor" not in table.model_fields_set else ("frequency_hz", "rotor")
-    missing = [key for key in needed if key not in table.model_fields_set]
-    faults += [f"Input {key} must be given; instead it is missing." for key in missing]
-    for k, coil in enumerate(table.coils or ()):
-        if coil.width_mm >= 2 * coil.radius_mm:
-            faults.append(
-                f"Input coils[{k}].width_mm must be less than twice radius_mm, of the middle of the winding; instead "
-                f"received {coil.width_mm:g}."
-            )
-        if isinstance(coil.current_A, list) and np.any(np.diff(np.array(coil.current_A)[:, 0]) <= 0):
-            faults.append(f"Input coils[{k}].current_A must have increasing times; instead they are not.")
-    faults += _floater_faults(floater)
-    for k, plate in table.plates:
-        faults += _shape_faults(f"plate[{k}]" if k >= 0 else "plate", plate)
-        if plate.lowering != table.plates[0][1].lowering:
-            faults.append(
-                f"Input plate[{k}].lowering must be that of plate[0], as all plates are lowered together; "
-                "instead it is another."
-            )
-    sphere = floater.shape == "sphere" and not floater.composite
-    if not sphere and floater.conductivity_S_m is not None and not table.coils:
-        faults.append(
-            "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
-            f"known then; instead received {floater.conductivity_S_m:g}."
-        )
-    if not sphere and drag and drag.model == "air":
-        faults.append(
-            'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
-            'sphere; instead received "air".'
-        )
-    for k, step in enumerate(table.drive or ()):
-        kinds = [key for key in ("to_hz", "stop", "hold_s") if getattr(step, key) is not None]
-        if len(kinds) != 1:
-            received = " and ".join(kinds) or "none of them"
-            faults.append(f"Input drive[{k}] must have one of to_hz, stop and hold_s; instead received {received}.")
-        elif (step.in_s is None) != (kinds == ["hold_s"]):
-            rule, instead = ("be left out", "received both") if step.in_s else ("be given", "it is missing")
-            faults.append(f"Input drive[{k}].in_s must {rule} beside {kinds[0]}; instead {instead}.")
-    if rotor.field_map is None:
-        alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(rotor, k) is not None]
-        faults += [f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone]
-    return faults
-
-
-def _floater_faults(floater: FloaterTable) -> list[str]:
-    """Faults of a floater's keys among themselves."""
-    single = [k for k in (*SIZE_KEYS, "file", "remanence_T", "recoil_permeability", "density_kg_m3")
-              if getattr(floater, k, None) is not None]  # fmt: skip
-    faults = []
-    if floater.composite:
-        if single or floater.shape != "sphere":
-            beside = " and ".join([*([] if floater.shape == "sphere" else ["shape"]), *single])
-            faults.append(
-                "Input floater must have its sizes and materials in floater.magnets and floater.bodies alone where it "
-                f"has such; instead received {beside} beside them."
-            )
-        if not floater.magnets:
-            faults.append("Input floater.magnets must have at least one magnet; instead there is ballast alone.")
-        for name, tables in (("magnets", floater.magnets), ("bodies", floater.bodies)):
-            for k, table in enumerate(tables):
-                faults += _shape_faults(f"floater.{name}[{k}]", table)
-    else:
-        faults += _shape_faults("floater", floater)
-        faults += [
-            f"Input floater.{key} must be given; instead it is missing."
-            for key in ("remanence_T", "density_kg_m3")
-            if key not in single
-        ]
-    if floater.inertia_kg_m2 is not None:
-        if floater.shape == "sphere" and not floater.composite:
-            faults.append("Input floater.inertia_kg_m2 must be left out of a sphere; instead it is given.")
-        low, middle, high = sorted(floater.inertia_kg_m2)
-        if high > (low + middle) * (1 + 1e-9):
-            faults.append(
-                "Input floater.inertia_kg_m2 must be moments of inertia, of which none is larger than the other two "
-                f"together; instead received {high:g} beside {low:g} and {middle:g}."
-            )
-    return faults
-
-
-def _start_faults(start: StartTable) -> list[str]:
-    faults = []
-    if start.offset_mm is not None and start.position_mm is not None:
-        faults.append("Input start must have offset_mm or position_mm; instead received both.")
-    if start.position_mm is None:
-        alone = [key for key in ("velocity_mm_s", "moment", "spin_hz", "body_x") if getattr(start, key) is not None]
-        faults += [f"Input start.{key} must come with start.position_mm; instead received it alone." for key in alone]
-    for key in ("moment", "body_x"):
-        given = getattr(start, key)
-        if given is not None and not any(given):
-            faults.append(f"Input start.{key} must be a direction, not zero; instead received {given}.")
-    return faults
-
-
-def _shape_faults(place: str, table: Any) -> list[str]:
-    """Faults of the sizes of a shape at a place of the scene file."""
-    given = [key for key in SIZE_KEYS if getattr(table, key, None) is not None]
-    file = getattr(table, "file", None)
-    if table.shape == "file" and not file:
-        return [f"Input {place}.file must be given, as the shape is 'file'; instead it is missing."]
-    if place == "floater" and file and table.shape != "file":
-        return ["Input floater.file must be left out, or shape be 'file'; instead it is given."]
-    if file:
-        if table.shape not in ("cuboid", "file"):
-            return [f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."]
-        sizes = " and ".join(given)
-        return [f"Input {place} must have no size beside file; instead received {sizes}."] if given else []
-    wanted = SIZES[table.shape]
-    if place == "floater" and not given and table.shape == "sphere":
-        return ["Input floater.diameter_mm must be given; instead it is missing."]
-    if set(given) != set(wanted):
-        more = " and ".join(key for key in given if key not in wanted)
-        return [
-            f"Input {place} must have {' and '.join(wanted)}, as the shape is {table.shape!r}; "
-            f"instead received {' and '.join(given) or 'no size'}." + (f" Leave out {more}." if more else "")
-        ]
-    if table.shape == "ring" and table.inner_diameter_mm >= table.diameter_mm:
-        return [
-            f"Input {place}.inner_diameter_mm must be less than diameter_mm {table.diameter_mm:g}; "
-            f"instead received {table.inner_diameter_mm:g}."
-        ]
-    return []
