@@ -45,7 +45,7 @@ FORMATS = {
     "slab": 3,
     "edges": 2,
     "rotor-losses": 2,
-    "floating": 1,
+    "floating": 2,
     "floating-free": 1,
     "equilibria": 4,
     "experiment": 2,

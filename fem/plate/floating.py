@@ -243,7 +243,7 @@ def floating_modes(
     low, high = heights
     reach = (low - half, high + half)
     outer = float(body.half_edges[:2].max())
-    sources = [AxialPotential.of(CoilField(coils, share), outer, reach) for share in shares]
+    sources = [AxialPotential.of(CoilField(coils, share), outer, reach).shortened(SHORTENED) for share in shares]
     windings = _windings(coils, np.pi / 2) - [0.0, 0.0, low]
     mesh = plate_mesh(body, conductivity, windings, frequency, rule or MeshRule())
     made = modes_along(mesh, [source.at for source in sources], heights, frequency, rtol, order)
@@ -257,6 +257,7 @@ def modes_along(
     frequency: float,
     rtol: float,
     order: int,
+    degree: int = DEGREE,
 ) -> FloatingModes:
     """Modes of a conductor that moves along an axis beside any sources.
 
@@ -265,12 +266,14 @@ def modes_along(
     mesh : of the conductor
     sources : at each height (m) of the conductor, in its frame
     heights, frequency, rtol, order : as of `floating_modes`
+    degree : of the series of G
     """
     start, (low, high) = time.perf_counter(), heights
-    nodes = (low + high) / 2 + (high - low) / 2 * np.cos(np.pi * np.arange(TRAINED) / (TRAINED - 1))
+    training = round(TRAINED * degree / DEGREE)
+    nodes = (low + high) / 2 + (high - low) / 2 * np.cos(np.pi * np.arange(training) / (training - 1))
     trained = [at(z) for z in nodes for at in sources]
     probes = [at(z) for z in (nodes[1:] + nodes[:-1]) / 2 for at in sources]
-    everywhere = [at(z) for z in (low + high) / 2 + (high - low) / 2 * _nodes(DEGREE + 1) for at in sources]
+    everywhere = [at(z) for z in (low + high) / 2 + (high - low) / 2 * _nodes(degree + 1) for at in sources]
     band = (0.1 * frequency, 4 * frequency)
     found: list[FloatingModes] = []
     for each in (order - 1, order):
@@ -283,7 +286,7 @@ def modes_along(
             kept = times * 2 * np.pi * band[1] * MOST > 1
             rates.append(1 / times[kept])
             couplings.append(b @ vectors[:, kept] / np.sqrt(times[kept]))
-        values = np.concatenate(couplings, axis=1).reshape(DEGREE + 1, len(sources), -1).swapaxes(1, 2)
+        values = np.concatenate(couplings, axis=1).reshape(degree + 1, len(sources), -1).swapaxes(1, 2)
         found.append(FloatingModes(np.concatenate(rates), _series(values), heights, missed, 0.0))
     every, amplitudes = np.linspace(low, high, 9), np.ones(len(sources))
     forces = [[modes.mean_force(z, amplitudes, np.full(len(sources), frequency)) for z in every] for modes in found]

@@ -5,13 +5,20 @@ import pytest
 from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms.eddy_bodies import tube_drag
+from spinlev.geometry.common import MU_0
 from spinlev.geometry.scene.files import parse_scene, scene_text
 from spinlev.studies.catalogue.measured import (
+    EXPERIMENTS,
+    MEASURED,
     TEAM28,
-    closed_rows,
+    compute,
     falling_magnet,
+    gather,
     in_phase,
+    lift_and_drag,
     measured_heights,
+    measured_numbers,
+    moving_plate,
     resting_height,
     swing,
 )
@@ -34,10 +41,31 @@ def test_team28_is_the_published_table():
 
 
 def test_known_answers_are_met():
-    for name, kind, known, found, error, _ in closed_rows():
-        assert found == pytest.approx(known, rel=2e-3), name
-        assert kind in ("series", "closed form")
-        assert 0 < error < 5e-3 * known
+    parts = [compute({"experiment": name, "quick": True}) for name in EXPERIMENTS if "TEAM" not in name]
+    rows = measured_numbers(gather(parts))["experiments"]
+    assert len(rows) == 5
+    for row in rows:
+        assert row["computed"] == pytest.approx(row["measured"], rel=2e-3), row["name"]
+        assert row["kind"] in ("series", "closed form")
+        assert 0 < row["error"] < 5e-3 * row["measured"]
+    off = [abs(row["computed"] / row["measured"] - 1) for row in rows]
+    assert off == sorted(off, reverse=True)
+    assert not any("TEAM 28" in line for line in MEASURED.report(gather(parts)))
+
+
+def test_a_plate_that_moves_slowly_brakes_and_one_that_moves_fast_lifts():
+    """Reitz's limits: at low speed the drag of a thick plate, at high speed the lift of an image, 3μ0m²/(32πh⁴)."""
+    drag, lift = moving_plate(1e-3)
+    slow = MU_0**2 * 3.4e7 / (128 * np.pi) * (0.02**-3 - 0.03**-3) * 1e-3
+    assert drag == pytest.approx(slow, rel=1e-5)
+    assert lift < 1e-3 * drag
+    assert moving_plate(1e9)[1] == pytest.approx(3 * MU_0 / (32 * np.pi * 0.02**4), rel=2e-3)
+
+
+@pytest.mark.slow
+def test_drag_and_lift_at_speed_are_within_their_stated_errors():
+    for _, _, known, found, error, _ in lift_and_drag(False):
+        assert abs(found - known) < error < 0.01 * known
 
 
 def test_magnet_falls_in_a_tube_as_it_does_by_the_series():
