@@ -10,6 +10,7 @@ from ..dynamics.equilibria.equilibrium import (
     FOLD,
     IN_PLATE,
     IN_ROTOR,
+    LOCKED,
     MODE_NAMES,
     NOT_CONVERGED,
     PAST_TABLE,
@@ -160,7 +161,13 @@ def equilibria_words(levitation: Levitation, survey: Survey) -> list[str]:
     rows = equilibria_rows(levitation, found)
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     table = ["  ".join(["", *map(str.rjust, row[:-1], widths), row[-1]]).rstrip() for row in rows]
-    return [headline(levitation, found, left_out), *table, *left_out_words(levitation, left_out)]
+    said = left_out_words(levitation, left_out)
+    if levitation.plate is not None and any(e.kind == LOCKED and e.currents is None for e in found):
+        said.append(
+            "Frequency-locked equilibria are those without the plate: with its currents they are periodic motions, "
+            "which are searched for of bodies that are round about their moment alone."
+        )
+    return [headline(levitation, found, left_out), *table, *said]
 
 
 def left_out_words(levitation: Levitation, left_out: Sequence[LeftOut]) -> list[str]:

@@ -30,6 +30,10 @@ FIRST = DEGREE + 1 + LARGE.count  # Number of the first runtime parameter of the
 WORTH = 5e6
 # Of a ball's field and its gradient, relative; the gradient of a table by finite elements is known to 4e-5.
 ERROR = 1e-6
+# Kinds and error for a body that is not round, whose multipoles are left out up to some 5e-3 of the force: 140 of 1351
+# operations less.
+OF_BODIES = BallField(DEGREE + 1, 6), BallField(DEGREE + 1, 8)
+ERROR_OF_BODIES = 1e-5
 SPACING = 1 / 32  # Of the lattice, in radii of the floater
 LEAST = 1.5  # Smallest radius of a ball in spacings: a floater that enters it is at most 0.87 of them from the centre
 TRIALS = 5
@@ -77,6 +81,16 @@ class Balls:
     scene: Scene  # whose bodies the floater must not touch while it is in a ball
     whole: Interaction  # the rotor's table with its effects
     _known: dict[tuple[float, ...], tuple[Array, float] | None] = field(default_factory=dict)
+
+    @property
+    def kinds(self) -> tuple[BallField, BallField]:
+        """The small and the large ball."""
+        return OF_BODIES if self.whole.turning else (SMALL, LARGE)
+
+    @property
+    def allowed(self) -> float:
+        """The error of a ball's field."""
+        return ERROR_OF_BODIES if self.whole.turning else ERROR
 
     @cached_property
     def end(self) -> int:
@@ -168,7 +182,8 @@ class Balls:
         """The largest ball about `center` whose expansion has at most the error allowed."""
         room, least = _room(self.scene, center, lost), LEAST * SPACING * self.scene.floater.radius
         # first so large that the terms left out, (radius / distance)^(degree - 1) nearly, are about the error allowed
-        part = (ERROR / 4) ** (1 / (formula.degree - 1))
+        allowed = self.allowed
+        part = (allowed / 4) ** (1 / (formula.degree - 1))
         radius = min(room, self._distance(center) * (min(part, FITTED) if _fitted(self.whole, formula) else part))
         error = np.inf
         for _ in range(TRIALS):
@@ -179,10 +194,10 @@ class Balls:
             except RangeError:
                 radius = room = radius / 2
                 continue
-            if error <= ERROR and (error > ERROR / 4 or radius >= room):
+            if error <= allowed and (error > allowed / 4 or radius >= room):
                 break
-            radius = min(radius * min(0.9 * (ERROR / max(error, 1e-15)) ** (1 / (formula.degree - 1)), 2.0), room)
-        return (values, error) if error <= ERROR else None
+            radius = min(radius * min(0.9 * (allowed / max(error, 1e-15)) ** (1 / (formula.degree - 1)), 2.0), room)
+        return (values, error) if error <= allowed else None
 
     def _fit(self, formula: BallField, ball: Ball) -> tuple[Array, float]:
         """Parameters of a ball, and the largest error, those of effects by what they may have."""
@@ -196,7 +211,7 @@ class Balls:
         found = [effect.fit(ball, gradient) for effect in effects]
         padded = np.concatenate([values, np.zeros(FIRST - DEGREE - 1 - len(values))])
         return np.concatenate([padded, *(numbers for numbers, _ in found)]), max(
-            error, *(ERROR * share for _, share in found)
+            error, *(self.allowed * share for _, share in found)
         )
 
 

@@ -2,8 +2,8 @@
 
 Three forms of one energy. In a ball of a trajectory it is that of its multipoles up to a degree; their components
 along the rotor's axes are states of the motion: they turn with the body, Ṁ = (Ω - W)·G M, as the moment of a round one.
-Beside a magnet, where no ball is, it is that of dipoles all over the body. About a pose, for equilibria and modes, it
-is force and torque on many such dipoles with their exact derivatives.
+Beside a magnet, where no ball is, it is that of a few dipoles with the same multipoles. About a pose, for equilibria
+and modes, it is force and torque on many dipoles all over the body with their exact derivatives.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -18,10 +19,10 @@ from numpy.typing import NDArray
 
 from ...fem.harmonics.expressions import regular_harmonics
 from ...fem.harmonics.interior import Ball, BallField
-from ...fem.harmonics.rigid import field_coefficients, matrices, shells, sizes, translation
-from ...fem.rotor.floater import FloaterSources, floater_sources, remanent_sources, shares, slopes_of, strength
+from ...fem.harmonics.rigid import field_coefficients, harmonics, matrices, shells, shifted, sizes
+from ...fem.rotor.floater import FloaterSources, floater_sources, shares, slopes_of, strength
 from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable, RangeError
-from ...geometry.common import Array
+from ...geometry.common import Array, even_directions
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Solid
 from .effect import Added, Motion, Poses
@@ -29,16 +30,21 @@ from .floater_effects import FLOATER_SHAPE
 from .state import Parameter, State, Vector, cross, dot, dotted, matrices_of
 
 HIGHEST = 7  # degree of the multipoles in a trajectory
-WAY = 3  # degree of what they feel, in a place within a ball
+LESS = 3  # degrees by which what they feel in a ball is of a lower one than the field there
 # Of the dipole's force, one radius off the body: shells of multipoles with less are left out of simulations
 KEPT = 5e-3
 # Size of the multipoles' states by those of the dipole: they act so much less. A step must not be short for their sake.
-LITTLE = 0.02
-ALLOWED = 2e-4  # error of the force in a ball by that of the dipole
+LITTLE = 1e-4
+# Error of the force in a ball by that of the dipole, by the degree of what multipoles feel: a large ball is left for
+# others, and its error is what energy is not continuous by.
+ALLOWED = {3: 1e-3, 5: 1e-4}
 REACHES = 0.6, 0.4, 0.25  # of the distance from a magnet: radii of the sphere on which the field is expanded
 # Degrees of the polynomials that dipoles integrate: about a pose of a cube, more of long or hollow bodies up to the
-# second; and in motion beside a magnet.
-SUMMED, MOST, NEAR = 8, 18, 5
+# second.
+SUMMED, MOST = 8, 18
+# Of the radius: how far from the centre dipoles stand for multipoles. The nearer, the less they have of further ones
+# (of a cube's a fiftieth), and the stronger they are.
+STAND = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +69,27 @@ class BodyShape:
 
     def placed(self, first: int) -> BodyShape:
         """See `Placeable`."""
-        return replace(self, first=first)
+        return self._changed(first=first)
 
     def in_ball(self, ball: BallField, first: int) -> BodyShape:
         """See `Fittable`."""
-        return replace(self, ball=ball, first=first)
+        return self._changed(ball=ball, first=first)
+
+    def _changed(self, **changes: Any) -> BodyShape:
+        """The same elsewhere, with what is known of the multipoles: a ball would take half a second without."""
+        found = replace(self, **changes)
+        found.__dict__.update({name: getattr(self, name) for name in ("moments", "shares", "kept")})
+        return found
 
     @property
     def count(self) -> int:
-        return 3 + 4 + 6 + 36 if self.ball is None else len(self.kept) * (WAY + 1) ** 2
+        return 3 + 4 + 6 + 36 if self.ball is None else len(self.kept) * (self._way + 1) ** 2
+
+    @property
+    def _way(self) -> int:
+        """Degree of what the multipoles feel, in a place within the ball."""
+        assert self.ball is not None
+        return self.ball.degree - LESS
 
     # The multipoles
 
@@ -92,6 +110,26 @@ class BodyShape:
         """(k,) numbers of the multipoles in trajectories."""
         degrees = shells(HIGHEST)
         return np.flatnonzero((self.shares[degrees] > KEPT) & (degrees > 0))
+
+    @cached_property
+    def poles(self) -> FloaterSources:
+        """Dipoles with the multipoles that trajectories keep, and no others up to the highest degree of these.
+
+        On pairs of opposite places, so that they have none of even degrees, of all degrees, where the body has none.
+        """
+        degree = int(shells(HIGHEST)[self.kept].max(initial=1))
+        degrees = shells(degree)
+        # three components of each pair have to make the multipoles of odd degrees, or those of even ones
+        pairs = max(int(np.sum((degrees % 2 == odd) & (degrees > 0))) for odd in (0, 1)) // 3 + 1
+        half = STAND * even_directions(2 * pairs)[:pairs]  # in a half space, so that none is opposite to another
+        places = np.concatenate([half, -half])
+        columns = np.moveaxis(harmonics(degree, places)[1], 1, 0).reshape(len(degrees), -1)
+        wanted = np.zeros(len(shells(HIGHEST)))
+        wanted[self.kept] = self.moments[self.kept]
+        unit = sizes(degree)[:, None]
+        solved = np.linalg.lstsq(columns / unit, wanted[: len(degrees)] / unit[:, 0], rcond=1e-12)[0]
+        moments = np.asarray(self.floater.radius * solved.reshape(-1, 3), float)
+        return FloaterSources(self.floater.radius * places, moments, np.zeros((0, 3)), np.zeros(0))
 
     @property
     def truncation(self) -> float:
@@ -133,13 +171,13 @@ class BodyShape:
         assert self.ball is not None
         assert self.first is not None
         length, inertia, share = (hy.par[p] for p in (Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE))
-        place = regular_harmonics(WAY, self.ball.offset([length * p for p in motion.position]))
+        place = regular_harmonics(self._way, self.ball.offset([length * p for p in motion.position]))
         size = len(place)
         numbers = [[hy.par[self.first + k * size + n] for n in range(size)] for k in range(len(states))]
         unit = self._unit * share * share
         sums = [dotted(column, states) for column in zip(*numbers, strict=True)]
         field = [dotted(row, place) for row in numbers]
-        slopes = matrices(WAY)[0]
+        slopes = matrices(self._way)[0]
         reach = -unit * length * hy.par[self.ball.first + 3]
         force = [reach * dotted([_combined(column, sums) for column in slope.T], place) for slope in slopes]
         return Added(
@@ -151,15 +189,12 @@ class BodyShape:
     def _by_dipoles(self, motion: Motion) -> Added:
         assert motion.axes is not None
         length, inertia, share = (hy.par[p] for p in (Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE))
-        axes, unit, near = motion.axes, share * share, remanent_sources(self.floater, NEAR)
-        # what permeability does to the dipole it does to all others here: 1e-3 of the force
-        true, plain = (np.linalg.norm(part.multipoles(1, 1.0)) for part in (self.sources, near))
+        axes, unit, poles = motion.axes, share * share, self.poles
         force, torque, energy = [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3, hy.expression(0.0)
-        dipoles = [(np.zeros(3), -self.floater.dipole), *zip(near.places, true / plain * near.moments, strict=True)]
-        for own, pole in dipoles:
+        for own, pole in zip(poles.places, poles.moments, strict=True):
             arm, source = ([_combined(part, row) for row in axes] for part in (own, pole))
             place = [length * p + a for p, a in zip(motion.position, arm, strict=True)]
-            field, gradient = self.field.expressions(place) if own.any() else (motion.field, motion.gradient)
+            field, gradient = self.field.expressions(place)
             pull = [dot(source, [gradient[i][j] for i in range(3)]) for j in range(3)]
             turns = zip(cross(source, field), cross(arm, pull), strict=True)
             force = [f + p for f, p in zip(force, pull, strict=True)]
@@ -218,9 +253,9 @@ class BodyShape:
         return whole[0] - own[0], whole[1] - own[1]
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
-        """See `Fittable`; what the place in the ball does beyond `WAY` is its error."""
+        """See `Fittable`; what the place in the ball does beyond `_way` is its error."""
         apart = min((float(body.distance(ball.center)) for body in self.magnets), default=np.inf)
-        degree = HIGHEST + WAY + 1
+        degree = int(shells(HIGHEST)[self.kept].max(initial=1)) + self._way + 1
         for share in REACHES:
             try:
                 there = field_coefficients(
@@ -234,12 +269,12 @@ class BodyShape:
         else:
             raise RangeError("Input ball must lie where the field of the rotor is known; instead it does not.")
         unit = sizes(HIGHEST)[self.kept, None]
-        moved = unit * np.einsum("k,kln->ln", there, translation(degree, WAY + 1))[self.kept]
-        way = shells(WAY + 1)
+        moved = unit * shifted(there, degree, self._way + 1)[self.kept]
+        way = shells(self._way + 1)
         moved = moved * (ball.radius / self.floater.radius) ** way
-        rest = np.linalg.norm(moved[:, way == WAY + 1], axis=1) @ np.abs(self.moments[self.kept] / unit[:, 0])
-        error = (WAY + 1) * rest / ball.radius / (strength(self.floater) * float(np.linalg.norm(gradient)) or 1.0)
-        return moved[:, way <= WAY].ravel(), float(error) / ALLOWED
+        rest = np.linalg.norm(moved[:, way == self._way + 1], axis=1) @ np.abs(self.moments[self.kept] / unit[:, 0])
+        error = (self._way + 1) * rest / ball.radius / (strength(self.floater) * float(np.linalg.norm(gradient)) or 1.0)
+        return moved[:, way <= self._way].ravel(), float(error) / ALLOWED[self._way]
 
     @property
     def _table(self) -> FieldTable:

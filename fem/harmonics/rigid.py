@@ -70,21 +70,26 @@ def matrices(degree: int) -> tuple[Array, Array]:
     return found[0], found[1]
 
 
+def shifted(coefficients: Array, degree: int, way: int) -> Array:
+    """Those of a field about places at ξ from the centre, (K, N): A_k = Σ P_kn R_n(ξ), n up to degree `way`.
+
+    The field's own coefficients (K,) about the centre are up to a `degree`; A(ξ) = exp(ξ·Dᵀ) A is harmonic in ξ.
+    """
+    ways, solving = _ways(way)
+    found = np.zeros((len(coefficients), (way + 1) ** 2))
+    power = np.broadcast_to(coefficients, (len(ways), len(coefficients)))
+    for j, solve in enumerate(solving):
+        found[:, shells(way) == j] = (solve @ power).T
+        power = sum(ways[:, [a]] * (power @ slope) for a, slope in enumerate(matrices(degree)[0])) / (j + 1)
+    return found
+
+
 @cache
-def translation(degree: int, way: int) -> Array:
-    """(K', K, N): R_k'(r + ξ) = Σ R_k(r) R_n(ξ) up to a degree, n up to `way`: exp(ξ·D), which is harmonic in ξ."""
-    ways = even_directions(6 * (way + 1) ** 2)
-    values, slopes = harmonics(way, ways)[0], np.einsum("na,akl->nkl", ways, matrices(degree)[0])
-    found, power = (
-        np.zeros((*slopes.shape[1:], values.shape[1])),
-        np.broadcast_to(np.eye(slopes.shape[1]), slopes.shape),
-    )
-    for j in range(way + 1):
-        shell = np.flatnonzero(shells(way) == j)
-        solved = np.linalg.lstsq(values[:, shell], power.reshape(len(ways), -1))[0]
-        found[..., shell] = np.moveaxis(solved.reshape(len(shell), *slopes.shape[1:]), 0, -1)
-        power = power @ slopes / (j + 1)
-    return _clean(found)
+def _ways(way: int) -> tuple[Array, list[Array]]:
+    """Places (n, 3) all around, and what makes of values there their weights in the harmonics of each degree."""
+    ways = even_directions(2 * (way + 1) ** 2)
+    values = harmonics(way, ways)[0]
+    return ways, [np.asarray(np.linalg.pinv(values[:, shells(way) == j]), float) for j in range(way + 1)]
 
 
 def _clean(values: Array) -> Array:
