@@ -325,16 +325,20 @@ def way_out(
     found = f"only unstable ones: {', '.join(kinds)}" if kinds else "nor an unstable one below the rotor"
     if not scene.floater.round:
         scene, _, table = mean_over_turns(scene, table)
-    own, other = scene.frequency, _levitating_frequency(scene, table, memory)
+    own, (other, computed) = scene.frequency, _levitating_frequency(scene, table, memory)
     advice = f"None was found from {own / WIDEST:.4g} to {own * WIDEST:.4g} Hz either."
     if other is not None:
-        advice = f"Stable levitation is possible at about {other:.4g} Hz."
+        without = "" if computed else " without eddy currents in the plate, which are not computed there"
+        advice = f"Stable levitation is possible at about {other:.4g} Hz{without}."
     said = f"At {own:g} Hz there is no stable equilibrium, {found}. {advice}"
     return f"{said} To simulate anyway, set start.position_mm."
 
 
-def _levitating_frequency(scene: Scene, table: FieldTable, memory: PlateMemory | None) -> float | None:
-    """A frequency (Hz) in the nearest window with a stable equilibrium; not in one that holds the scene's own."""
+def _levitating_frequency(scene: Scene, table: FieldTable, memory: PlateMemory | None) -> tuple[float | None, bool]:
+    """A frequency (Hz) in the nearest window with a stable equilibrium, and whether with the plate's currents.
+
+    Not in a window that holds the scene's own; one beyond the reach of the plate's table is the last resort.
+    """
     # A map without plate, in upright gravity, finds the windows; with all that acts a search has to find one too.
     own, rates = scene.frequency, Rates(with_effects(scene, table))
     upright = replace(scene, plate=None, gravity=np.array([0.0, 0.0, scene.gravity[2]]))
@@ -347,13 +351,18 @@ def _levitating_frequency(scene: Scene, table: FieldTable, memory: PlateMemory |
         values = [tried[k].frequency for k in run]
         if stable and not values[0] <= own <= values[-1]:  # in one that does, the plate or tilted gravity is to blame
             windows.append(values if values[0] > own else values[::-1])
+    alone: float | None = None
     for window in sorted(windows, key=lambda window: abs(np.log(window[0] / own))):
         near, far = window[0], window[-1]
         there = replace(scene, frequency=float(near + INSIDE * (far - near)))
-        bare = there.plate is None and not np.any(there.gravity[:2])
-        if too_slow(there) or (not bare and memory is not None and there.frequency > memory.table.frequencies[1]):
+        if too_slow(there):
             continue
-        found_there = [] if bare else find_equilibria(there, table, rates=rates, memory=memory)
-        if bare or any(e.stable and (memory is None or e.currents is not None) for e in found_there):
-            return there.frequency
-    return None
+        if there.plate is None and not np.any(there.gravity[:2]):
+            return there.frequency, True
+        tabulated = memory is None or there.frequency <= memory.table.frequencies[1]
+        found_there = find_equilibria(there, table, rates=rates, memory=memory if tabulated else None)
+        stable = [e for e in found_there if e.stable]
+        if any(memory is None or e.currents is not None for e in stable):
+            return there.frequency, True
+        alone = alone or (there.frequency if stable else None)
+    return alone, False

@@ -1,6 +1,8 @@
 """Where a search has nothing to find, a problem is degenerate or the system refuses: what is said or done instead."""
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from spinlev.geometry.common import MU_0
 from spinlev.geometry.cutting import CONVERGENCE, cut_magnets
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex_mesh
+from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.shapes import Box, rotation_matrix
 
 TABLE = rotor_table(SCENE.rotor, "dipole")
@@ -77,6 +80,17 @@ def test_no_frequency_helps_a_floater_without_strength(monkeypatch):
     assert "from 91.67 to 132 Hz either. To simulate anyway, set start.position_mm" in way_out(WEAK, TABLE, ())
     with pytest.raises(EquilibriumError, match=r"At 110 Hz the floater has no equilibrium with body spin 0\.25"):
         drift(WEAK, TABLE, spin=0.25)
+
+
+def test_a_frequency_that_the_plates_table_does_not_reach_is_still_named():
+    """At 60 Hz nothing levitates; from some 90 Hz it does, where this plate's table, up to 70 Hz, has no currents."""
+    low = replace(SCENE, frequency=60.0, plate=Plate(Box((0.1, 0.1, 0.01), (0.0, 0.0, -0.05)), 3.5e7))
+    memory = SimpleNamespace(table=SimpleNamespace(frequencies=(50.0, 70.0)))
+    said = way_out(low, TABLE, (), memory=memory)
+    assert "Hz without eddy currents in the plate, which are not computed there" in said
+    named = float(re.search(r"possible at about ([\d.]+) Hz", said)[1])
+    assert any(e.stable for e in find_equilibria(replace(SCENE, frequency=named), TABLE))
+    assert "currents" not in way_out(replace(low, plate=None), TABLE, ())
 
 
 @pytest.fixture(scope="module")
