@@ -106,8 +106,10 @@ def _place(equilibrium: Equilibrium) -> str:
     """Where the floater is in the laboratory, and how its moment points."""
     distance, error = _distance(equilibrium).lstrip("-"), equilibrium.position_error / MILLI
     angle = f"polar angle {_polar_angle(equilibrium, 1, '°')}"
-    offset = equilibrium.lateral_offset / MILLI
-    if math.hypot(*equilibrium.laboratory_position[:2]) / MILLI > max(offset / 2, FINEST):  # it stays on one side
+    offset, aside = equilibrium.lateral_offset / MILLI, math.hypot(*equilibrium.laboratory_position[:2]) / MILLI
+    if offset > abs(equilibrium.position[2]) / MILLI or aside > max(
+        offset / 2, FINEST
+    ):  # beside the rotor, or on one side
         lateral = bracketed(offset, max(error, FINEST))
         return f"{distance} mm along the axis from the rotor's centre, lateral offset {lateral} mm, {angle}"
     return f"{distance} mm {'below' if equilibrium.position[2] < 0 else 'above'} the rotor's centre, {angle}"

@@ -76,6 +76,14 @@ def test_stable_is_said_in_one_way(levitation):
     assert headline(levitation, [equilibrium(stable=False, growth=2.2e-5)]).endswith("e-folding time of 12.6 h.")
 
 
+def test_a_floater_beside_the_rotor_is_not_said_to_be_below(levitation):
+    beside = State(np.array([0.013, 0.0, -1.2e-4]), np.zeros(3), np.array([1.0, 0.0, 0.0]), np.zeros(3))
+    said = headline(levitation, [replace(equilibrium(), state=beside)])
+    assert said.startswith(
+        "Stable levitation 0.120(2) mm along the axis from the rotor's centre, lateral offset 13.00(1) mm"
+    )
+
+
 def test_rows_that_mean_nothing_are_not_printed(levitation):
     rough = equilibrium(error=0.12)
     lines = equilibria_words(levitation, Survey((equilibrium(), rough), ()))
