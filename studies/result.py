@@ -384,7 +384,7 @@ def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) ->
     """
     lab, rotor = flight.lab, flight.rotor
     dims = ("time", "axis")
-    far = np.linalg.norm(lab.position, axis=1)
+    far = np.linalg.norm(rotor.position, axis=1)
     tilt = np.degrees(np.arctan2(np.hypot(lab.moment[:, 0], lab.moment[:, 1]), lab.moment[:, 2]))
     found = xr.Dataset(
         {
@@ -401,6 +401,12 @@ def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) ->
             "energy_error": flight.energy_error,
         },
     )
+    if flight.pose is not None:
+        center, axes = flight.pose
+        found = found.assign(
+            rotor_center=variable(dims, center, "m", "origin of the rotor, laboratory frame"),
+            rotor_axis=variable(dims, axes[:, :, 2], "1", "axis of the rotor, laboratory frame"),
+        )
     if memory is None:
         return found
     return found.assign_attrs(

@@ -48,6 +48,10 @@ def several(
             "Input rotor must have no conductivity_S_m where there are several floaters, as they share its currents, "
             "which is not computed; instead it has. Leave it out."
         )
+    if scene.moving:
+        raise InputError(
+            "Input drive must have no center_mm and no axis where there are several floaters; instead it has."
+        )
     if requested.interaction == "mutual":
         raise InputError(
             "Input --interaction must be rigid or auto where there are several floaters; instead received mutual."

@@ -271,6 +271,8 @@ def _check(scene: Scene, starts: State, duration: float) -> None:
         raise InputError(f"Input duration must be positive; instead received {duration} s.")
     if not len(starts.position):
         raise InputError("Input starts must have one state at least; instead received none.")
+    if scene.moving:
+        raise InputError("Input drive must have no center_mm and no axis in many trajectories at once; instead it has.")
 
 
 def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:

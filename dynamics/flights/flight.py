@@ -156,7 +156,8 @@ class Flight:
         ball = BallField(DEGREE + 1, degree)
         whole = in_ball(self.whole, ball) if degree else self.whole
         driven = bool(self.scene.drive)
-        equations = equations_of_motion(whole, self.tilted, self.memory, self.first, driven)
+        moving = self.scene.moving
+        equations = equations_of_motion(whole, self.tilted, self.memory, self.first, driven, moving)
         position, turn = equations.variables[:3], DRIVEN if driven else STEADY
         if degree:
             away = ball.offset([hy.par[Parameter.LENGTH] * x for x in position])
@@ -336,12 +337,12 @@ class Course:
 
     def set_leg(self, leg: Leg) -> float:
         """Let plate and rotor move as on a leg; scaled time of its end."""
-        scales, values = self.flight.scales, self.values
-        values[Parameter.PLATE_DEPTH] = leg.depth / scales.length
-        values[Parameter.PLATE_SPEED] = leg.speed * scales.time / scales.length
-        values[Parameter.ANGLE], values[Parameter.RATE] = leg.angle, leg.rate * scales.time
-        values[Parameter.ACCELERATION] = leg.acceleration * scales.time**2
-        return leg.end / scales.time
+        flight, before, now, row = self.flight, self.values.copy(), np.array([self.time[0]]), self.state[None]
+        leg.write(self.values, flight.scales, flight.scene)
+        if leg.way and self.recorder:  # a rotor whose axis begins to turn has another J
+            jump = flight.jacobi(self.values, now, row).sum() - flight.jacobi(before, now, row).sum()
+            self.state = np.append(self.state[:-1], self.state[-1] + jump)
+        return leg.end / flight.scales.time
 
     def _piece(self, end: float, recorder: Recorder) -> tuple[Array, Array]:
         """Go on to the end of a piece or to an event: scaled times, and states with J - work."""
@@ -399,7 +400,9 @@ class Course:
         if self.ended_by == DURATION:  # not a last digit less
             time[-1] = self.duration
         angle, memory, beyond = scene.angle(time), self.flight.memory, 0.0
-        lab = scales.unpack(states).to_lab(angle)
+        lab, pose = scales.unpack(states).to_lab(angle), None
+        if scene.moving:
+            lab = lab.moved(*(pose := scene.pose(time)))
         if memory is not None:
             beyond = float(1 - np.mean(memory.in_range(lab.position, plate_depth(memory.plate, time))))
         if scene.drive:
@@ -420,6 +423,7 @@ class Course:
             left_plate_table=self.ended_by == BEYOND,
             field_changes=replace(changes, energy=changes.energy / self.scale, total=changes.total / self.scale),
             given=given,
+            pose=pose,
         )
 
 

@@ -46,6 +46,8 @@ class LiveFlight:
     def __init__(
         self, scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], memory: PlateMemory | None = None
     ) -> None:
+        if scene.moving:
+            raise InputError("Input drive must have no center_mm and no axis in live motion; instead it has.")
         start, currents = initial_state(scene, table, equilibria, memory)
         tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
         self.scene = scene

@@ -408,19 +408,21 @@ class JointFlight:
         if self.ended[0] == DURATION:  # not a last digit less
             time[-1] = self.duration
         angle, error = scene.angle(time), float(np.abs(states[:, -1] - states[0, -1]).max()) / scale
-        known, each = self.changes, list[State]()
+        known, each, pose = self.changes, list[State](), scene.pose(time) if scene.moving else None
         given = np.zeros((len(time), 2)) if scene.drive else None
         for flight, own in zip(self.flights, self._own, strict=True):
             part = states[:, own]
             lengths = np.linalg.norm(part[:, 6 : flight.scales.size - 3], axis=1)
             error = max(error, float(np.abs(lengths - 1).max()))
-            each.append(flight.scales.unpack(part).to_lab(angle))
+            lab = flight.scales.unpack(part).to_lab(angle)
+            each.append(lab.moved(*pose) if pose else lab)
             if given is not None:
                 unit = flight.scene.floater.mass * scales.length**2 / scales.time
                 given += part[:, -2:] * [unit, unit / scales.time]
         common: dict[str, Any] = {
             "time": time, "angle": angle, "rate": scene.rate(time), "ended_by": self.ended[0], "energy_error": error,
             "realtime_factor": speed, "steps": self.steps, "compile_seconds": self.compile_seconds, "given": given,
+            "pose": pose,
             "field_changes": replace(known, energy=known.energy / scale, total=known.total / scale),
         }  # fmt: skip
         return Together(tuple(Trajectory(lab=lab, **common) for lab in each), *self.ended)

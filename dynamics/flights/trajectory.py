@@ -51,6 +51,8 @@ class Trajectory:
     field_changes: FieldChanges = field(default_factory=FieldChanges)
     #: (n, 2) angular momentum about the axis, N m s, and work, J, that the motor has given; None without a drive
     given: Array | None = None
+    #: origin (n, 3) m and axes (n, 3, 3) of the rotor's frame before its own turn, where it is moved; else None
+    pose: tuple[Array, Array] | None = None
 
     def __repr__(self) -> str:
         place = ", ".join(f"{1e3 * value:.4f}" for value in self.lab.position[-1])
@@ -88,7 +90,7 @@ class Trajectory:
     @property
     def rotor(self) -> State:
         """Motion (n, 3) along the rotor's axes, SI units."""
-        return self.lab.to_rotor(self.angle)
+        return (self.lab if self.pose is None else self.lab.brought_back(*self.pose)).to_rotor(self.angle)
 
 
 class FlightStopped(KeyboardInterrupt):
@@ -165,7 +167,7 @@ def flight_kind(flight: Trajectory) -> str:
     if flight.left_plate_table:
         return NOT_FOLLOWED
     lasted = flight.ended_by in (DURATION, STOPPED)
-    distance = np.linalg.norm(flight.lab.position, axis=1)
+    distance = np.linalg.norm(flight.rotor.position, axis=1)
     if len(distance) < FEWEST * WINDOWS or flight.levitated_s <= SHORTEST:
         return STABLE if lasted else LOST_AT_ONCE
     whole = np.arange(len(distance))
@@ -192,7 +194,8 @@ def _swings(flight: Trajectory, samples: Indices) -> bool:
 
 def _trends(flight: Trajectory, samples: Indices) -> tuple[Array, Array]:
     """Mean distance, and size of the oscillation in the rotor's frame, in parts of samples (n,), m."""
-    distance, places = np.linalg.norm(flight.lab.position, axis=1), flight.rotor.position
+    places = flight.rotor.position
+    distance = np.linalg.norm(places, axis=1)
     parts = np.array_split(samples, WINDOWS)
     sizes = [_oscillation(flight.time[part], places[part]) for part in parts]
     return np.array([distance[part].mean() for part in parts]), np.array(sizes)

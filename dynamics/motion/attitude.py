@@ -28,34 +28,48 @@ class Attitude:
     moment: Vector  # (3,) unit vector
     spin: Vector  # (3,) as seen from the laboratory
     energy: hy.expression  # of the turning, by the inertia of `parameters`
-    swirl: hy.expression  # angular momentum about the rotor's axis, by the same
+    momentum: Vector  # (3,) angular momentum, by the same
     braking: hy.expression  # power of the viscous torque as seen from the rotor, by the same
     rates: Callable[[Vector], list[hy.expression]]  # of the states, from the torque (3,) by the same
     axes: Matrix | None = None  # whose columns are the body's axes; None of a round body
     quaternion: Vector | None = None  # (4,) of these axes
 
 
-def round_attitude(moment: Vector, spin: Vector, rate: hy.expression) -> Attitude:
-    """That of a body that is round about its `moment` (3,), with the integrated `spin` (3,), in a frame of a `rate`."""
-    lag = [spin[0], spin[1], spin[2] - rate]
+def round_attitude(moment: Vector, spin: Vector, rate: hy.expression, across: Vector = ()) -> Attitude:
+    """That of a body that is round about its `moment` (3,), with the integrated `spin` (3,), in a frame of a `rate`.
+
+    See `turned` for a rate `across` its axis.
+    """
+    lag = lag_of(spin, rate, across)
     tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
     excess = (tilt - along) * dot(spin, moment)
     brake = [excess * moment[i] - tilt * spin[i] for i in range(3)]
 
     def rates(torque: Vector) -> list[hy.expression]:
-        return [*cross(lag, moment), *subtract([torque[i] + brake[i] for i in range(3)], turned(spin, rate))]
+        return [*cross(lag, moment), *subtract([torque[i] + brake[i] for i in range(3)], turned(spin, rate, across))]
 
-    return Attitude(moment, spin, 0.5 * dot(spin, spin), spin[2], dot(brake, lag), rates)
+    return Attitude(moment, spin, 0.5 * dot(spin, spin), spin, dot(brake, lag), rates)
 
 
-def turning_attitude(quaternion: Vector, spin: Vector, rate: hy.expression) -> Attitude:
-    """That of any body, from its `quaternion` (4,) and its `spin` (3,) along its own axes, in a frame of a `rate`."""
+def lag_of(spin: Vector, rate: hy.expression, across: Vector = ()) -> list[hy.expression]:
+    """A spin (3,) as seen from a frame of a `rate` about z and one `across` it."""
+    x, y = [s - a for s, a in zip(spin[:2], across, strict=True)] if across else spin[:2]
+    return [x, y, spin[2] - rate]
+
+
+def turning_attitude(quaternion: Vector, spin: Vector, rate: hy.expression, across: Vector = ()) -> Attitude:
+    """That of any body, from its `quaternion` (4,) and its `spin` (3,) along its own axes, in a frame of a `rate`.
+
+    See `turned` for a rate `across` its axis.
+    """
     w, x, y, z = quaternion
     axes = rotation_of(quaternion)
     ratios = [hy.par[p] for p in (Parameter.INERTIA_X, Parameter.INERTIA_Y, Parameter.INERTIA_Z)]
     pointing = [hy.par[p] for p in (Parameter.POINTING_X, Parameter.POINTING_Y, Parameter.POINTING_Z)]
     turning = [a * s for a, s in zip(ratios, spin, strict=True)]  # angular momentum
     lag = [s - rate * a for s, a in zip(spin, axes[2], strict=True)]
+    if across:
+        lag = [s - across[0] * a - across[1] * b for s, a, b in zip(lag, axes[0], axes[1], strict=True)]
     brake = [-hy.par[Parameter.TILT_DRAG] * s for s in spin]
 
     def rates(torque: Vector) -> list[hy.expression]:
@@ -75,7 +89,7 @@ def turning_attitude(quaternion: Vector, spin: Vector, rate: hy.expression) -> A
         moment=[dot(row, pointing) for row in axes],
         spin=[dot(row, spin) for row in axes],
         energy=0.5 * dot(spin, turning),
-        swirl=dot(axes[2], turning),
+        momentum=[dot(row, turning) for row in axes],
         braking=dot(brake, lag),
         rates=rates,
         axes=axes,

@@ -17,6 +17,8 @@ do in the rotating frame is integrated along as the last state, `work`, so that 
 With a drive W changes in time, and dJ/dt = -Ẇ ẑ·(r × v + iΩ); velocity and spin are those seen from the laboratory, so
 that nothing else changes.  What the rotor does to the floater, and a plate to the rotor, the motor gives: its angular
 momentum and its work, W times the torque, are integrated along as two more states.
+A rotor that is moved has an angular velocity W across its axis, too, and an origin with a velocity; positions are seen
+from there, and all of gravity is in `work`, as what moves the rotor does work that the motor does not.
 Effects (`effect`) add what else acts on the floater: accelerations of position and spin, their energy to J, their
 power to `work`.  A plate adds its currents as further states (`memory_terms`) and their energy to J.  Every number that
 a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
@@ -31,10 +33,23 @@ from ...fem.closed_forms.eddy_bodies import thin_field_torque
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
-from .attitude import ROUND_NAMES, TURNING_NAMES, round_attitude, turning_attitude
-from .effect import Motion, interaction_of
+from .attitude import ROUND_NAMES, TURNING_NAMES, lag_of, round_attitude, turning_attitude
+from .effect import NOTHING, Motion, interaction_of
 from .plate import PlateMemory, memory_terms
-from .state import DRIVEN, STEADY, Parameter, Scales, Vector, cross, dot, left_product, rotation_of, subtract, turned
+from .state import (
+    DRIVEN,
+    STEADY,
+    Parameter,
+    Scales,
+    Vector,
+    cross,
+    dot,
+    left_product,
+    moved,
+    rotation_of,
+    subtract,
+    turned,
+)
 
 CENTRE = tuple(f"{vector}_{axis}" for vector in ("position", "velocity") for axis in "xyz")
 NAMES = (*CENTRE, *ROUND_NAMES)
@@ -83,6 +98,7 @@ def equations_of_motion(
     memory: PlateMemory | None = None,
     first: int = len(Parameter),
     driven: bool = False,
+    moving: bool = False,
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
@@ -92,11 +108,14 @@ def equations_of_motion(
     tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
     memory, first : the plate's currents, if they are modelled, and the first of their runtime parameters
     driven : whether the rotor's rate changes in time
+    moving : whether it is moved, too
     """
-    whole, rotor = interaction_of(table), DRIVEN if driven else STEADY
+    whole, rotor = interaction_of(table), moved() if moving else DRIVEN if driven else STEADY
     variables = list(hy.make_vars(*CENTRE, *(TURNING_NAMES if whole.turning else ROUND_NAMES)))
     position, velocity, turn_states, spin_states = variables[:3], variables[3:6], variables[6:-3], variables[-3:]
-    attitude = (turning_attitude if whole.turning else round_attitude)(turn_states, spin_states, rotor.rate)
+    attitude = (turning_attitude if whole.turning else round_attitude)(
+        turn_states, spin_states, rotor.rate, rotor.across
+    )
     moment, spin = attitude.moment, attitude.spin
     length, torque, inertia, linear = (
         hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
@@ -105,11 +124,13 @@ def equations_of_motion(
     strength = torque * inertia * length
     force, turn = [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
     pulled, turning = [strength * m for m in moment], [torque * b for b in field]
-    axial, lateral = _gravity(tilted_gravity, rotor.angle)
+    axial, lateral = _gravity(tilted_gravity, rotor.angle) if not moving else (NOTHING, rotor.gravity)
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
-    drift = subtract(velocity, turned(position, rotor.rate))
-    lag = [spin[0], spin[1], spin[2] - rotor.rate]
-    momentum = cross(position, velocity)[2] + inertia * attitude.swirl
+    drift = subtract(velocity, turned(position, rotor.rate, rotor.across))
+    drift = subtract(drift, rotor.velocity) if moving else drift
+    lag = lag_of(spin, rotor.rate, rotor.across)
+    momenta = [a + inertia * b for a, b in zip(cross(position, velocity), attitude.momentum, strict=True)]
+    momentum = momenta[2]
     jacobi = [
         0.5 * dot(velocity, velocity),
         inertia * attitude.energy,
@@ -138,6 +159,13 @@ def equations_of_motion(
         power = power + added.power
     force = [dot(pulled, [gradient[i][j] for i in range(3)]) + f for j, f in enumerate(force)]
     turn = [a + b for a, b in zip(cross(moment, turning), turn, strict=True)]
+    if moving:
+        # E - W·L of a frame whose origin has a velocity c: c·F + W·(c × v) beside what there is without
+        (x, y), whirl = rotor.across, [*rotor.across, rotor.rate]
+        jacobi.append(-(x * momenta[0] + y * momenta[1]))
+        power = power + dot(rotor.velocity, [a + b for a, b in zip(force, push, strict=True)])
+        power = power + dot(whirl, cross(rotor.velocity, velocity))
+        power = power - rotor.rate * (y * momenta[0] - x * momenta[1])
     if driven:
         power = power - rotor.acceleration * momentum
         given = cross(position, force)[2] + inertia * turn[2]
@@ -148,7 +176,7 @@ def equations_of_motion(
         state_rates = [*state_rates, given, rotor.rate * given]
     rates = [
         *drift,
-        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity, rotor.rate)),
+        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity, rotor.rate, rotor.across)),
         *attitude.rates(turn),
     ]
     return Equations([*variables, *states], [*rates, *state_rates], jacobi, power)

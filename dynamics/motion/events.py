@@ -11,11 +11,11 @@ import numpy as np
 
 from ...geometry.common import Array
 from ...geometry.overlap import body_overlap
-from ...geometry.scene.contents import Plate, Scene
+from ...geometry.scene.contents import Plate, Scene, Stretch
 from ...geometry.shapes import Box
 from ...geometry.solids import Solid
 from .plate import PlateMemory, raised, seen_by_plate
-from .state import STEADY, Parameter, Turn, Vector, turned_about_z
+from .state import STEADY, Parameter, Scales, Turn, Vector, turned_about_z
 
 # The last: where the range of a plate's table ends, beyond which nobody knows its currents' field.
 CONTACT, LOST, BEYOND = "contact", "lost", "beyond"
@@ -132,6 +132,20 @@ class Leg:
     angle: float  # of the rotor
     rate: float
     acceleration: float = 0.0
+    way: Stretch | None = None  # of a rotor that is moved
+
+    def write(self, values: Array, scales: Scales, scene: Scene) -> None:
+        """Set the runtime parameters (p,) that say so."""
+        speed, way = scales.length / scales.time, self.way
+        values[Parameter.PLATE_DEPTH], values[Parameter.PLATE_SPEED] = self.depth / scales.length, self.speed / speed
+        values[Parameter.ANGLE], values[Parameter.RATE] = self.angle, self.rate * scales.time
+        values[Parameter.ACCELERATION] = self.acceleration * scales.time**2
+        if way is not None:
+            turned = way.axes.T
+            values[Parameter.TILT_X : Parameter.TILT_Y + 1] = (turned @ way.about)[:2]
+            values[Parameter.TILT], values[Parameter.TILT_RATE] = -way.rate * way.start, way.rate * scales.time
+            values[Parameter.MOVE_X : Parameter.MOVE_Z + 1] = turned @ way.velocity / speed
+            values[Parameter.GRAVITY_X : Parameter.GRAVITY_Z + 1] = turned @ scene.gravity * scales.time / speed
 
 
 def motion_legs(scene: Scene, duration: float) -> list[Leg]:
@@ -155,5 +169,6 @@ def motion_legs(scene: Scene, duration: float) -> list[Leg]:
     for end in sorted({*ends, *(end for end, _, _ in plate)}):
         _, depth, speed = next(leg for leg in plate if end <= leg[0])
         k = next(k for k, last in enumerate(ends) if end <= last)
-        legs.append(Leg(end, depth, speed, float(angles[k]), float(begins[k]), float(slopes[k])))
+        way = scene.stretches[k] if scene.moving else None
+        legs.append(Leg(end, depth, speed, float(angles[k]), float(begins[k]), float(slopes[k]), way))
     return legs

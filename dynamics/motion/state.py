@@ -27,6 +27,8 @@ class Parameter(IntEnum):
     SLOWNESS is μ0σR² of it in units of time.
     INERTIA_X to _Z are principal moments of inertia over that of INERTIA, POINTING_X to _Z the moment's direction along
     the body's axes: those of a body that is not round about its moment.
+    Of a rotor that is moved: TILT_X, _Y is the direction across its axis about which that turns, at TILT_RATE, by TILT
+    at t = 0, MOVE_X to _Z its velocity; these and gravity along the axes that it had, before its turn, where TILT is 0.
     MEASURE is that of a rotor whose shape is a parameter, m or rad (`rotor_family`); no other rotor has it.
     """
 
@@ -59,6 +61,13 @@ class Parameter(IntEnum):
     MEASURE = auto()
     ACCELERATION = auto()
     ANGLE = auto()
+    TILT_X = auto()
+    TILT_Y = auto()
+    TILT = auto()
+    TILT_RATE = auto()
+    MOVE_X = auto()
+    MOVE_Y = auto()
+    MOVE_Z = auto()
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +78,11 @@ class Turn:
     angle: hy.expression
     acceleration: hy.expression
     pace: hy.expression  # the rate's size, smooth where it passes through zero
+    # of a rotor that is moved, along its own axes: the part of its angular velocity across its axis (2), the velocity
+    # of its origin (3), and gravity (3)
+    across: Vector = ()
+    velocity: Vector = ()
+    gravity: Vector = ()
 
 
 RATE, ACCELERATION = hy.par[Parameter.RATE], hy.par[Parameter.ACCELERATION]
@@ -81,6 +95,27 @@ DRIVEN = Turn(
     ACCELERATION,
     hy.sqrt(NOW * NOW + REST**2),
 )
+
+
+def moved() -> Turn:
+    """That of a rotor that is driven and moved."""
+    x, y, rate = (hy.par[p] for p in (Parameter.TILT_X, Parameter.TILT_Y, Parameter.TILT_RATE))
+    tilt = hy.par[Parameter.TILT] + rate * hy.time
+    cosine, sine = hy.cos(DRIVEN.angle), hy.sin(DRIVEN.angle)
+
+    def spun(vector: Vector) -> list[hy.expression]:
+        return [cosine * vector[0] + sine * vector[1], cosine * vector[1] - sine * vector[0], vector[2]]
+
+    def seen(first: Parameter) -> list[hy.expression]:
+        # by Rodrigues' formula, turned back by the tilt
+        vector, axis = [hy.par[first + k] for k in range(3)], [x, y, hy.expression(0.0)]
+        along, side = (1.0 - hy.cos(tilt)) * dot(axis, vector), cross(axis, vector)
+        return spun(
+            [hy.cos(tilt) * v - hy.sin(tilt) * s + along * a for v, s, a in zip(vector, side, axis, strict=True)]
+        )
+
+    about = spun([rate * x, rate * y, hy.expression(0.0)])
+    return replace(DRIVEN, across=about[:2], velocity=seen(Parameter.MOVE_X), gravity=seen(Parameter.GRAVITY_X))
 
 
 def dotted(a: Vector, b: Vector) -> hy.expression:
@@ -98,9 +133,15 @@ def cross(a: Vector, b: Vector) -> list[hy.expression]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def turned(vector: Vector, rate: hy.expression) -> list[hy.expression]:
-    """W × vector: what the frame's rotation adds to the rate of a vector fixed in the laboratory."""
-    return [-rate * vector[1], rate * vector[0], hy.expression(0.0)]
+def turned(vector: Vector, rate: hy.expression, across: Vector = ()) -> list[hy.expression]:
+    """W × vector: what the frame's rotation adds to the rate of a vector fixed in the laboratory.
+
+    W is a `rate` about z, with a part `across` it (2), if there is one.
+    """
+    about_z = [-rate * vector[1], rate * vector[0], hy.expression(0.0)]
+    if not across:
+        return about_z
+    return [a + b for a, b in zip(about_z, cross([*across, hy.expression(0.0)], vector), strict=True)]
 
 
 def subtract(a: Vector, b: Vector) -> list[hy.expression]:
@@ -142,6 +183,16 @@ class State:
             columns = turned_about_z(self.axes.swapaxes(-1, -2), np.asarray(angle, float)[..., None])
             axes = columns.swapaxes(-1, -2)
         return replace(State(*(turned_about_z(v, angle) for v in self.vectors)), axes=axes)
+
+    def moved(self, center: Array, axes: Array) -> State:
+        """In the laboratory, from along axes (n, 3, 3) with an origin at (n, 3) m; velocities are the same."""
+        position, *rest = (np.einsum("nij,nj->ni", axes, vector) for vector in self.vectors)
+        return replace(State(position + center, *rest), axes=None if self.axes is None else axes @ self.axes)
+
+    def brought_back(self, center: Array, axes: Array) -> State:
+        """What `moved` takes away."""
+        shifted = replace(self, position=self.position - center)
+        return shifted.moved(np.zeros(3), axes.swapaxes(1, 2))
 
     @property
     def orientation(self) -> Array:

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from ..common import Array, frozen_array, html_table, listed, millimetres
 from ..magnets import Magnet
@@ -133,10 +134,34 @@ class Drag:
 
 @dataclass(frozen=True)
 class DriveStep:
-    """A step of the rotor's drive: steadily to a `frequency` (Hz), or staying where None, in so many `seconds`."""
+    """A step of the rotor's drive: steadily to a `frequency` (Hz), or staying where None, in so many `seconds`.
+
+    Meanwhile its origin moves steadily to a `center` (3,) m, and its axis turns the shortest way to an `axis` (3,),
+    both of the laboratory; None: they stay.
+    """
 
     frequency: float | None
     seconds: float
+    center: tuple[float, ...] | None = None
+    axis: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """The rotor's place in the laboratory from an instant on, as it moves and turns its axis steadily."""
+
+    start: float  # s
+    center: Array  # (3,) m of its origin then
+    axes: Array  # (3, 3) whose columns are the axes of its frame then, had it no turn about its own
+    velocity: Array  # (3,) m/s
+    about: Array  # (3,) unit vector of the laboratory about which its axis turns
+    rate: float  # rad/s
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Origin (n, 3) m and axes (n, 3, 3) at times (n,) s."""
+        since = time - self.start
+        turns = Rotation.from_rotvec(self.rate * since[:, None] * self.about).as_matrix()
+        return self.center + since[:, None] * self.velocity, turns @ self.axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,6 +290,38 @@ class Scene:
         return np.asarray(angles[last] + (rates[last] + self.rate(time)) / 2 * (time - times[last]))
 
     @property
+    def moving(self) -> bool:
+        """Whether a step of the drive moves the rotor or turns its axis."""
+        return any(step.center or step.axis for step in self.drive)
+
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """The rotor's way, a stretch for each step of the drive and one for all that follows."""
+        found, time, center, axes = list[Stretch](), 0.0, np.zeros(3), np.eye(3)
+        for step in (*self.drive, DriveStep(None, np.inf)):
+            velocity = (np.array(step.center) - center) / step.seconds if step.center else np.zeros(3)
+            about, rate = np.eye(3)[0], 0.0
+            if step.axis:
+                across = np.cross(axes[:, 2], step.axis)
+                size = float(np.linalg.norm(across))
+                about = across / size if size else about
+                rate = float(np.arctan2(size, axes[:, 2] @ step.axis)) / step.seconds
+            found.append(Stretch(time, center, axes, velocity, about, rate))
+            if np.isfinite(step.seconds):
+                time += step.seconds
+                (center,), (axes,) = found[-1].at(np.array([time]))
+        return tuple(found)
+
+    def pose(self, time: ArrayLike) -> tuple[Array, Array]:
+        """Origin (n, 3) m of the rotor at times (n,) s, and the axes (n, 3, 3) of its frame before its own turn."""
+        time = np.asarray(time, float)
+        which = np.searchsorted([stretch.start for stretch in self.stretches], time, "right") - 1
+        center, axes = np.empty((len(time), 3)), np.empty((len(time), 3, 3))
+        for k in np.unique(which):
+            center[which == k], axes[which == k] = self.stretches[k].at(time[which == k])
+        return center, axes
+
+    @property
     def turning_bodies(self) -> tuple[Solid, ...]:
         """The rotor's magnets and conductors."""
         return (*(magnet.body for magnet in self.rotor), *(conductor.body for conductor in self.conductors))
@@ -291,5 +348,7 @@ class Scene:
         said = [f"{self.frequency:g} Hz"]
         for step in self.drive:
             way = "held for" if step.frequency is None else f"to {step.frequency:g} Hz in"
-            said.append(f"{way} {step.seconds:g} s")
+            there = f", its origin to ({listed(1e3 * np.array(step.center))}) mm" if step.center else ""
+            there += f", its axis to ({listed(np.array(step.axis))})" if step.axis else ""
+            said.append(f"{way} {step.seconds:g} s{there}")
         return ", ".join(said)

@@ -447,9 +447,14 @@ def _drag(scene: Scene) -> dict[str, Any] | None:
     return {"model": "air"} if scene.drag == replace(stokes, air=True) else _said(schema.DragTable, scene.drag)
 
 
-def _drive(scene: Scene) -> list[dict[str, float]] | None:
-    steps = [(step.frequency, step.seconds) for step in scene.drive]
-    return [{"hold_s": s} if f is None else {"to_hz": f, "in_s": s} for f, s in steps] or None
+def _drive(scene: Scene) -> list[dict[str, Any]] | None:
+    found = list[dict[str, Any]]()
+    for step in scene.drive:
+        way = {"center_mm": _all_rounded(1e3 * np.array(step.center))} if step.center else {}
+        way |= {"axis": list(step.axis)} if step.axis else {}
+        kind = {} if step.frequency is None else {"to_hz": step.frequency}
+        found.append(kind | way | {"in_s" if kind | way else "hold_s": step.seconds})
+    return found or None
 
 
 def _coils(scene: Scene) -> list[dict[str, Any]] | None:

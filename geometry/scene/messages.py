@@ -24,6 +24,7 @@ STRONGEST, SIZES = 2.0, (1e-4, 1.0)
 HEADER, KEY = re.compile(r"\s*(\[\[?)\s*([\w.-]+)\s*\]"), re.compile(r"\s*([\w.-]+)\s*=")
 NAMED = re.compile(r"(?:unknown key `|Input )([\w.\[\]-]+)")
 COMMA = re.compile(r"[-+]?\d+,\d+")  # a number as many languages write it
+OPPOSITE = 1 - 1e-9  # cosine of the angle between two axes from which on they are opposite
 MOST = 20  # Faults of a scene that are listed; the rest are counted
 # By their keys; rotors by their configuration, but for that of `rotor.magnets`.
 TABLES: dict[str, type[schema.Table]] = {
@@ -226,15 +227,35 @@ def key_faults(table: schema.SceneTable) -> list[str]:
             )
     for k, step in enumerate(table.drive or ()):
         kinds = [key for key in ("to_hz", "stop", "hold_s") if getattr(step, key) is not None]
-        if len(kinds) != 1:
+        ways = [key for key in ("center_mm", "axis") if getattr(step, key) is not None]
+        faults += _way_faults(f"drive[{k}]", step, table)
+        if ways and "hold_s" in kinds:
+            faults.append(f"Input drive[{k}].hold_s must be in_s beside {ways[0]}; instead received hold_s.")
+        elif len(kinds) > 1 or not kinds + ways:
             received = " and ".join(kinds) or "none of them"
             faults.append(f"Input drive[{k}] must have one of to_hz, stop and hold_s; instead received {received}.")
         elif (step.in_s is None) != (kinds == ["hold_s"]):
             rule, instead = ("be left out", "received both") if step.in_s else ("be given", "it is missing")
-            faults.append(f"Input drive[{k}].in_s must {rule} beside {kinds[0]}; instead {instead}.")
+            faults.append(f"Input drive[{k}].in_s must {rule} beside {(kinds + ways)[0]}; instead {instead}.")
     if rotor.field_map is None:
         alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(rotor, k) is not None]
         faults += [f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone]
+    return faults
+
+
+def _way_faults(place: str, step: schema.DriveTable, table: schema.SceneTable) -> list[str]:
+    """Faults of a step that moves the rotor or turns its axis."""
+    if step.center_mm is None and step.axis is None:
+        return []
+    faults = []
+    if step.axis is not None and not np.any(step.axis):
+        faults.append(f"Input {place}.axis must be a direction, not zero; instead received {step.axis}.")
+    if table.plate is not None:
+        key = "axis" if step.center_mm is None else "center_mm"
+        faults.append(
+            f"Input {place}.{key} must be left out beside a plate, whose currents are known for a rotor that stays "
+            "where it is; instead it is given. Leave the plate out, or lower it (plate.lowering)."
+        )
     return faults
 
 
@@ -384,6 +405,12 @@ def overlap_faults(scene: Scene) -> list[str]:
         for (first, one), (second, other) in combinations(bodies, 2)
         if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING
     ]
+    for k, (stretch, step) in enumerate(zip(scene.stretches, scene.drive, strict=False)):
+        if step.axis and stretch.axes[:, 2] @ step.axis < -OPPOSITE:
+            faults.append(
+                f"Input drive[{k}].axis must not be opposite to the axis before it, as no way to it is the shortest; "
+                "instead it is. Give a step between."
+            )
     metal = scene.plate.body.placed if scene.plate else ()
     plates = [("plate" if len(metal) == 1 else f"plate[{k}]", body) for k, body in enumerate(metal)]
     faults += [

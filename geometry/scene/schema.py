@@ -386,15 +386,19 @@ class StartTable(Table):
 
 
 class DriveTable(Table):
-    """A step of the rotor's drive: a ramp to a frequency or to rest, or a hold."""
+    """A step of the rotor's drive: a ramp to a frequency or to rest, or a hold, or the rotor's way."""
 
     to_hz: Frequency | None = None
     stop: Literal[True] | None = None
     in_s: Duration | None = None
     hold_s: Duration | None = None
+    center_mm: Three[Coordinate] | None = None
+    axis: Three[Number] | None = None
 
     def step(self) -> DriveStep:
-        return DriveStep(0.0 if self.stop else self.to_hz, self.in_s or self.hold_s or 0.0)
+        center = None if self.center_mm is None else tuple(MILLI * c for c in self.center_mm)
+        axis = None if self.axis is None else tuple((np.array(self.axis) / np.linalg.norm(self.axis)).tolist())
+        return DriveStep(0.0 if self.stop else self.to_hz, self.in_s or self.hold_s or 0.0, center, axis)
 
 
 ONE_OR_SEVERAL = Discriminator(lambda given: "several" if isinstance(given, list) else "one")

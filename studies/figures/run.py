@@ -171,7 +171,7 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     figure, ((far, look), (tilt, above)) = panels(2, 2, 2.4)
     seconds, moment = result["time"].values, result["moment"].values
     time, unit = (seconds / 3600, "h") if seconds[-1] > HOURS else (seconds, "s")
-    distance = -1e3 * result["position"].sel(axis="z").values
+    distance = -1e3 * result["position_rotor_frame"].sel(axis="z").values
     angle = np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2]))
     up = str(result.attrs.get("ended_by", "duration")) in ("duration", "stopped")
     near = slice(0, SHOWN) if up else slice(-SHOWN, None)

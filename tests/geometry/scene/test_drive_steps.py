@@ -1,6 +1,7 @@
 """Steps of the rotor's drive in scene files: what they say, and what is wrong with them, one message each."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,6 +27,19 @@ def test_steps_are_read_written_and_changed():
     assert (again.frequency, again.drive) == (60.0, (DriveStep(None, 1.0),))
 
 
+def test_a_way_of_the_rotor_is_read_and_written():
+    way = {"center_mm": [1.0, 0.0, 2.0], "axis": [0.0, 3.0, 4.0], "in_s": 2.0}
+    scene = driven(parse_scene(TEXT), [{**way, "to_hz": 90.0}, {"axis": [0.0, 0.0, 1.0], "in_s": 1.0}])
+    assert scene.drive[0] == DriveStep(90.0, 2.0, (1e-3, 0.0, 2e-3), (0.0, 0.6, 0.8))
+    assert parse_scene(scene_text(replace(scene, text="", keys=None))).drive == scene.drive
+    center, axes = scene.pose(np.array([1.0, 2.0, 5.0]))
+    np.testing.assert_allclose(center, [[5e-4, 0.0, 1e-3], [1e-3, 0.0, 2e-3], [1e-3, 0.0, 2e-3]], atol=1e-15)
+    half = np.arctan2(0.6, 0.8) / 2
+    np.testing.assert_allclose(
+        axes[:, :, 2], [[0.0, np.sin(half), np.cos(half)], [0.0, 0.6, 0.8], [0.0, 0.0, 1.0]], atol=1e-15
+    )
+
+
 @pytest.mark.parametrize(
     ("step", "message"),
     [
@@ -42,7 +56,34 @@ def test_steps_are_read_written_and_changed():
         ("hold_s = 0.0", "Input drive[0].hold_s must be at least 1e-06; instead received 0.0."),
         ("stop = false\nin_s = 1.0", "Input drive[0].stop must be True; instead received False."),
         ("to_hz = 50.0\nin_sec = 2.0", "unknown key `drive[0].in_sec` (did you mean `in_s`?)"),
-        ("to_hz = 50.0\nramp = 2.0", "unknown key `drive[0].ramp` (allowed are to_hz, stop, in_s, hold_s)"),
+        (
+            "to_hz = 50.0\nramp = 2.0",
+            "unknown key `drive[0].ramp` (allowed are to_hz, stop, in_s, hold_s, center_mm, axis)",
+        ),
+        (
+            "axis = [0.0, 0.0, 0.0]\nin_s = 1.0",
+            "Input drive[0].axis must be a direction, not zero; instead received [0.0, 0.0, 0.0].",
+        ),
+        ("center_mm = [0.0, 0.0, 1.0]", "Input drive[0].in_s must be given beside center_mm; instead it is missing."),
+        (
+            "center_mm = [0.0, 1.0]\nin_s = 1.0",
+            "Input drive[0].center_mm must be a list of exactly 3 numbers; instead received [0.0, 1.0].",
+        ),
+        (
+            "axis = [0.0, 0.1, 1.0]\nhold_s = 1.0",
+            "Input drive[0].hold_s must be in_s beside axis; instead received hold_s.",
+        ),
+        (
+            "axis = [0.0, 0.0, -1.0]\nin_s = 1.0",
+            "Input drive[0].axis must not be opposite to the axis before it, as no way to it is the shortest; "
+            "instead it is. Give a step between.",
+        ),
+        (
+            "center_mm = [0.0, 0.0, 1.0]\nin_s = 1.0\n"
+            "[plate]\nsize_mm = [100.0, 100.0, 10.0]\ncenter_mm = [0.0, 0.0, -50.0]\nconductivity_S_m = 3.5e7",
+            "Input drive[0].center_mm must be left out beside a plate, whose currents are known for a rotor that stays "
+            "where it is; instead it is given. Leave the plate out, or lower it (plate.lowering).",
+        ),
     ],
 )
 def test_one_message_for_each_fault(step, message):
