@@ -47,7 +47,7 @@ FORMATS = {
     "rotor-losses": 2,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 4,
+    "equilibria": 5,
     "experiment": 2,
     "code": 1,
 }

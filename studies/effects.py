@@ -130,8 +130,8 @@ def _shape(levitation: Levitation) -> ListedEffect:
     floater = levitation.scene.floater
     left_out = shares(floater, floater_sources(floater), HIGHEST)
     why = (
-        f"its multipoles in the rotor's field; plate, induced magnetisation and currents have its dipole and a sphere "
-        f"of its volume, whose error is up to {left_out.sum():.1%} of what they do"
+        f"its multipoles and its polarizability in the rotor's field; plate, the magnets' response and currents have "
+        f"its dipole and a sphere of its volume, whose error is up to {left_out.sum():.1%} of what they do"
     )
     return ListedEffect(FLOATER_SHAPE, True, None, None, why)
 

@@ -13,8 +13,15 @@ from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
 from .body_shape import BodyShape
 from .effect import Interaction, interaction_of
-from .floater_effects import FLOATER_SHAPE, FloaterShape, check_floater_metal, scene_effects
-from .rotor_effects import ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
+from .floater_effects import (
+    FLOATER_SHAPE,
+    INDUCED_SHAPE,
+    FloaterShape,
+    InducedShape,
+    check_floater_metal,
+    scene_effects,
+)
+from .rotor_effects import MUTUAL, ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
 
 NOTHING_PERMEABLE = "neither rotor nor floater is permeable"
 LARGEST = 5000  # Points in a magnet with which mutual magnetisation is computed at all: minutes
@@ -97,6 +104,9 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
         else:
             bodies = [magnet.body for magnet in scene.rotor]
             effects.append(BodyShape.of(scene.floater, whole.field, bodies))
+    mutual = {effect.name for effect in whole.effects} & {MUTUAL, INDUCED_SHAPE} == {MUTUAL}
+    if mutual and not scene.floater.is_sphere:
+        effects.append(InducedShape.of(scene.floater))
     pieces = pieces_of(scene.rotor, scene.conductors)
     if pieces:
         check_metal(pieces, scene.fastest, scene.floater.radius)
@@ -112,6 +122,7 @@ def mean_over_turns(scene: Scene, table: FieldFormula) -> tuple[Scene, Interacti
     """
     whole, round_scene = interaction_of(table), replace(scene, floater=scene.floater.averaged)
     # Beside what the shape does all effects are those of a round body as well.
-    others = replace(whole, turning=False, effects=tuple(e for e in whole.effects if e.name != FLOATER_SHAPE))
+    kept = tuple(e for e in whole.effects if e.name not in (FLOATER_SHAPE, INDUCED_SHAPE))
+    others = replace(whole, turning=False, effects=kept)
     rough = FloaterShape.of(round_scene.floater, floater_sources(round_scene.floater), whole.field)
     return round_scene, with_effects(round_scene, others), with_effects(round_scene, others.joined(rough))

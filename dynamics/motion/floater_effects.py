@@ -51,7 +51,7 @@ from numpy.typing import ArrayLike
 
 from ...fem.closed_forms.eddy_bodies import skin_number
 from ...fem.harmonics.interior import LocalField
-from ...fem.rotor.floater import FloaterSources, force_and_torque
+from ...fem.rotor.floater import FloaterSources, force_and_torque, polarizability_tensor
 from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable
 from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
@@ -218,6 +218,51 @@ class FloaterShape:
             force -= pull
             torque -= strength * np.cross(moment, field) + height * np.cross(moment, pull)
         return np.asarray(np.linalg.norm([torque, force], axis=2).T / (self.floater.moment or 1.0))
+
+
+INDUCED_SHAPE = "shape of what is induced in the floater"
+
+
+@dataclass(frozen=True, eq=False)
+class InducedShape:
+    """What the rotor's field at its centre induces in a floater beyond a sphere of its magnets' volume.
+
+    Its energy is -½ B·A B with the difference A of the two polarizabilities, which turns with the body.
+    """
+
+    tensor: Array  # (3, 3) A m²/T, along the body's axes
+    name: str = INDUCED_SHAPE
+
+    @classmethod
+    def of(cls, floater: Floater) -> InducedShape:
+        """That of a floater; one that is round about its moment, or the mean of turns about it, has a round one."""
+        tensor = polarizability_tensor(floater) - floater.polarizability * np.eye(3)
+        if floater.round:
+            across = (tensor[0, 0] + tensor[1, 1]) / 2
+            tensor = np.diag([across, across, tensor[2, 2]])
+        return cls(tensor)
+
+    @property
+    def compiled_in(self) -> tuple[float, ...]:
+        """Numbers in the code of the equations, see `Rates.elsewhere`."""
+        return tuple(self.tensor.ravel().tolist())
+
+    def added(self, motion: Motion) -> Added:
+        length, inertia, share = (hy.par[p] for p in (Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE))
+        field, gradient, unit = motion.field, motion.gradient, share * share
+        if motion.axes is None:
+            across, along = float(self.tensor[0, 0]), float(self.tensor[2, 2] - self.tensor[0, 0])
+            lengthwise = along * dot(motion.moment, field)
+            induced = [across * b + lengthwise * m for b, m in zip(field, motion.moment, strict=True)]
+        else:
+            own = [dot([row[k] for row in motion.axes], field) for k in range(3)]
+            turned = [hy.sum([float(a) * b for a, b in zip(row, own, strict=True)]) for row in self.tensor]
+            induced = [dot(row, turned) for row in motion.axes]
+        return Added(
+            force=[unit * length * dot(induced, [gradient[i][j] for i in range(3)]) for j in range(3)],
+            torque=[unit / inertia * t for t in cross(induced, field)],
+            energy=-0.5 * unit * dot(induced, field),
+        )
 
 
 Matrix = list[list[hy.expression]]

@@ -24,7 +24,7 @@ import scipy.linalg
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from ...geometry.common import Array, ComputationError
+from ...geometry.common import MU_0, Array, ComputationError
 from ...geometry.magnets import Magnet
 from ...geometry.overlap import separation
 from ...geometry.shapes import Box, Cylinder, Sphere
@@ -538,6 +538,11 @@ class SurfaceCharges:
         whole[np.diag_indices_from(whole)] += 1 + self.contrast / 2
         factors, pivots = scipy.linalg.lu_factor(whole, overwrite_a=True)
         return factors, pivots
+
+    def polarizability(self) -> Array:
+        """(3, 3) A m²/T: the moment of all magnets together that a uniform field induces, ∫ x σ dS/μ0 of a unit one."""
+        found = (self.places * self.areas[:, None]).T @ self.response(self.normals) / MU_0
+        return np.asarray((found + found.T) / 2)
 
     def beyond(self, carriers: Sequence[Magnet]) -> Array:
         """σ (n,) T beyond n·J' of uniform `carriers`, one for each of all magnets."""

@@ -20,6 +20,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import rotation_matrix
 from ..closed_forms.potentials import unit_dipole_fields
+from ..elements.surface import SurfaceCharges, bears_charges
 from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
 from ..harmonics.interior import sphere
 from ..harmonics.rigid import field_coefficients, harmonics, matrices, shells as multipole_degrees
@@ -98,6 +99,24 @@ class FloaterSources:
             forces[k] = pulls.sum() + charges @ outer
             torques[k] = strengths @ inner + arms @ pulls + (charges * ends) @ outer
         return forces, torques
+
+
+# Along an edge, of the charges by which a body's polarizability is computed, up to a permeability; beyond it edges ask
+# for more.
+NODES, HIGHEST_PERMEABILITY = 10, 2.0
+
+
+def polarizability_tensor(floater: Floater) -> Array:
+    """(3, 3) A m²/T: the moment that a uniform field induces in a floater, along its own axes.
+
+    Exact for a sphere; of cuboids, cylinders and rings of μr up to 2 by charges on their surfaces, to 1e-4; of any
+    other body that of the sphere of its magnets' volume.
+    """
+    permeable = [magnet for magnet in floater.magnets if magnet.contrast]
+    known = all(map(bears_charges, permeable)) and floater.recoil_permeability <= HIGHEST_PERMEABILITY
+    if floater.is_sphere or not permeable or not known:
+        return floater.polarizability * np.eye(3)
+    return SurfaceCharges(permeable, NODES).polarizability()
 
 
 def floater_sources(
