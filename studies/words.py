@@ -106,8 +106,8 @@ def _place(equilibrium: Equilibrium) -> str:
     """Where the floater is in the laboratory, and how its moment points."""
     distance, error = _distance(equilibrium).lstrip("-"), equilibrium.position_error / MILLI
     angle = f"polar angle {_polar_angle(equilibrium, 1, '°')}"
-    offset, aside = equilibrium.lateral_offset / MILLI, math.hypot(*equilibrium.laboratory_position[:2]) / MILLI
-    if offset > abs(equilibrium.position[2]) / MILLI or aside > max(
+    offset, mean = equilibrium.lateral_offset / MILLI, math.hypot(*equilibrium.laboratory_position[:2]) / MILLI
+    if offset > abs(equilibrium.position[2]) / MILLI or mean > max(
         offset / 2, FINEST
     ):  # beside the rotor, or on one side
         lateral = bracketed(offset, max(error, FINEST))
