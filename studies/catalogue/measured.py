@@ -38,7 +38,7 @@ from ...geometry.common import MU_0, Array
 from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Coil, Plate, Scene
 from ...geometry.scene.files import parse_scene
-from ...geometry.shapes import Box, Cylinder, Sphere, ring
+from ...geometry.shapes import Box, Sphere, ring
 from ..figures.style import PALETTE, panels
 from ..result import Columns, columns, variable
 from ..study import Point, Study
@@ -132,12 +132,12 @@ def _sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tupl
     ]
     if quick:
         return found
-    (disc,), (inner, outer) = floater.bodies, scene.coils
-    assert isinstance(disc, Cylinder)
-    thicker = replace(floater, bodies=(replace(disc, height=1.01 * disc.height),))
+    inner, outer = scene.coils
+    thicker = parse_scene(TEAM28.replace("height_mm = 3.0\n", "height_mm = 3.03\n"))
+    thicker = replace(thicker, floater=replace(thicker.floater, density=floater.density / 1.01))  # of the same mass
     variants = {
         "finite elements of order 3 instead of 4": scene,
-        "thickness of the disc +1 %": replace(scene, floater=thicker),
+        "thickness of the disc +1 %": thicker,
         "radius of the inner coil +0.1 mm": with_coils(replace(inner, radius=inner.radius + 1e-4), outer),
         "windings a tenth as wide": with_coils(*(replace(coil, width=coil.width / 10) for coil in scene.coils)),
     }
