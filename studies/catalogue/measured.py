@@ -449,7 +449,7 @@ def _measured_lines(result: xr.Dataset) -> list[str]:
 
 @showing.drawn
 def measured_figure(result: xr.Dataset) -> Figure:
-    """Problem 28's height, and every experiment's deviation."""
+    """Problem 28's height, and every experiment's deviation with the estimated error of the computation."""
     figure, ((left, right),) = panels(1, 2, 3.0)
     for name, look in (("measured", {"marker": "o", "ls": "", "ms": 2}), ("computed", {"lw": 0.9})):
         if "rms" in result:
@@ -457,7 +457,8 @@ def measured_figure(result: xr.Dataset) -> Figure:
             left.plot(result["time"], 1e3 * result[f"{name}_height"], color=color, label=name, **look)
     left.set(xlabel="time (s)", ylabel="height over the windings (mm)")
     off = 100 * (result["computed"] / result["measured"] - 1).values
-    right.barh(range(len(off)), off, color=PALETTE[0])
+    errors = 100 * np.abs(result["error"] / result["measured"]).values
+    right.barh(range(len(off)), off, xerr=errors, color=PALETTE[0], ecolor="0.3")
     right.set_yticks(range(len(off)), [str(name) for name in result["name"].values], fontsize=6)
     right.invert_yaxis()
     right.set_xlabel("computed less measured (%)")
