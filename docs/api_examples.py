@@ -43,6 +43,10 @@ print(1e3 * slopes.distance.isel(equilibrium=0).to_series())  # mm by mm, and by
 # [uncertainty]
 bars = sl.uncertainty(scene, {"rotor.edge_mm": 0.05, "frequency_hz": 0.5}, model="cuboid").isel(equilibrium=0)
 print(f"{1e3 * bars.distance:.2f} ± {1e3 * bars.distance_error:.2f} mm", 1e3 * bars.distance_drawn.values)
+# [design]
+free, limits = {"rotor.angle_deg": (5, 25), "rotor.edge_mm": (9, 12)}, {"distance_mm": 20}
+best = sl.design(scene, "largest margin", free, limits, model="dipole")
+print(best.number.to_series(), best.value.to_series())
 # [stability]
 modes = sl.stability(scene, model="cuboid")
 print(modes[["mode_frequency", "mode_growth"]].to_dataframe())

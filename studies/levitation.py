@@ -12,7 +12,13 @@ import numpy as np
 from ..dynamics.continuation.branch import BranchPoint, follow_branch
 from ..dynamics.continuation.frequencies import branch_through, by_frequency, on_branch
 from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, PAST_TABLE, Equilibrium, EquilibriumError, Survey
-from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, survey, with_plate
+from ..dynamics.equilibria.search import (
+    FixedPoints,
+    cached_points,
+    free_of_bodies,
+    survey,
+    with_plate,
+)
 from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
 from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
@@ -29,7 +35,7 @@ from ..fem.plate.choice import PlateAround, plate_around, rotor_nearby, wider_re
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
 from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rotor_table
-from ..fem.rotor.models import AccuracyError
+from ..fem.rotor.models import AccuracyError, changed_table, magnified as alike
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
 from ..geometry.common import Array, InputError, SpinlevError, Watch, unwatched
@@ -113,9 +119,15 @@ class Levitation:
         other.share(self)
         return other
 
-    def share(self, other: Levitation) -> None:
-        """Use the tables and the compiled equations of another scene where they fit, made or yet to make."""
+    def share(self, other: Levitation, magnified: bool = False) -> None:
+        """Use the tables and the compiled equations of another scene where they fit, made or yet to make.
+
+        With `magnified` also its field of a lone permeable magnet that is moved, turned, magnified or polarised more.
+        """
         self._tables = other._tables
+        table, name, rotor = other.table if magnified else None, self.models.model, self.scene.rotor
+        if isinstance(table, RotorTable) and name == table.model in PERMEABLE and alike(table.magnets, rotor):
+            self._tables.once(field_key(self.scene, name, self.models.rtol), lambda: changed_table(table, rotor))
 
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""

@@ -19,7 +19,7 @@ from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..equilibria.equilibrium import FOLD, MARGINAL, Equilibrium, EquilibriumError
-from ..equilibria.path import Steps
+from ..equilibria.path import Steps, stepped
 from ..equilibria.search import find_equilibria
 from ..motion.effects import mean_over_turns, with_effects
 from ..motion.equations import parameters
@@ -39,6 +39,7 @@ LOWEST, HIGHEST = 25.0, 400.0  # Frequencies between which is looked for ranges 
 CONTACT, BORDER = "contact", "border"
 # Along a branch, and along one that is known from one that is near.
 STEPS, LONG_STEPS = Steps(longest=0.1, turn=0.15), Steps(longest=0.4, turn=0.3)
+TRACKED = 0.4  # Along a branch, how far an end of stability is looked for from where a like branch has it
 WIDEST = 2.0  # Ratio of frequencies, up and down, within which one that works is looked for
 FREQUENCIES = 81  # That are looked at there, 1.7 % apart
 INSIDE = 0.05  # How far inside a window of frequencies the one that is named lies, as a part of the window
@@ -275,6 +276,50 @@ def stability_end(
     Of the equilibria of a `scene` against the frequency, a `family`, from a scaled state `start` (12,) in `steps`.
     """
     return next(point for point in _side(scene, family, start, frequency, towards, steps) if point.kind)
+
+
+def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0.0) -> BranchPoint | None:
+    """The end of stability of a kind near one of another scene's `family`, without what lies between.
+
+    None where none is near. Of the equilibria of a `scene` against the frequency, a `family`; the end is expected to
+    have `moved` so far, Hz.
+    """
+    expected = end.parameter + (0.0 if end.kind == BORDER else moved)
+    pose = np.concatenate([end.position / family.balance(expected).values[Parameter.LENGTH], end.state[6:9]])
+    if end.kind == BORDER:
+        there = family.solution(pose, end.parameter)
+        return None if there is None else replace(family.at(there, end.tangent, end.parameter), kind=BORDER)
+    begun, along = np.append(pose, expected / family.unit)[None], end.tangent[None]
+
+    def at(way: float) -> BranchPoint:
+        points, tangents, good = stepped(family, begun - TRACKED * along, along, np.array([way + TRACKED]))
+        if not good[0]:
+            raise EquilibriumError(f"No equilibrium was found near the one at {end.parameter:.6g} Hz.")
+        return family.at(points[0], tangents[0], float(points[0, 6]) * family.unit)
+
+    def measure(way: float) -> float:
+        point = at(way)
+        if end.kind == FOLD:
+            return float(point.tangent[6])
+        if end.kind == CONTACT:
+            return rotor_gap(scene, point.position, point.state[6:9])
+        # where two modes meet growth begins as a root: its square is smooth
+        tolerated = max(MARGINAL, point.doubt_per_s)
+        return point.growth_per_s * abs(point.growth_per_s) - tolerated**2
+
+    try:
+        low, high, width = measure(0.0), np.nan, TRACKED / 20
+        while not low * high <= 0 and width < TRACKED:
+            for way in (width, -width):
+                if low * (high := measure(way)) <= 0:
+                    break
+            width *= 4
+        if not low * high <= 0:
+            return None
+        root = float(scipy.optimize.brentq(measure, 0.0, way, xtol=1e-10)) if low else 0.0
+        return replace(at(root), kind=end.kind)
+    except EquilibriumError:
+        return None
 
 
 def is_over(scene: Scene, point: BranchPoint) -> bool:

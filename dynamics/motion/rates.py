@@ -24,6 +24,8 @@ from .effect import Effect, Interaction, Placeable, Poses, interaction_of
 from .equations import Equations, balances, equations_of_motion, locked_balances, still_balances
 from .state import Parameter, matrices_of
 
+NOWHERE = np.zeros((0, 3)), np.zeros((0, 0))
+
 
 class Rates:
     """Right-hand side and Jacobian of the autonomous equations of motion (gravity along the axis).
@@ -38,6 +40,8 @@ class Rates:
         whole = interaction_of(table)
         self._field, self._effects = _derived(whole), whole.effects
         self._rough = False
+        # where the field was asked for last, m, and what it is: other parameters there, as frequencies, need it again
+        self._last = NOWHERE
         self._placed: list[Placeable] = []
         effects: list[Effect] = []
         self._local = LocalField(len(Parameter))
@@ -62,7 +66,7 @@ class Rates:
             return Rates(table, bool(self._level))
         found = copy(self)
         found.__dict__.pop("rough", None)
-        found._field, found._placed = _derived(whole), []
+        found._field, found._placed, found._last = _derived(whole), [], NOWHERE
         for effect in whole.effects:
             if isinstance(effect, Placeable):
                 found._placed.append(effect.placed(first))
@@ -146,7 +150,11 @@ class Rates:
         if self.turning:
             pointing = rows[:, Parameter.POINTING_X : Parameter.POINTING_Z + 1]
             moment, quaternion = (matrices_of(turn) @ pointing[..., None])[..., 0], turn
-        slopes = field.derivatives(places, LocalField.ORDER)
+        last, slopes = self._last
+        if field is not self._field or not np.array_equal(places, last):
+            slopes = field.derivatives(places, LocalField.ORDER)
+            if field is self._field:
+                self._last = places, slopes
         parts = [rows, places, slopes]
         if self._rough:
             parts += [np.zeros((count, part.count)) for part in self._placed]

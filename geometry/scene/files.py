@@ -77,6 +77,15 @@ def load_scene(path: str | Path) -> Scene:
     return scene
 
 
+def toml_tables(path: str | Path, name: str) -> dict[str, Any]:
+    """The tables of a TOML file that messages call `name`. Raises InputError where there is none."""
+    try:
+        text = file_content(path, MOST, name, "a TOML file").decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: Input {name} must be a text in UTF-8; instead: {error}.") from None
+    return _keys(text, str(path))
+
+
 def parse_scene(
     text: str, source: str = "scene", changes: Mapping[str, float] | None = None, known: Scene | None = None
 ) -> Scene:

@@ -23,6 +23,7 @@ from ..cli.console import note, progress
 from ..cli.options import NAMES, Answer, Models, Workers, combinations
 from ..coils import coils_figure
 from ..compare import compare_figure
+from ..design import design_figure
 from ..exchange import field_map_figure
 from ..figures.drive import drive_figure
 from ..figures.pictures import flight_frames, last_view, plate_currents
@@ -49,6 +50,7 @@ from .entries import CATALOGUE
 
 QUESTION = "question"  # What the result of one's own question is called
 DRAWN = {
+    "first_number": ("design", design_figure),
     "branch_distance": ("compare", compare_figure),
     "outside": ("field-map", field_map_figure),
     "easy_axis": ("working-point", working_point_figure),

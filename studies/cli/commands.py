@@ -357,6 +357,23 @@ def study(
     return study_job(name, quick, engine.checked(), output.folder)
 
 
+def design(goals: Path, *, requested: Models = Models(), output: Output = Output()) -> Answer:
+    """The scene that meets a goal best within bounds and limits; of two goals the curve between (Pareto).
+
+    Writes design.toml, the scene, with design.nc, design.json and a figure.
+
+    Parameters
+    ----------
+    goals
+        TOML file: `scene` (a scene file), `goals` (one or two of "largest margin", "shortest damping time", "lowest
+        frequency", "heaviest floater", "lightest rotor"), `[free]` with bounds by key of the scene file, as
+        "rotor.edge_mm" = [8.0, 12.0], and `[limits]` with a number, or least and most, as decay_per_s = [1.0, inf].
+    """
+    from ..design import design_job
+
+    return design_job(goals, requested.checked(), output.folder)
+
+
 def figure(result: Path, *, output: Output = Output()) -> Answer:
     """The figures of a result as PNG and PDF, from its file alone; beside it, unless --out is given.
 

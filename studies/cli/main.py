@@ -34,7 +34,7 @@ app = App(
 )
 for command in (
     *(commands.run, commands.field, commands.plate, commands.equilibria, commands.compare, commands.simulate),
-    commands.study,
+    *(commands.study, commands.design),
     *(commands.figure, commands.show, commands.report, commands.cite, commands.new, commands.export, commands.explore),
 ):
     app.command(command)

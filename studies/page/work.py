@@ -26,9 +26,8 @@ from ...dynamics.equilibria.equilibrium import (
     spectra,
 )
 from ...dynamics.equilibria.path import NEAR, NEWTON_STEPS
-from ...dynamics.equilibria.search import FixedPoints, check_turning, field_doubts, survey, survey_of
+from ...dynamics.equilibria.search import survey
 from ...dynamics.flights.live import LiveFlight, Piece
-from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.events import plate_depth
 from ...dynamics.motion.state import Scales
 from ...fem.cache import NotKeptError, kept_only
@@ -36,6 +35,7 @@ from ...fem.rotor.choice import PERMEABLE
 from ...fem.rotor.models import of_true_moment
 from ...geometry.common import Array, ComputationError, InputError, SpinlevError
 from ...geometry.scene.files import canonical_keys, scene_text
+from ..candidates import survey_near
 from ..catalogue import article
 from ..cli.console import to_json
 from ..cli.options import FieldModel, Models
@@ -165,21 +165,9 @@ def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -
 
 
 def _survey_near(levitation: Levitation, near: Sequence[Any]) -> Survey | None:
-    """What becomes of equilibria of a scene nearby; None where one of them is lost, or is no fixed point."""
-    scene, scales = levitation.scene, Scales.of(levitation.scene)
-    if not near or not scene.floater.is_sphere or np.any(scene.gravity[:2]):
-        return None
-    check_turning(scene)
-    balance = Balance(
-        levitation.rates, parameters(scene, scales, frozen_spin=True), levitation.spin * scales.spin_ratio
-    )
-    starts = np.array([place for place, _ in near]) * 1e-3 / scales.length
-    position, moment, size = solve(balance, starts, np.array([m for _, m in near]), EVERY, NEWTON_STEPS)
-    here, doubts = field_doubts(levitation.interaction, position * scales.length)
-    apart = np.linalg.norm(position - starts, axis=1)
-    if not here.all() or (size > CONVERGED_STEP).any() or (apart > 3 * NEAR).any():
-        return None
-    return survey_of(scene, balance, FixedPoints.at(balance, np.concatenate([position, moment], axis=1), doubts))
+    """What becomes of equilibria at places, as of `Shown`, of a scene nearby; None where one of them is lost."""
+    places, moments = (np.array([pair[k] for pair in near]) for k in (0, 1))
+    return survey_near(levitation, 1e-3 * places, moments) if len(near) else None
 
 
 def complete(state: PageState) -> Shown:

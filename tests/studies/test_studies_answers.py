@@ -21,7 +21,7 @@ from spinlev.fem.mutual.response import two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.studies.catalogue.article import FLOATER, rotor_scene
 from spinlev.studies.catalogue.finite_magnets import CAUSES, TOTAL, change, dipole_vs_fem
-from spinlev.studies.catalogue.margins import PARAMETERS, QUANTITIES, Slopes, designed, nominal, scene_of
+from spinlev.studies.catalogue.margins import PARAMETERS, QUANTITIES, Slopes, nominal, scene_of
 from spinlev.studies.catalogue.regions import stability_map
 
 
@@ -101,15 +101,6 @@ def test_distance_of_a_sample_is_that_of_a_survey(horizontal):
     expected = next(e for e in find_equilibria(scene, rotor_table(scene.rotor, "cuboid")) if e.stable)
     assert found["distance at 50%"] == pytest.approx(expected.distance, abs=1e-10)
     assert set(values) == set(PARAMETERS)
-
-
-@pytest.mark.slow
-def test_a_design_holds_the_floater_where_it_was_wanted():
-    found = designed("tilt", 12.7e-3, 25e-3, 100.0)
-    scene = rotor_scene("tilt", found.measure, drag=False, edge=12.7e-3, permeability=1.0)
-    stable = next(e for e in find_equilibria(scene, rotor_table(scene.rotor, "cuboid")) if e.stable)
-    assert stable.distance == pytest.approx(25e-3, abs=1e-9)
-    assert found.margin == pytest.approx(min(100 - found.low.parameter, found.high.parameter - 100) / 100)
 
 
 @pytest.mark.slow

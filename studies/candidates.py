@@ -1,0 +1,297 @@
+"""Scenes that differ in some numbers, each with the equilibrium that is followed from one to the next.
+
+Newton's method finds the equilibrium of a scene from that of one nearby, from where its derivatives lead; the ends of
+stable frequencies are followed likewise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+from ..dynamics.continuation.branch import BranchPoint
+from ..dynamics.continuation.frequencies import (
+    BORDER,
+    HIGHEST,
+    LONG_STEPS,
+    LOWEST,
+    by_frequency,
+    levitates,
+    stability_end,
+    tracked_end,
+)
+from ..dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
+from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey, nearest_of
+from ..dynamics.equilibria.path import NEAR, NEWTON_STEPS
+from ..dynamics.equilibria.search import FixedPoints, check_turning, field_doubts, survey_of
+from ..dynamics.motion.equations import parameters
+from ..dynamics.motion.events import rotor_gap
+from ..dynamics.motion.state import Scales
+from ..geometry.common import Array, ComputationError, InputError, SpinlevError
+from ..geometry.scene.contents import Scene
+from ..geometry.scene.files import changed, scene_numbers
+from .cli.options import Models
+from .gradient import Gradient, derivative
+from .levitation import Levitation
+from .result import IN_JSON
+
+MAGNET_DENSITY = 7500.0  # kg/m³, of a rotor's magnets, whose scene file has none: sintered neodymium
+HALVES = 3  # ways to a scene that Newton's method does not reach at once are halved so often
+DRAWS, SEED = 32, 20250708  # of scenes to begin at where the given one has no equilibrium
+
+
+def survey_near(levitation: Levitation, places: Array, moments: Array) -> Survey | None:
+    """What becomes of equilibria of a scene nearby at places (n, 3) m with moments (n, 3), without plate.
+
+    None where one of them is lost, or is no fixed point.
+    """
+    scene, scales = levitation.scene, Scales.of(levitation.scene)
+    if not scene.floater.is_sphere or np.any(scene.gravity[:2]):
+        return None
+    check_turning(scene)
+    values = parameters(scene, scales, frozen_spin=True)
+    balance, starts = Balance(levitation.rates, values, levitation.spin * scales.spin_ratio), places / scales.length
+    position, moment, size = solve(balance, starts, moments, EVERY, NEWTON_STEPS)
+    here, doubts = field_doubts(levitation.interaction, position * scales.length)
+    apart = np.linalg.norm(position - starts, axis=1)
+    if not here.all() or (size > CONVERGED_STEP).any() or (apart > 3 * NEAR).any():
+        return None
+    return survey_of(scene, balance, FixedPoints.at(balance, np.concatenate([position, moment], axis=1), doubts))
+
+
+@dataclass(eq=False)
+class Candidate:
+    """A scene of a search with the equilibrium that is followed."""
+
+    levitation: Levitation
+    known: Equilibrium
+    keys: tuple[str, ...]  # of the numbers that may change
+    near: Candidate | None = None  # one whose ends of stability are near
+    step: Array | float = 0.0  # (key,) of the numbers from that
+
+    @property
+    def bare(self) -> Equilibrium:
+        """The equilibrium as if there were no plate."""
+        return self.known.without or self.known
+
+    @cached_property
+    def gradient(self) -> Gradient:
+        return Gradient(self.levitation)
+
+    @cached_property
+    def ways(self) -> Mapping[str, Any]:
+        """Its way by each key."""
+        ways = self.gradient.ways(self.known, self.keys)[0]
+        if len(ways) < len(self.keys):
+            raise ComputationError(f"Derivatives are not known: {'; '.join(self.gradient.reasons.values())}.")
+        return ways
+
+    @cached_property
+    def ends(self) -> tuple[BranchPoint, BranchPoint]:
+        """The equilibria at which stable levitation ends below and above the frequency, without the plate."""
+        scene = replace(self.levitation.still, plate=None)
+        if scene.gravity[:2].any() or not scene.floater.round:
+            raise InputError(
+                "Input margin must be asked for where gravity is along the axis and the floater round about its "
+                "moment; instead this scene's is not."
+            )
+        family, start, found = by_frequency(scene, self.levitation.rates, self.levitation.spin), self._start, []
+        for number, border in enumerate((LOWEST, HIGHEST)):
+            known = self.near.ends[number] if self.near and "ends" in self.near.__dict__ else None
+            moved = float(self.near.ends_by[number] @ self.step) if known and "ends_by" in self.near.__dict__ else 0.0
+            end = known and tracked_end(scene, family, known, moved)
+            if end is None:  # tracked from a scene nearby, it may be on the other side of the frequency
+                if not levitates(family.point(start[:3], start[6:9], scene.frequency)):
+                    raise EquilibriumError(f"At {scene.frequency:.4g} Hz it is not stable without the plate.")
+                end = stability_end(scene, family, start, scene.frequency, border, LONG_STEPS)
+            found.append(end)
+        self.near = None
+        return found[0], found[1]
+
+    @property
+    def _start(self) -> Array:
+        return Scales.of(self.levitation.still).pack(self.bare.start)
+
+    def values(self, name: str) -> Array:
+        """Numbers (k,) whose least is a measure. Raises EquilibriumError for the margin where it is not stable."""
+        scene, known = self.levitation.still, self.known
+        if name == "margin":
+            low, high = (end.parameter for end in self.ends)
+            return np.array([1 - low / scene.frequency, high / scene.frequency - 1])
+        if name == "decay_per_s":
+            return -np.array([mode.growth_per_s for mode in known.modes])
+        if name == "gap_mm":
+            return 1e3 * np.array([rotor_gap(scene, known.position, known.state.orientation)])
+        if name in OF_SCENE:
+            return np.array([OF_SCENE[name](scene)])
+        stem, scale = _answer(name)
+        return np.array([getattr(known, stem) / scale])
+
+    def slopes(self, name: str) -> Array:
+        """Derivatives (k, key) of the same."""
+        scene, known = self.gradient.scene, self.known
+        if name in OF_SCENE:
+            return self._of_scenes(lambda there: np.array([OF_SCENE[name](there)]))
+        if name == "margin":
+            own = np.array([key == "frequency_hz" for key in self.keys])
+            relative = np.array([end.parameter for end in self.ends])[:, None] / scene.frequency
+            return np.array([[-1.0], [1.0]]) * (self.ends_by - own * relative) / scene.frequency
+        ways = [self.ways[key] for key in self.keys]
+        if name == "decay_per_s":
+            return -np.array([[way.modes[mode.name].real for way in ways] for mode in known.modes])
+        if name == "gap_mm":
+
+            def gap(one: Equilibrium) -> Array:
+                return 1e3 * np.array([rotor_gap(scene, one.position, one.state.orientation)])
+
+            own = self._of_scenes(
+                lambda there: 1e3 * np.array([rotor_gap(there, known.position, known.state.orientation)])
+            )
+            return own + np.array([way.of(gap) for way in ways]).T
+        stem, scale = _answer(name)
+        return np.array([[float(derivative(known, way, stem.removesuffix("_deg"))) / scale for way in ways]])
+
+    @cached_property
+    def ends_by(self) -> Array:
+        """Derivatives (2, key) of the frequencies at which stability ends, Hz."""
+        rows = []
+        for end in self.ends:
+            there = Gradient(self.levitation.elsewhere(frequency=end.parameter))
+            rows.append([0.0 if end.kind == BORDER else there.end_by(end, key) for key in self.keys])
+        return np.array(rows)
+
+    def _of_scenes(self, quantity: Callable[[Scene], Array]) -> Array:
+        """Derivatives (k, key) of what the scene decides alone, by central differences."""
+        columns = []
+        for key in self.keys:
+            number = self.gradient.numbers[key]
+            step = 1e-4 * (abs(number) or 1.0)
+            ends = [quantity(changed(self.gradient.scene, {key: number + s * step})) for s in (1, -1)]
+            columns.append((ends[0] - ends[1]) / (2 * step))
+        return np.array(columns).T
+
+
+OF_SCENE: Mapping[str, Callable[[Scene], float]] = {
+    "frequency_hz": lambda scene: scene.frequency,
+    "floater_mass_g": lambda scene: 1e3 * scene.floater.mass,
+    "rotor_mass_g": lambda scene: 1e3 * MAGNET_DENSITY * sum(magnet.body.volume for magnet in scene.rotor),
+}
+
+
+def _answer(name: str) -> tuple[str, float]:
+    """Attribute of an equilibrium for a measure, and its unit in SI."""
+    if name.endswith("_deg"):
+        return name, 1.0
+    return name.removesuffix("_mm"), IN_JSON["m"][1]
+
+
+class Search:
+    """Scenes that differ in some numbers, each with the equilibrium that is followed from the last.
+
+    Parameters
+    ----------
+    levitation : of the scene to begin at
+    free : ends of each number, by key
+    """
+
+    def __init__(self, levitation: Levitation, free: Mapping[str, tuple[float, float]]) -> None:
+        self.scene, numbers = scene_numbers(levitation.scene)
+        self.keys, self.low, self.high = tuple(free), *np.array(list(free.values()), float).T
+        self.first = np.array([numbers[key] for key in free])
+        self.models, self.spin = levitation.models, levitation.spin
+        self.start = self._begun(levitation)
+        self.models = replace(self.models, model=self.start.levitation.table.model)
+        self.near, self.at_near = self.start, self.first
+        self._known: dict[bytes, Candidate | None] = {}
+
+    def _begun(self, levitation: Levitation) -> Candidate:
+        """The scene itself, or the first of some within the bounds that has an equilibrium."""
+        draws = qmc.Sobol(len(self.keys), seed=SEED).random(DRAWS)
+        for numbers in [self.first, *(self.low + draws * (self.high - self.low))]:
+            try:
+                one = levitation
+                if numbers is not self.first:
+                    one = self._levitation(numbers)
+                    one.share(levitation)
+                found = Candidate(one, self._first(one), self.keys)
+            except SpinlevError as error:
+                if numbers is self.first and not isinstance(error, EquilibriumError):
+                    raise
+                continue
+            self.first = numbers
+            return found
+        raise EquilibriumError(f"Neither the scene nor {DRAWS} others within the bounds have an equilibrium.")
+
+    def _first(self, levitation: Levitation) -> Equilibrium:
+        """The equilibrium to begin at: of the field of dipoles, in which a search is quick, or else of a whole one."""
+        if "without_plate" not in levitation.__dict__:
+            quick = Levitation(levitation.scene, Models("dipole", "none", interaction="rigid"), self.spin)
+            with suppress(EquilibriumError):
+                near = quick.stability
+                survey = survey_near(levitation, near.position[None], near.state.moment[None])
+                if survey is not None:
+                    levitation.adopt(survey)
+        return levitation.stability
+
+    def _levitation(self, numbers: Array) -> Levitation:
+        there = changed(self.scene, dict(zip(self.keys, numbers.tolist(), strict=True)))
+        return Levitation(there, self.models, self.spin)
+
+    def at(self, numbers: Array) -> Candidate | None:
+        """The scene of some numbers; None where there is none, or it has no such equilibrium."""
+        key = numbers.tobytes()
+        if key not in self._known:
+            self._known[key] = self._reached(self.near, self.at_near, numbers, HALVES)
+        return self._known[key]
+
+    def begin_at(self, candidate: Candidate, numbers: Array) -> None:
+        """Forget what was looked at, and go on from a scene."""
+        self._known = {numbers.tobytes(): candidate}
+        self.go_on_from(candidate, numbers)
+
+    @property
+    def looked_at(self) -> int:
+        """How many scenes were looked at."""
+        return len(self._known)
+
+    def go_on_from(self, candidate: Candidate, numbers: Array) -> None:
+        """Follow equilibria from this one, whose derivatives are asked for."""
+        self.near, self.at_near = candidate, numbers.copy()
+
+    def _reached(self, near: Candidate, begun: Array, numbers: Array, halves: int) -> Candidate | None:
+        if np.array_equal(begun, numbers):
+            return near
+        found = self._followed(near, begun, numbers)
+        if found is not None or not halves:
+            return found
+        middle = (begun + numbers) / 2
+        half = self._reached(near, begun, middle, halves - 1)
+        return half and self._reached(half, middle, numbers, halves - 1)
+
+    def _followed(self, near: Candidate, begun: Array, numbers: Array) -> Candidate | None:
+        try:
+            levitation = self._levitation(numbers)
+            levitation.share(near.levitation, magnified=True)
+            bare, step = near.bare, numbers - begun
+            place, moment = bare.position, bare.state.moment
+            if "ways" in near.__dict__:  # where the tangent leads
+                ways = [near.ways[key] for key in self.keys]
+                place = place + sum(s * way.of(lambda e: e.position) for s, way in zip(step, ways, strict=True))
+                moment = moment + sum(s * way.of(lambda e: e.state.moment) for s, way in zip(step, ways, strict=True))
+            survey = survey_near(levitation, place[None], (moment / np.linalg.norm(moment))[None])
+            if survey is None and levitation.scene.floater.is_sphere and not levitation.scene.gravity[:2].any():
+                return None
+            if survey is not None:
+                if np.linalg.det(survey.equilibria[0].slope) * np.linalg.det(bare.slope) < 0:
+                    return None  # it is beyond the fold in which both meet
+                levitation.adopt(survey)
+            found = nearest_of(levitation.equilibria, place)
+            return found and Candidate(levitation, found, self.keys, near, step)
+        except SpinlevError:
+            return None

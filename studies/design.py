@@ -1,0 +1,556 @@
+"""Scenes that meet goals within bounds: SciPy's SLSQP over equilibria with their derivatives.
+
+What is the least of several numbers, as the margin below and above the frequency and the decay of each mode, counts as
+all of them, each of which is smooth; to make it large, a bound below all of them is raised (its epigraph).  Equilibria
+are followed from one scene to the next by Newton's method; the last scene is searched anew.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+import scipy
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ..dynamics.continuation.frequencies import (
+    branch_through,
+    levitates,
+)
+from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
+from ..dynamics.motion.state import Scales
+from ..fem.files import write_whole
+from ..geometry.common import Array, ComputationError, InputError, SpinlevError, shown
+from ..geometry.scene.contents import Scene
+from ..geometry.scene.files import changed, load_scene, scene_numbers, scene_text, toml_tables
+from .candidates import OF_SCENE, Candidate, Search, survey_near
+from .cli.console import note, to_json
+from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
+from .figures.style import PALETTE, legend_below, panels, plot_branch, save_figures, styled
+from .gradient import Gradient, unknown_over_plate
+from .levitation import Levitation
+from .plan import SceneLike
+from .result import label_of_key, variable, write_dataset
+
+# What a scene may be asked for: unit and label
+MEASURES: Mapping[str, tuple[str, str]] = {
+    "margin": ("1", "least relative change of the frequency that ends stable levitation"),
+    "decay_per_s": ("1/s", "decay rate of the least stable mode"),
+    "frequency_hz": ("Hz", "frequency of the rotor"),
+    "distance_mm": ("mm", "levitation distance"),
+    "lateral_offset_mm": ("mm", "distance from the axis of rotation"),
+    "polar_angle_deg": ("deg", "polar angle of the moment"),
+    "gap_mm": ("mm", "gap between floater and rotor"),
+    "floater_mass_g": ("g", "mass of the floater"),
+    "rotor_mass_g": ("g", "mass of the rotor's magnets"),
+}
+# Goals with what they are of, and whether it shall be large (1) or small (-1)
+GOALS = {
+    "largest margin": ("margin", 1),
+    "shortest damping time": ("decay_per_s", 1),
+    "lowest frequency": ("frequency_hz", -1),
+    "heaviest floater": ("floater_mass_g", 1),
+    "lightest rotor": ("rotor_mass_g", -1),
+}
+NO_GOAL = "", 1  # to meet the limits alone
+LEAST = ("margin", "decay_per_s")  # those that are the least of several numbers
+# Limits, unless others are given; of the growth that is tolerated round-off leaves no more than this
+ALWAYS = {"decay_per_s": (-0.99 * MARGINAL, np.inf), "gap_mm": (0.0, np.inf)}
+MET = 1e-6  # by which a limit may be missed, in what its measure is at first
+AGAIN = 3  # designs after which ends of stability are looked for anew
+FAILED = 1e3  # what a scene without equilibrium misses everything by, so that a line search comes back
+STEPS, TOLERANCE = 60, 1e-6  # of SLSQP
+SETTLED, PATIENCE = 1e-4, 40  # part of a goal, by its size, that so many scenes must gain together
+CURVE = 81  # points of a branch that is kept
+Limits = Mapping[str, tuple[float, float]]
+
+
+def checked_measures(values: object, name: str, known: Mapping[str, Any], what: str) -> Mapping[str, Any]:
+    """Values by name, or InputError unless each name is `known`."""
+    if not isinstance(values, Mapping):
+        raise InputError(f"Input {name} must be ranges by {what}; instead received {shown(values)}.")
+    for one in values:
+        if one not in known:
+            close = difflib.get_close_matches(str(one), known, n=1)
+            hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
+            raise InputError(f"Input {name} must name {what}; instead received {shown(one)} ({hint})")
+    return values
+
+
+def _range(name: str, value: object) -> tuple[float, float]:
+    """A number as a range of itself, or two numbers in order, of which None and infinity leave an end open."""
+    ends = list(value) if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else [value] * 2
+    if len(ends) == 2:
+        low, high = (side if end is None else end for end, side in zip(ends, (-np.inf, np.inf), strict=True))
+        good = all(is_number(end) or end in (-np.inf, np.inf) for end in (low, high) if not isinstance(end, str))
+        if good and not isinstance(low, str) and not isinstance(high, str) and low <= high and low < np.inf > -high:
+            return float(low), float(high)
+    raise InputError(
+        f"Input {name} must be a number, or two in order, least and most, of which inf leaves an end open; "
+        f"instead received {shown(value)}."
+    )
+
+
+class _SettledError(Exception):
+    """Nothing better is found any more."""
+
+
+class _Problem:
+    """A goal within limits as SLSQP sees it: numbers from 0 to 1, measures by their sizes, and a bound to raise."""
+
+    def __init__(self, search: Search, goal: tuple[str, int], limits: Limits) -> None:
+        self.search, (self.name, self.sense), self.limits = search, goal, limits
+        self.raised = self.name in LEAST and self.sense > 0  # a bound below all of them, the last of the unknowns
+        self.width = search.high - search.low
+        self.sizes = {one: self._size(one) for one in {self.name, *limits} if one}
+        # measure, its end, 1 where that is the least and -1 where it is the most, and whether it is both
+        self.rows = [
+            (one, end, sign, low == high)
+            for one, (low, high) in limits.items()
+            for end, sign in ((low, 1), (high, -1))[: 1 if low == high else 2]
+            if np.isfinite(end)
+        ]
+        self.best: list[tuple[float, Candidate, Array]] = []  # scenes that meet all limits, with how well
+        self.kept = search.looked_at  # how many scenes were looked at when one was better by more than `SETTLED`
+        self.nearest = np.inf, ""  # by how much the limits are missed at least, and which
+
+    def _size(self, name: str) -> float:
+        ends = [abs(end) for end in self.limits.get(name, ()) if np.isfinite(end)]
+        return max([0.1 if name == "margin" else float(np.abs(self.search.near.values(name)).min()), *ends, 1e-2])
+
+    def _count(self, name: str) -> int:
+        """Of how many numbers a measure is the least."""
+        return {"margin": 2, "decay_per_s": len(self.search.start.known.modes)}.get(name, 1)
+
+    def numbers(self, z: Array) -> Array:
+        """Numbers of the scene for SLSQP's unknowns."""
+        return np.clip(self.search.low + z[: len(self.width)] * self.width, self.search.low, self.search.high)
+
+    def values(self, z: Array, name: str, sign: int = 1) -> Array | None:
+        """What a measure is the least of, by its size; None where there is no such scene."""
+        known = self.search.at(self.numbers(z))
+        if known is not None and not name:
+            return np.zeros(1)
+        try:
+            found = None if known is None else known.values(name) / self.sizes[name]
+        except EquilibriumError:  # as the margin of what is not stable
+            return None
+        return found if found is None or sign > 0 else found[[int(np.argmin(found))]]
+
+    def slopes(self, z: Array, name: str, sign: int = 1) -> Array:
+        """Derivatives of the same; from here on equilibria are followed from this scene."""
+        numbers = self.numbers(z)
+        known = self.search.at(numbers)
+        if known is None:  # SLSQP came back from there as near as it could
+            raise _SettledError
+        self.search.go_on_from(known, numbers)
+        try:
+            found = known.slopes(name) * self.width / self.sizes[name]
+        except EquilibriumError:
+            raise _SettledError from None
+        found = found if sign > 0 else found[[int(np.argmin(known.values(name)))]]
+        return np.column_stack([found, np.zeros(len(found))]) if self.raised else found
+
+    def objective(self, z: Array) -> float:
+        if self.best and self.search.looked_at - self.kept > PATIENCE:
+            raise _SettledError
+        value = self.values(z, self.name)
+        if value is None:
+            return FAILED
+        return float(-z[-1] if self.raised else -self.sense * value[0])
+
+    def objective_by(self, z: Array) -> Array:
+        if not self.name:
+            return np.zeros(len(z))
+        return -np.eye(len(z))[-1] if self.raised else np.asarray(-self.sense * self.slopes(z, self.name)[0])
+
+    def excess(self, z: Array, name: str, end: float, sign: int, equal: bool) -> Array:
+        """By how much a limit is met."""
+        value = self.values(z, name, sign)
+        if value is None:
+            return np.full(self._count(name) if sign > 0 else 1, FAILED if equal else -FAILED)
+        return sign * (value - end / self.sizes[name])
+
+    def above(self, z: Array) -> Array:
+        """By how much all that the goal is the least of is above the bound that is raised."""
+        value = self.values(z, self.name)
+        return np.full(self._count(self.name), -FAILED) if value is None else value - z[-1]
+
+    def keep(self, z: Array) -> None:
+        """Remember a scene that meets all limits, or else how near it comes to that."""
+        known = self.search.at(self.numbers(z))
+        value = self.values(z, self.name)
+        if known is None or value is None:
+            return
+        missed = [(0.0, "")]
+        for row in self.rows:
+            far = self.excess(z, *row)
+            missed.append((float(np.max(np.abs(far) if row[3] else -far)), row[0]))
+        worst = max(missed)
+        if worst[0] < MET:
+            reached = self.sense * float(value.min() if self.sense > 0 else value[0])
+            if not self.best or reached > self.best[-1][0] + SETTLED * max(1.0, abs(reached)):
+                self.kept = self.search.looked_at
+            if not self.best or reached > self.best[-1][0]:
+                self.best.append((reached, known, self.numbers(z)))
+        elif worst[0] < self.nearest[0]:
+            self.nearest = worst[0], f": {worst[1]} is {known.values(worst[1]).min():.4g} where it is nearest to them"
+
+    def solved(self) -> tuple[Candidate, Array]:
+        """The best scene that was met, and its numbers."""
+        search = self.search
+        z = (search.at_near - search.low) / self.width
+        if self.raised:
+            z = np.append(z, float(search.near.values(self.name).min()) / self.sizes[self.name])
+        constraints: list[dict[str, Any]] = [
+            {
+                "type": "eq" if row[3] else "ineq",
+                "fun": lambda z, row=row: self.excess(z, *row),
+                "jac": lambda z, row=row: row[2] * self.slopes(z, row[0], row[2]),
+            }
+            for row in self.rows
+        ]
+        if self.raised:
+            by = {"jac": lambda z: self.slopes(z, self.name) - np.eye(len(z))[-1]}
+            constraints.append({"type": "ineq", "fun": self.above, **by})
+        self.keep(z)
+        with suppress(_SettledError):
+            found = scipy.optimize.minimize(
+                self.objective, z, jac=self.objective_by, constraints=constraints, callback=self.keep, method="SLSQP",
+                bounds=[(0.0, 1.0)] * len(self.width) + [(None, None)] * self.raised,
+                options={"maxiter": STEPS, "ftol": TOLERANCE},
+            )  # fmt: skip
+            self.keep(found.x)
+        if not self.best:
+            raise ComputationError(
+                f"No scene that was looked at meets all limits{self.nearest[1]}. Give wider bounds, or other limits."
+            )
+        _, known, numbers = self.best[-1]
+        search.go_on_from(known, numbers)
+        return known, numbers
+
+
+def optimised(search: Search, goal: tuple[str, int], limits: Limits) -> tuple[Candidate, Array]:
+    """The scene that makes a measure large (1) or small (-1) within limits, and its numbers.
+
+    Raises ComputationError where no scene that was looked at meets them.
+    """
+    begun = search.near, search.at_near
+    try:
+        if "margin" in (goal[0], *limits):
+            search.near.values("margin")
+        found, numbers = _Problem(search, goal, limits).solved()
+    except ComputationError:  # as there is no margin of what is not stable, or a long step led nowhere
+        search.go_on_from(*begun)
+        others = {name: ends for name, ends in limits.items() if name != "margin"}
+        decay = others.get("decay_per_s", (0.0, np.inf))
+        others["decay_per_s"] = max(decay[0], -MARGINAL / 2), decay[1]
+        _Problem(search, NO_GOAL, others).solved()  # the nearest that meets the limits
+        found, numbers = _Problem(search, goal, limits).solved()
+    for _ in range(AGAIN if "margin" in (goal[0], *limits) else 0):
+        whole = Candidate(found.levitation, found.known, found.keys)
+        if np.allclose(whole.values("margin"), found.values("margin"), atol=MET):
+            break
+        search.begin_at(whole, numbers)  # ends that were followed are not the first that are met
+        found, numbers = _Problem(search, goal, limits).solved()
+    return found, numbers
+
+
+def _front(
+    search: Search, goals: Sequence[tuple[str, int]], limits: Limits, points: int
+) -> list[tuple[Candidate, Array]]:
+    """Scenes from the best by the first of two goals to the best by the second, that of the second in equal steps."""
+    (first, (name, sense)), found = goals, [optimised(search, goals[0], limits)]
+    last = optimised(search, (name, sense), limits)
+    ends = [float(one.values(name).min()) for one in (found[0][0], last[0])]
+    search.go_on_from(*found[0])
+    for level in np.linspace(*ends, points)[1:-1]:
+        low, high = limits.get(name, (-np.inf, np.inf))
+        there = {name: (max(low, level), high) if sense > 0 else (low, min(high, level))}
+        found.append(optimised(search, first, {**limits, **there}))
+    return [*found, last]
+
+
+@documented
+def design(
+    scene: SceneLike,
+    goals: str | Sequence[str],
+    free: Mapping[str, Sequence[float]],
+    limits: Mapping[str, Any] | None = None,
+    points: int = 7,
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    progress: bool | None = None,
+    **requested: Unpack[Requested],
+) -> xr.Dataset:
+    """The scene that meets a goal best, its numbers within bounds; of two goals the scenes between (Pareto curve).
+
+    Parameters
+    ----------
+    goals : str or list of 2 str
+        "largest margin" (of the frequency, to where stable levitation ends), "shortest damping time", "lowest
+        frequency", "heaviest floater", "lightest rotor" (magnets of 7500 kg/m³).
+    free : dict of str to (float, float)
+        Bounds of the numbers that may change, by dotted key of the scene file.
+    limits : dict, optional
+        A number, or least and most (None or inf: open), of "margin" (a part of the frequency), "decay_per_s",
+        "frequency_hz", "distance_mm", "lateral_offset_mm", "polar_angle_deg", "gap_mm", "floater_mass_g" and
+        "rotor_mass_g". Left out, nothing grows by more than 0.004 /s and the bodies do not touch.
+    points : int
+        Of the curve of two goals, 2 to 100.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over `point`: `number` by `key`, `value` by `measure` (of a search of the scene anew), and `scene`, its file;
+        `first_number` and `first_value` are those of the scene given.
+
+    Raises
+    ------
+    EquilibriumError
+        Neither the scene nor others within the bounds have an equilibrium.
+    ComputationError
+        No scene that was looked at meets the limits.
+
+    Examples
+    --------
+    >>> import spinlev as sl
+    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
+    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
+    >>> free, limits = {"frequency_hz": (60.0, 130.0)}, {"gap_mm": (0.0, 12.0)}
+    >>> found = sl.design(scene, "lowest frequency", free, limits, model="dipole")
+    >>> round(float(found.number.sel(key="frequency_hz")[0]), 2)
+    93.15
+    """
+    wanted, bounds, ends = checked_goals(goals, free, limits, points)
+    levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
+    return designed(levitation, wanted, bounds, ends, points)
+
+
+def checked_goals(
+    goals: object, free: object, limits: object, points: int
+) -> tuple[list[str], dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
+    """Goals, bounds of free numbers and limits as they are used. Raises InputError."""
+    wanted = [goals] if isinstance(goals, str) else list(goals) if isinstance(goals, Sequence) else []
+    if not 1 <= len(wanted) <= 2 or len(set(map(str, wanted))) < len(wanted):
+        raise InputError(f"Input goals must be one or two of {', '.join(GOALS)}; instead received {shown(goals)}.")
+    checked_measures(dict.fromkeys(wanted), "goals", GOALS, "goals")
+    if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= 100:
+        raise InputError(f"Input points must be a number from 2 to 100; instead received {shown(points)}.")
+    given = checked_measures({} if limits is None else limits, "limits", MEASURES, "what a scene can be asked for")
+    ends = {name: _range(f"limits.{name}", value) for name, value in given.items()}
+    if not isinstance(free, Mapping) or not free:
+        raise InputError(f"Input free must be least and most by key of the scene file; instead received {shown(free)}.")
+    bounds = {str(key): _range(f"free.{key}", value) for key, value in free.items()}
+    for key, (low, high) in bounds.items():
+        if not low < high or not np.isfinite([low, high]).all():
+            raise InputError(
+                f"Input free.{key} must be two finite numbers in order, least and most; instead received "
+                f"{shown(free[key])}."
+            )
+    return [str(one) for one in wanted], bounds, ALWAYS | ends
+
+
+def designed(
+    levitation: Levitation, goals: Sequence[str], bounds: Mapping[str, tuple[float, float]], limits: Limits, points: int
+) -> xr.Dataset:
+    """The Dataset of `design`, for goals and limits that were checked."""
+    gradient = Gradient(levitation)
+    for key in gradient.checked_keys(list(bounds), "free"):
+        number, (low, high) = gradient.numbers[key], bounds[key]
+        if not low <= number <= high:
+            raise InputError(
+                f"Input free.{key} must be a range that holds the scene's own number, {number:g}; instead received "
+                f"[{low:g}, {high:g}]."
+            )
+        if levitation.scene.plate is not None and levitation.models.plate_model != "none" and unknown_over_plate(key):
+            raise InputError(f"Input free must name what has derivatives; instead {key}: {unknown_over_plate(key)}.")
+    search = Search(levitation, bounds)
+    kinds = [GOALS[goal] for goal in goals]
+    found = [optimised(search, kinds[0], limits)] if len(kinds) == 1 else _front(search, kinds, limits, points)
+    return _dataset(search, levitation, goals, bounds, limits, [numbers for _, numbers in found])
+
+
+def _dataset(
+    search: Search, first: Levitation, goals: Sequence[str], bounds: Mapping[str, tuple[float, float]],
+    limits: Limits, found: Sequence[Array],
+) -> xr.Dataset:  # fmt: skip
+    """Scenes that were found, each searched anew, and the one given."""
+    note("The scene that was found, searched anew ...")
+    begun = replace(first.models, model=search.models.model)
+    given = scene_numbers(first.scene)[1]
+    numbers = [np.array([given[key] for key in search.keys]), *found]
+    rows, curves, texts = [], [], list[str]()
+    for k, one in enumerate(numbers):
+        scene = changed(search.scene, dict(zip(search.keys, one.tolist(), strict=True)))
+        there = first if k == 0 else Levitation(scene, begun, search.spin)
+        near = search.at(one) if k else None
+        if near is not None and (survey := survey_near(there, *(v[None] for v in near.bare.start.vectors[:3:2]))):
+            there.adopt(survey)
+        known = nearest_of(there.equilibria, near.known.position if near else np.zeros(3))
+        rows.append(_measured(there, known, search.keys))
+        curves.append(_curve(there, known))
+        texts.append(scene_text(first.scene if k == 0 else scene))
+    units = [label_of_key(key)["units"] for key in search.keys]
+    ends = [limits.get(name, (-np.inf, np.inf)) for name in MEASURES]
+    values = np.array(rows)
+    over = ("curve", "step")
+    return xr.Dataset(
+        {
+            "number": variable(("point", "key"), np.array(numbers[1:]), "as the key", "number of the scene"),
+            "first_number": variable(("key",), numbers[0], "as the key", "number of the scene given"),
+            "bound": variable(("key", "end"), [bounds[key] for key in search.keys], "as the key", "its bounds"),
+            "value": variable(("point", "measure"), values[1:], "as the measure", "measure"),
+            "first_value": variable(("measure",), values[0], "as the measure", "measure of the scene given"),
+            "limit": variable(("measure", "end"), ends, "as the measure", "its limits"),
+            "followed_frequency": variable(over, [c[0] for c in curves], "Hz", "frequency, without the plate"),
+            "followed_distance": variable(over, [c[1] for c in curves], "m", "levitation distance, without the plate"),
+            "followed_stable": variable(over, [c[2] for c in curves], "1", "whether it is stable, or marginal"),
+            "scene": (("point",), texts[1:]),
+        },
+        {
+            "key": list(search.keys),
+            "unit": ("key", units),
+            "measure": list(MEASURES),
+            "measure_unit": ("measure", [unit for unit, _ in MEASURES.values()]),
+            "end": ["least", "most"],
+        },
+        {"study": "designed", "goals": ", ".join(goals), **search.near.levitation.labels},
+    )
+
+
+def _measured(levitation: Levitation, known: Equilibrium | None, keys: tuple[str, ...]) -> list[float]:
+    """All measures of a scene; NaN where it has none."""
+    found = []
+    for name in MEASURES:
+        try:
+            whole = levitation.stability if known is None else known
+            found.append(float(Candidate(levitation, whole, keys).values(name).min()))
+        except SpinlevError:
+            found.append(OF_SCENE[name](levitation.scene) if name in OF_SCENE else np.nan)
+    return found
+
+
+def _curve(levitation: Levitation, known: Equilibrium | None) -> Array:
+    """Frequencies, distances and stability (3, `CURVE`) along the branch of an equilibrium; NaN where there is none."""
+    scene, found = replace(levitation.still, plate=None), np.full((3, CURVE), np.nan)
+    if known is None or scene.gravity[:2].any() or not scene.floater.round:
+        return found
+    start = Scales.of(scene).pack((known.without or known).start)
+    try:
+        points = branch_through(scene, levitation.rates, start, scene.frequency, levitation.spin)
+    except EquilibriumError:
+        return found
+    chosen = np.unique(np.linspace(0, len(points) - 1, CURVE).round().astype(int))
+    some = [(points[k].parameter, points[k].distance, levitates(points[k])) for k in chosen]
+    found[:, : len(some)] = np.array(some).T
+    return found
+
+
+def _lines(result: xr.Dataset) -> list[str]:
+    """What was found, in lines."""
+    lines = []
+    for k in range(result.sizes["point"]):
+        one = result.isel(point=k)
+        changes = [
+            f"{key} = {float(number):.5g}" + (f" {unit}" if unit != "1" else "")
+            for key, number, unit in zip(result["key"].values, one["number"].values, result["unit"].values, strict=True)
+        ]
+        lines.append("; ".join(changes))
+        rows = zip(MEASURES, one["value"].values, result["first_value"].values, strict=True)
+        said = [f"{name} {value:.4g} (was {was:.4g})" for name, value, was in rows if np.isfinite(value)]
+        lines.append(f"  {', '.join(said)}")
+    return lines
+
+
+@styled
+def design_figure(result: xr.Dataset) -> Figure:
+    """Free numbers within their bounds and the branch of equilibria before and after; of two goals their curve."""
+    figure, ((left, right),) = panels(1, 2, 2.9)
+    goals = [GOALS[name] for name in str(result.attrs["goals"]).split(", ")]
+    count, (low, high) = result.sizes["point"], result["bound"].values.T
+    places = np.arange(result.sizes["key"])[::-1]
+    first = (result["first_number"].values - low) / (high - low)
+    if count > 1:
+        (one, _), (other, _) = goals
+        for panel, name, axis in ((left, other, "x"), (left, one, "y")):
+            panel.set(**{f"{axis}label": f"{MEASURES[name][1]} ({MEASURES[name][0]})"})
+        left.plot(result["value"].sel(measure=other), result["value"].sel(measure=one), "o-", color=PALETTE[0])
+        for key, color in zip(result["key"].values, PALETTE * 3, strict=False):
+            ends = result["bound"].sel(key=key).values
+            part = (result["number"].sel(key=key) - ends[0]) / (ends[1] - ends[0])
+            right.plot(result["value"].sel(measure=other), part, "o-", color=color, label=str(key))
+        right.set(xlabel=f"{MEASURES[other][1]} ({MEASURES[other][0]})", ylabel="number, from its least to its most")
+        legend_below(figure, right)
+        return figure
+    after = (result["number"].isel(point=0).values - low) / (high - low)
+    left.hlines(places, 0, 1, color="0.85", lw=4)
+    left.plot(first, places, "o", mfc="none", color=PALETTE[1], label="given")
+    left.plot(after, places, "o", color=PALETTE[0], label="found")
+    left.set_yticks(
+        places, [f"{key} ({unit})" for key, unit in zip(result["key"].values, result["unit"].values, strict=True)]
+    )
+    left.set_xticks([0, 1], ["least", "most"])
+    left.set_ylim(-0.7, len(places) - 0.3)
+    for curve, color in ((0, PALETTE[1]), (1, PALETTE[0])):
+        one = result.isel(curve=curve).dropna("step")
+        plot_branch(
+            right,
+            one["followed_frequency"],
+            1e3 * one["followed_distance"],
+            one["followed_stable"].values == 1,
+            color=color,
+        )
+        values = result["first_value"] if curve == 0 else result["value"].isel(point=0)
+        right.plot(values.sel(measure="frequency_hz"), values.sel(measure="distance_mm"), "o", color=color, ms=4)
+    right.set(xlabel="rotor frequency (Hz)", ylabel="levitation distance (mm)")
+    legend_below(figure, left)
+    return figure
+
+
+TABLE = ("scene", "goals", "free", "limits", "points")
+
+
+def read_goals(path: Path) -> tuple[Scene, tuple[Any, ...]]:
+    """Scene and goals, bounds, limits and points of a file of goals. Raises InputError."""
+    table = toml_tables(path, "goals")
+    for key in table:
+        checked_measures({key: 0}, "goals", dict.fromkeys(TABLE), f"keys of {path}")
+    if not isinstance(table.get("scene"), str):
+        raise InputError(
+            f"Input scene must be the path of a scene file, in {path}; instead received {shown(table.get('scene'))}."
+        )
+    wanted = checked_goals(table.get("goals"), table.get("free"), table.get("limits"), table.get("points", 7))
+    return load_scene(path.parent / table["scene"]), (*wanted, table.get("points", 7))
+
+
+def design_job(path: Path, requested: Models, out: Path) -> Answer:
+    """The scene that a file of goals asks for, written as design.toml with design.nc, .json and its figure."""
+    scene, (goals, bounds, limits, points) = read_goals(path)
+    levitation = Levitation(scene, requested)
+    result = designed(levitation, goals, bounds, limits, points)
+    count, files = result.sizes["point"], list[str]()
+    for k, text in enumerate(result["scene"].values):
+        files.append(str(out / ("design.toml" if count == 1 else f"design-{k + 1}.toml")))
+        write_whole(Path(files[-1]), str(text).encode())
+    names = {str(name): result["value"].sel(measure=name).values for name in result["measure"].values}
+    keys = result["key"].values.tolist()
+    values: dict[str, Any] = {
+        "scene": files[0] if count == 1 else files,
+        **{name: float(row[0]) if count == 1 else row for name, row in names.items()},
+        "numbers": [dict(zip(keys, row, strict=True)) for row in result["number"].values.tolist()],
+        "goals": list(goals), **levitation.labels,
+    }  # fmt: skip
+    write_dataset(result, out / "design.nc", scene)
+    write_whole(out / "design.json", f"{to_json(values)}\n".encode())
+    save_figures({"design": design_figure(result)}, out)
+    said = f"Scene{'s' if count > 1 else ''} in {', '.join(files)}; figure and numbers in"
+    return values, [*_lines(result), f"{said} {out}/design.png, .pdf, .nc and .json"]
