@@ -38,7 +38,7 @@ from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rot
 from ..fem.rotor.models import AccuracyError, changed_table, magnified as alike
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
-from ..geometry.common import Array, InputError, SpinlevError, Watch, unwatched
+from ..geometry.common import Array, SpinlevError, Watch, unwatched
 from ..geometry.scene.contents import AbsoluteStart, Plate
 from ..geometry.solids import moved
 from .cli.console import detail, note, progress, stages
@@ -54,7 +54,7 @@ from .plan import (
     equations_key,
     far_plan,
     field_key,
-    given_scene,
+    levitating_scene,
     looser,
     map_of,
     nearest_faces,
@@ -86,17 +86,7 @@ class Levitation:
     """
 
     def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
-        self.scene = given_scene(scene)
-        if self.scene.coils:
-            raise InputError(
-                "Input scene must have no coils here; instead it has. Coils carry a conductor along their axis: "
-                "spinlev simulate computes that, and nothing else yet."
-            )
-        if self.scene.companions:
-            raise InputError(
-                "Input floater must be one here; instead the scene has several, of which spinlev simulate computes the "
-                "trajectories and nothing else."
-            )
+        self.scene = levitating_scene(scene)
         self.still = replace(self.scene, drive=()) if self.scene.drive else self.scene
         """The scene with a rotor that keeps its first frequency, of which the equilibria are."""
         self.models = models.checked()

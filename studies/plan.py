@@ -85,6 +85,25 @@ def given_scene(scene: SceneLike) -> Scene:
     raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {shown(scene)}.")
 
 
+def levitating_scene(scene: SceneLike) -> Scene:
+    """A scene of one floater below a rotor, as `given_scene` has it.
+
+    Raises InputError: it has coils, or several floaters, of which trajectories alone are computed.
+    """
+    found = given_scene(scene)
+    if found.coils:
+        raise InputError(
+            "Input scene must have no coils here; instead it has. Coils carry a conductor along their axis: "
+            "spinlev simulate computes that, and nothing else yet."
+        )
+    if found.companions:
+        raise InputError(
+            "Input floater must be one here; instead the scene has several, of which spinlev simulate computes the "
+            "trajectories and nothing else."
+        )
+    return found
+
+
 def sources(table: RotorField) -> RotorTable:
     """The closed forms and expansions that make a table's field."""
     return table.expansions if isinstance(table, GriddedTable) else table

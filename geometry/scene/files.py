@@ -220,11 +220,11 @@ def scene(
     *,
     frequency_hz: float,
     rotor: Mapping[str, Any],
-    floater: Mapping[str, Any],
+    floater: Mapping[str, Any] | Sequence[Mapping[str, Any]],
     plate: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     gravity_m_s2: Sequence[float] = (0.0, 0.0, -9.81),
     drag: Mapping[str, Any] | None = None,
-    start: Mapping[str, Any] | None = None,
+    start: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     drive: Sequence[Mapping[str, Any]] | None = None,
     **more: Any,
 ) -> Scene:
@@ -245,9 +245,10 @@ def scene(
         and "angular_N_m_s"; left out, Stokes drag in air.
     start : dict, optional
         "offset_mm" from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz"; left
-        out, 0.1 mm above the stable equilibrium.
+        out, 0.1 mm above the stable equilibrium. Of several floaters, which are a list, a list of as many.
     drive : list of dict, optional
-        Steps of the rotor's frequency from `frequency_hz` on: "to_hz" or "stop" (True) with "in_s", or "hold_s".
+        Steps of the rotor's frequency from `frequency_hz` on: "to_hz" or "stop" (True) with "in_s", or "hold_s"; or of
+        its way, "center_mm" and "axis".
     **more : float or list
         Further keys that stand in no table of a scene file.
 
