@@ -95,18 +95,26 @@ def tube_reaction(inner: float, outer: float, conductivity: float, frequency: fl
     return complex(MU_0 / (2 * np.pi**2) * np.sum(dk * k**2 * back))
 
 
-def tube_drag(inner: float, outer: float, conductivity: float, speed: float) -> float:
+def tube_drag(
+    inner: float, outer: float, conductivity: float, speed: float, magnet: tuple[float, float] | None = None
+) -> float:
     """Drag on a dipole of 1 A m² along an infinite tube, in which it moves on the axis, N/(A m²)².
 
-    Each harmonic e^{ik(z-vt)} is one of the frequency kv in the tube.
+    Each harmonic e^{ik(z-vt)} is one of the frequency kv in the tube; a cylinder that is magnetised along the axis has
+    2 I₁(ka)/ka · sin(kh/2)/(kh/2) of the dipole's.
 
     Parameters
     ----------
     inner, outer, conductivity : as of `tube_reaction`
     speed : m/s
+    magnet : radius a and height h of such a cylinder, m; None for a dipole
     """
     k, dk, back = _tube_harmonics(inner, outer, conductivity, lambda k: k * speed)
-    return float(-MU_0 / (2 * np.pi**2) * np.sum(dk * k**3 * back.imag))
+    share = np.ones_like(k)
+    if magnet:
+        radius, height = magnet
+        share = 2 * iv(1, k * radius) / (k * radius) * np.sinc(k * height / (2 * np.pi))
+    return float(-MU_0 / (2 * np.pi**2) * np.sum(dk * k**3 * back.imag * share**2))
 
 
 def _tube_harmonics(
