@@ -232,6 +232,10 @@ ALLOWED = 0.02  # Relative error of losses that are taken as instantaneous
 ROUNDED = 0.995  # What is named as the most that would do is less by so much, so that its three digits will do
 
 
+GRADIENT = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2))  # Entries that tell a gradient
+PRODUCTS = [(a, b) for a in range(8) for b in range(a, 8)]  # Pairs of these and of three components
+
+
 @dataclass(frozen=True, eq=False)
 class RotorLosses:
     """Dissipation in the rotor's metal.
@@ -267,6 +271,10 @@ class RotorLosses:
         rates = self.rate_matrix(positions, moments)
         return np.asarray(np.einsum("nka,nkb->nab", rates, rates))
 
+    def products(self, places: Array) -> Array:
+        """(36, n) of all that D depends on: Σ_k of the products of c_k's gradient and c_k, by `PRODUCTS`."""
+        return _products(*self.fields(places))
+
     def error_at(self, distance: float) -> float:
         """Relative error of D for a centre at this distance from the nearest face, m."""
         return float(np.interp(distance, self.distances, self.errors))
@@ -291,6 +299,15 @@ class MovedLosses:
         there = self.before.body.center + (places - self.after.body.center) @ turn / self.size
         fields, slopes = self.table.fields(there)
         return fields @ turn.T / self.size**0.5, turn @ slopes @ turn.T / self.size**1.5
+
+    def products(self, places: Array) -> Array:
+        """See `RotorLosses`."""
+        return _products(*self.fields(places))
+
+
+def _products(fields: Array, slopes: Array) -> Array:
+    rows = np.concatenate([np.stack([slopes[..., i, j] for i, j in GRADIENT], axis=2), fields], axis=2)
+    return np.array([np.einsum("nk,nk->n", rows[..., a], rows[..., b]) for a, b in PRODUCTS])
 
 
 LOSSES = TableKind("rotor-losses", RotorLosses, "Dissipation in a rotor's metal: power Σ (d/dt m·c)²")

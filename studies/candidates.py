@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy.stats import qmc
@@ -36,7 +36,7 @@ from ..dynamics.motion.state import Scales
 from ..geometry.common import Array, ComputationError, InputError, SpinlevError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, scene_numbers
-from .cli.options import Models
+from .cli.options import FieldModel, Models
 from .gradient import Gradient, derivative
 from .levitation import Levitation
 from .result import IN_JSON
@@ -73,7 +73,7 @@ class Candidate:
     known: Equilibrium
     keys: tuple[str, ...]  # of the numbers that may change
     near: Candidate | None = None  # one whose ends of stability are near
-    step: Array | float = 0.0  # (key,) of the numbers from that
+    step: Any = 0.0  # (key,) of the numbers from that
 
     @property
     def bare(self) -> Equilibrium:
@@ -103,9 +103,10 @@ class Candidate:
             )
         family, start, found = by_frequency(scene, self.levitation.rates, self.levitation.spin), self._start, []
         for number, border in enumerate((LOWEST, HIGHEST)):
-            known = self.near.ends[number] if self.near and "ends" in self.near.__dict__ else None
-            moved = float(self.near.ends_by[number] @ self.step) if known and "ends_by" in self.near.__dict__ else 0.0
-            end = known and tracked_end(scene, family, known, moved)
+            end = None
+            if self.near is not None and "ends" in self.near.__dict__:
+                moved = float(self.near.ends_by[number] @ self.step) if "ends_by" in self.near.__dict__ else 0.0
+                end = tracked_end(scene, family, self.near.ends[number], moved)
             if end is None:  # tracked from a scene nearby, it may be on the other side of the frequency
                 if not levitates(family.point(start[:3], start[6:9], scene.frequency)):
                     raise EquilibriumError(f"At {scene.frequency:.4g} Hz it is not stable without the plate.")
@@ -153,9 +154,9 @@ class Candidate:
             own = self._of_scenes(
                 lambda there: 1e3 * np.array([rotor_gap(there, known.position, known.state.orientation)])
             )
-            return own + np.array([way.of(gap) for way in ways]).T
+            return np.asarray(own + np.array([way.of(gap) for way in ways]).T)
         stem, scale = _answer(name)
-        return np.array([[float(derivative(known, way, stem.removesuffix("_deg"))) / scale for way in ways]])
+        return np.array([[np.asarray(derivative(known, way, stem.removesuffix("_deg"))) / scale for way in ways]])
 
     @cached_property
     def ends_by(self) -> Array:
@@ -206,7 +207,7 @@ class Search:
         self.first = np.array([numbers[key] for key in free])
         self.models, self.spin = levitation.models, levitation.spin
         self.start = self._begun(levitation)
-        self.models = replace(self.models, model=self.start.levitation.table.model)
+        self.models = replace(self.models, model=cast(FieldModel, self.start.levitation.table.model))
         self.near, self.at_near = self.start, self.first
         self._known: dict[bytes, Candidate | None] = {}
 
@@ -292,6 +293,6 @@ class Search:
                     return None  # it is beyond the fold in which both meet
                 levitation.adopt(survey)
             found = nearest_of(levitation.equilibria, place)
-            return found and Candidate(levitation, found, self.keys, near, step)
+            return None if found is None else Candidate(levitation, found, self.keys, near, step)
         except SpinlevError:
             return None

@@ -88,9 +88,9 @@ def _range(name: str, value: object) -> tuple[float, float]:
     ends = list(value) if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else [value] * 2
     if len(ends) == 2:
         low, high = (side if end is None else end for end, side in zip(ends, (-np.inf, np.inf), strict=True))
-        good = all(is_number(end) or end in (-np.inf, np.inf) for end in (low, high) if not isinstance(end, str))
-        if good and not isinstance(low, str) and not isinstance(high, str) and low <= high and low < np.inf > -high:
-            return float(low), float(high)
+        good = all(is_number(end) or (isinstance(end, float) and np.isinf(end)) for end in (low, high))
+        if good and float(low) <= float(high) and float(low) < np.inf and float(high) > -np.inf:  # type: ignore[arg-type]
+            return float(low), float(high)  # type: ignore[arg-type]
     raise InputError(
         f"Input {name} must be a number, or two in order, least and most, of which inf leaves an end open; "
         f"instead received {shown(value)}."
@@ -130,7 +130,9 @@ class _Problem:
 
     def numbers(self, z: Array) -> Array:
         """Numbers of the scene for SLSQP's unknowns."""
-        return np.clip(self.search.low + z[: len(self.width)] * self.width, self.search.low, self.search.high)
+        return np.asarray(
+            np.clip(self.search.low + z[: len(self.width)] * self.width, self.search.low, self.search.high)
+        )
 
     def values(self, z: Array, name: str, sign: int = 1) -> Array | None:
         """What a measure is the least of, by its size; None where there is no such scene."""
@@ -270,7 +272,7 @@ def _front(
     last = optimised(search, (name, sense), limits)
     ends = [float(one.values(name).min()) for one in (found[0][0], last[0])]
     search.go_on_from(*found[0])
-    for level in np.linspace(*ends, points)[1:-1]:
+    for level in np.linspace(ends[0], ends[1], points)[1:-1]:
         low, high = limits.get(name, (-np.inf, np.inf))
         there = {name: (max(low, level), high) if sense > 0 else (low, min(high, level))}
         found.append(optimised(search, first, {**limits, **there}))
@@ -501,12 +503,12 @@ def design_figure(result: xr.Dataset) -> Figure:
     left.set_xticks([0, 1], ["least", "most"])
     left.set_ylim(-0.7, len(places) - 0.3)
     for curve, color in ((0, PALETTE[1]), (1, PALETTE[0])):
-        one = result.isel(curve=curve).dropna("step")
+        some = result.isel(curve=curve).dropna("step")
         plot_branch(
             right,
-            one["followed_frequency"],
-            1e3 * one["followed_distance"],
-            one["followed_stable"].values == 1,
+            some["followed_frequency"],
+            1e3 * some["followed_distance"],
+            some["followed_stable"].values == 1,
             color=color,
         )
         values = result["first_value"] if curve == 0 else result["value"].isel(point=0)

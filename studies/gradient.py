@@ -431,10 +431,10 @@ class _Line:
         parts = (table.derivatives(places, moments) for table in (self.base, self.first, self.last))
         return tuple(a + self.share * (c - b) for a, b, c in zip(*parts, strict=True))
 
-    def entries(self, places: Array) -> Array:
-        """See `RotorCurrents`."""
-        base, first, last = (RotorCurrents(table).entries(places) for table in (self.base, self.first, self.last))
-        return base + self.share * (last - first)
+    def products(self, places: Array) -> Array:
+        """See `RotorLosses`."""
+        base, first, last = (table.products(places) for table in (self.base, self.first, self.last))
+        return np.asarray(base + self.share * (last - first))
 
 
 @documented

@@ -32,7 +32,7 @@ from ...fem.harmonics.interior import Ball, BallField
 from ...fem.mutual.table import MutualTable
 from ...fem.plate.multipoles import weighted
 from ...fem.rotor.table import DerivedField, FieldTable
-from ...fem.rotor_metal import RotorLosses
+from ...fem.rotor_metal import GRADIENT, PRODUCTS, RotorLosses
 from ...geometry.common import MU_0, Array, even_directions
 from ...geometry.magnets import Magnet, polarizability
 from ...geometry.scene.contents import Scene
@@ -241,9 +241,7 @@ def rough_force(
 
 ROTOR_CURRENTS = "currents in the rotor"
 NUMBERS = 8
-UPPER = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2))  # Entries of the gradient that tell it
-ENTRIES = [(a, b) for a in range(NUMBERS) for b in range(a, NUMBERS)]
-DIAGONAL = [ENTRIES.index((a, a)) for a in range(NUMBERS)]
+DIAGONAL = [PRODUCTS.index((a, a)) for a in range(NUMBERS)]
 UNIT = 1e-2  # Length by which gradients count beside fields, m: about a place's distance from the currents
 BRAKE_ALLOWED = 5e-3  # Error of S by its largest entry; the table has 1e-2 in contact and 1e-3 farther off
 
@@ -257,14 +255,14 @@ class RotorCurrents(_Near):
 
     @property
     def count(self) -> int:
-        return len(ENTRIES) if self.ball is None else COUNT[2] + len(ENTRIES) * COUNT[1]
+        return len(PRODUCTS) if self.ball is None else COUNT[2] + len(PRODUCTS) * COUNT[1]
 
     def added(self, motion: Motion) -> Added:
         """Force and torque are minus half the derivatives of the power by drift and turning."""
         length, moment, drift = hy.par[Parameter.LENGTH], motion.moment, motion.drift
         last = moment[2] * drift[2]
         pairs = [moment[0] * drift[0] - last, moment[1] * drift[1] - last]
-        pairs += [moment[i] * drift[j] + moment[j] * drift[i] for i, j in UPPER[2:]]
+        pairs += [moment[i] * drift[j] + moment[j] * drift[i] for i, j in GRADIENT[2:]]
         rates = [*(length * p for p in pairs), *cross(motion.lag, moment)]
         strength = hy.par[Parameter.PLATE_MOMENT] * hy.par[Parameter.PLATE_MOMENT] / hy.par[Parameter.TIME]
         xx, yy, xy, xz, yz, *field = (-strength * s for s in self._response(motion, rates))
@@ -278,46 +276,38 @@ class RotorCurrents(_Near):
         metres = [hy.par[Parameter.LENGTH] * x for x in motion.position]
         if self.first is None:
             parts = self.table.multipoles.expressions(metres)
-            rows = [[*(slope[i][j] for i, j in UPPER), *field] for field, slope in parts]
+            rows = [[*(slope[i][j] for i, j in GRADIENT), *field] for field, slope in parts]
             signals, weights = [dotted(row, rates) for row in rows], self.table.weights
             induced = [weighted(w, signals) for w in weights]
             strengths = [weighted(w, induced) for w in weights.T]
             return [dotted(strengths, column) for column in zip(*rows, strict=True)]
         if self.ball is None:
-            entries = [hy.par[self.first + k] for k in range(len(ENTRIES))]
+            entries = [hy.par[self.first + k] for k in range(len(PRODUCTS))]
         else:
             basis, start = monomials(2, self.ball.offset(metres), hy.expression(1.0)), self.first
             inverse = 1.0 / polynomial([hy.par[start + k] for k in range(COUNT[2])], basis)
             rates = [inverse * inverse * inverse * r for r in rates]
             start, size = start + COUNT[2], COUNT[1]
             entries = [
-                polynomial([hy.par[start + n * size + k] for k in range(size)], basis) for n in range(len(ENTRIES))
+                polynomial([hy.par[start + n * size + k] for k in range(size)], basis) for n in range(len(PRODUCTS))
             ]
-        known = dict(zip(ENTRIES, entries, strict=True))
+        known = dict(zip(PRODUCTS, entries, strict=True))
         return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
 
     def numbers(self, field: DerivedField, poses: Poses) -> Array:
         """See `Placeable`."""
-        return self.entries(poses.places).T
+        return self.table.products(poses.places).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
-        parts = self.entries(ball.center + ball.radius * nodes())
+        parts = self.table.products(ball.center + ball.radius * nodes())
         lengths = np.repeat([UNIT, 1.0], (5, 3))
-        units = np.array([lengths[a] * lengths[b] for a, b in ENTRIES])
+        units = np.array([lengths[a] * lengths[b] for a, b in PRODUCTS])
         solve, basis = fitting(1)
         quadratic, fall = falling(units[DIAGONAL] @ parts[DIAGONAL])
         weights = (parts / fall) @ solve.T
         missed = units * np.abs(fall * (weights @ basis.T) - parts).max(axis=1)
         error = float(missed.max() / (units * np.abs(parts).max(axis=1)).max())
         return np.concatenate([quadratic, weights.ravel()]), error / BRAKE_ALLOWED
-
-    def entries(self, places: Array) -> Array:
-        """(36, n) of S at places (n, 3) m."""
-        if not isinstance(self.table, RotorLosses) and hasattr(self.table, "entries"):  # one between others
-            return np.asarray(self.table.entries(places))
-        fields, slopes = self.table.fields(places)
-        rows = np.concatenate([np.stack([slopes[..., i, j] for i, j in UPPER], axis=2), fields], axis=2)
-        return np.array([np.einsum("nk,nk->n", rows[..., a], rows[..., b]) for a, b in ENTRIES])
 
 
 class Dissipation(Protocol):
