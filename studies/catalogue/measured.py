@@ -416,7 +416,7 @@ def gather(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     """Every experiment, what disagrees most first."""
     whole = next((part for part in parts if "rms" in part), parts[0])
     rows = xr.concat([part[list(COLUMNS)].drop_attrs(deep=False) for part in parts], "experiment")
-    order = np.argsort(-np.abs(rows["computed"] / rows["measured"] - 1).values)
+    order = np.argsort(-np.abs((rows["computed"] / rows["measured"] - 1).values))
     return whole.drop_dims("experiment").merge(rows.isel(experiment=order), combine_attrs="no_conflicts")
 
 
@@ -480,7 +480,7 @@ def measured_figure(result: xr.Dataset) -> Figure:
             left.plot(result["time"], 1e3 * result[f"{name}_height"], color=color, label=name, **look)
     left.set(xlabel="time (s)", ylabel="height over the windings (mm)")
     off = 100 * (result["computed"] / result["measured"] - 1).values
-    errors = 100 * np.abs(result["error"] / result["measured"]).values
+    errors = 100 * np.abs((result["error"] / result["measured"]).values)
     right.barh(range(len(off)), off, xerr=errors, color=PALETTE[0], ecolor="0.3")
     right.set_yticks(range(len(off)), [str(name) for name in result["name"].values], fontsize=6)
     right.invert_yaxis()
