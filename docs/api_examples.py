@@ -47,6 +47,10 @@ print(f"{1e3 * bars.distance:.2f} ± {1e3 * bars.distance_error:.2f} mm", 1e3 * 
 free, limits = {"rotor.angle_deg": (5, 25), "rotor.edge_mm": (9, 12)}, {"distance_mm": 20}
 best = sl.design(scene, "largest margin", free, limits, model="dipole")
 print(best.number.to_series(), best.value.to_series())
+# [fit]
+seen = {"frequency_hz": [110, 130, 150], "distance_mm": [20.9, 18.7, 17.0], "distance_mm_error": [0.1, 0.1, 0.1]}
+fitted = sl.fit(scene, seen, {"rotor.angle_deg": (5, 25)}, model="dipole")
+print(f"{float(fitted.estimate[0]):.2f}° ± {float(fitted.error[0]):.2f}°")
 # [stability]
 modes = sl.stability(scene, model="cuboid")
 print(modes[["mode_frequency", "mode_growth"]].to_dataframe())

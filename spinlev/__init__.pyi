@@ -15,6 +15,7 @@ from .geometry.scene.making import (
 from .geometry.scene.messages import SceneError as SceneError
 from .studies.cli.options import Models as Models
 from .studies.design import design as design
+from .studies.fit import fit as fit
 from .studies.floater_force import floater_force as floater_force
 from .studies.gradient import gradient as gradient
 from .studies.interface import (

@@ -349,6 +349,11 @@ def checked_goals(
         raise InputError(f"Input points must be a number from 2 to 100; instead received {shown(points)}.")
     given = checked_measures({} if limits is None else limits, "limits", MEASURES, "what a scene can be asked for")
     ends = {name: _range(f"limits.{name}", value) for name, value in given.items()}
+    return [str(one) for one in wanted], checked_free(free), ALWAYS | ends
+
+
+def checked_free(free: object, levitation: Levitation | None = None) -> dict[str, tuple[float, float]]:
+    """Bounds of free numbers, which hold those of a `levitation` and have derivatives in it. Raises InputError."""
     if not isinstance(free, Mapping) or not free:
         raise InputError(f"Input free must be least and most by key of the scene file; instead received {shown(free)}.")
     bounds = {str(key): _range(f"free.{key}", value) for key, value in free.items()}
@@ -358,14 +363,9 @@ def checked_goals(
                 f"Input free.{key} must be two finite numbers in order, least and most; instead received "
                 f"{shown(free[key])}."
             )
-    return [str(one) for one in wanted], bounds, ALWAYS | ends
-
-
-def designed(
-    levitation: Levitation, goals: Sequence[str], bounds: Mapping[str, tuple[float, float]], limits: Limits, points: int
-) -> xr.Dataset:
-    """The Dataset of `design`, for goals and limits that were checked."""
-    gradient = Gradient(levitation)
+    if levitation is None:
+        return bounds
+    gradient, plate = Gradient(levitation), levitation.scene.plate is not None
     for key in gradient.checked_keys(list(bounds), "free"):
         number, (low, high) = gradient.numbers[key], bounds[key]
         if not low <= number <= high:
@@ -373,8 +373,16 @@ def designed(
                 f"Input free.{key} must be a range that holds the scene's own number, {number:g}; instead received "
                 f"[{low:g}, {high:g}]."
             )
-        if levitation.scene.plate is not None and levitation.models.plate_model != "none" and unknown_over_plate(key):
+        if plate and levitation.models.plate_model != "none" and unknown_over_plate(key):
             raise InputError(f"Input free must name what has derivatives; instead {key}: {unknown_over_plate(key)}.")
+    return bounds
+
+
+def designed(
+    levitation: Levitation, goals: Sequence[str], bounds: Mapping[str, tuple[float, float]], limits: Limits, points: int
+) -> xr.Dataset:
+    """The Dataset of `design`, for goals and limits that were checked."""
+    checked_free(bounds, levitation)
     search = Search(levitation, bounds)
     kinds = [GOALS[goal] for goal in goals]
     found = [optimised(search, kinds[0], limits)] if len(kinds) == 1 else _front(search, kinds, limits, points)

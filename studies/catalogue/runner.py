@@ -40,6 +40,7 @@ from ..figures.run import (
 )
 from ..figures.style import save_figures
 from ..figures.view import SEEN, Currents, current_places, near_plate
+from ..fit import fit_figure
 from ..levitation import Levitation
 from ..plan import sources
 from ..question import Question
@@ -51,6 +52,7 @@ from .entries import CATALOGUE
 QUESTION = "question"  # What the result of one's own question is called
 DRAWN = {
     "first_number": ("design", design_figure),
+    "estimate": ("fit", fit_figure),
     "branch_distance": ("compare", compare_figure),
     "outside": ("field-map", field_map_figure),
     "easy_axis": ("working-point", working_point_figure),

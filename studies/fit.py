@@ -1,0 +1,267 @@
+"""Numbers of a scene that fit what was measured: least squares over equilibria with their derivatives."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+import scipy
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ..dynamics.equilibria.equilibrium import AXIAL, SIDE, TILT
+from ..geometry.common import Array, ComputationError, InputError, shown
+from ..geometry.scene.files import changed, scene_numbers
+from .candidates import Candidate, Search
+from .cli.options import FieldModel, Models, PlateModel, Requested, documented
+from .design import checked_free
+from .figures.style import PALETTE, legend_below, panels, styled
+from .levitation import Levitation
+from .plan import SceneLike
+from .result import label_of_key, variable
+
+# What may have been measured: unit and label; beside these the modes' frequencies, as `axial_hz`
+MEASURABLE: Mapping[str, tuple[str, str]] = {
+    "distance_mm": ("mm", "levitation distance"),
+    "lateral_offset_mm": ("mm", "distance from the axis of rotation"),
+    "polar_angle_deg": ("deg", "polar angle of the moment"),
+}
+MODE_OF = {
+    "axial_hz": AXIAL,
+    **dict(zip(("backward_whirl_hz", "forward_whirl_hz"), SIDE, strict=True)),
+    **{f"{name}_hz": name for name in TILT},
+}
+ERROR = "_error"  # what a column of standard deviations is called after that of its measure
+LOST = 1e3  # residual of each value of a scene that has no such equilibrium, so that the fit comes back
+Data = str | PathLike[str] | xr.Dataset | Mapping[str, Sequence[float]]
+
+
+def table_of(data: Data) -> dict[str, Array]:
+    """Columns of measurements with numbers alone; empty cells are NaN. Raises InputError, OSError."""
+    if isinstance(data, str | PathLike) and str(data).endswith(".nc"):
+        with xr.open_dataset(data, engine="h5netcdf") as opened:
+            return table_of(opened.load())
+    if isinstance(data, xr.Dataset):
+        frame = data.to_dataframe().reset_index()
+        columns: dict[str, Any] = {str(name): frame[name].tolist() for name in frame if name in data.variables}
+    elif isinstance(data, str | PathLike):
+        lines = [line for line in Path(data).read_text(encoding="utf-8").splitlines() if line.strip(" ,")]
+        rows = list(csv.reader(line for line in lines if not line.lstrip().startswith("#")))
+        if len({len(row) for row in rows}) != 1:
+            raise InputError(f"Input data must have rows of one length, with commas; instead those of {data} have not.")
+        columns = {name.strip(): [cell.strip() or "nan" for cell in cells] for name, *cells in zip(*rows, strict=True)}
+    elif isinstance(data, Mapping):
+        columns = {str(name): list(np.atleast_1d(values)) for name, values in data.items()}
+    else:
+        raise InputError(f"Input data must be a table or its file; instead received {shown(data)}.")
+    if len({len(values) for values in columns.values()}) != 1 or not min(map(len, columns.values())):
+        raise InputError("Input data must have columns of one length that are not empty; instead they have not.")
+    found = {}
+    for name, values in columns.items():
+        try:
+            found[name] = np.array([float(value) for value in values])
+        except (TypeError, ValueError):
+            raise InputError(f"Input data must have numbers; instead those of {name} are {shown(values)}.") from None
+    return found
+
+
+class _Rows:
+    """The scenes of a table's rows, and what was measured in them."""
+
+    def __init__(
+        self, levitation: Levitation, table: Mapping[str, Array], free: Mapping[str, tuple[float, float]]
+    ) -> None:
+        scene, numbers = scene_numbers(levitation.scene)
+        known = {**MEASURABLE, **MODE_OF}
+        self.measures = [name for name in table if name in known]
+        self.keys = [name for name in table if name in numbers]
+        errors = [name for name in table if name.removesuffix(ERROR) in self.measures and name not in known]
+        rest = set(table) - {*self.measures, *self.keys, *errors}
+        if rest or not self.measures:
+            what = f"unknown are {', '.join(sorted(rest))}" if rest else "none is a measure"
+            raise InputError(
+                "Input data must have columns of keys of the scene file and of what was measured "
+                f"({', '.join(known)}); instead {what}."
+            )
+        if both := set(self.keys) & set(free):
+            raise InputError(f"Input free must not name what the data give; instead both have {', '.join(both)}.")
+        if errors and len(errors) < len(self.measures):
+            raise InputError("Input data must have standard deviations of all measures or of none; instead of some.")
+        self.measured = np.stack([table[name] for name in self.measures], axis=1)
+        self.given = bool(errors)
+        self.deviations = np.ones_like(self.measured)
+        if errors:
+            self.deviations = np.stack([table[f"{name}{ERROR}"] for name in self.measures], axis=1)
+            if not np.all(self.deviations[np.isfinite(self.measured)] > 0):
+                raise InputError("Input data must have positive standard deviations; instead some are not.")
+        self.there = np.isfinite(self.measured)
+        if self.there.sum() <= len(free) - bool(errors):
+            raise InputError(
+                f"Input data must have more values than there are free numbers; instead {self.there.sum()} values are "
+                f"to give {len(free)} numbers."
+            )
+        self.set = (
+            np.stack([table[name] for name in self.keys], axis=1) if self.keys else np.zeros((len(self.there), 0))
+        )
+        self.searches = []
+        for row in self.set:
+            there = Levitation(changed(scene, dict(zip(self.keys, row.tolist(), strict=True))), levitation.models)
+            there.share(levitation)
+            self.searches.append(Search(there, free))
+
+    def _each(self, numbers: Array, of: Any) -> list[Array | None]:
+        found = []
+        for search, there in zip(self.searches, self.there, strict=True):
+            known = search.at(numbers)
+            names = [name for name, here in zip(self.measures, there, strict=True) if here]
+            found.append(None if known is None else np.array([of(known, name) for name in names]))
+            if known is not None and of is _slope:
+                search.go_on_from(known, numbers)
+        return found
+
+    def residuals(self, numbers: Array) -> Array:
+        """What is computed less what was measured, in standard deviations."""
+        parts = []
+        for k, values in enumerate(self._each(numbers, _value)):
+            wanted, size = (table[k][self.there[k]] for table in (self.measured, self.deviations))
+            parts.append(np.full(len(wanted), LOST) if values is None else (values - wanted) / size)
+        return np.concatenate(parts)
+
+    def slopes(self, numbers: Array) -> Array:
+        """Derivatives of the same by the free numbers."""
+        found = self._each(numbers, _slope)
+        return np.concatenate([
+            np.zeros((int(self.there[k].sum()), len(numbers))) if part is None
+            else part / self.deviations[k][self.there[k], None]
+            for k, part in enumerate(found)
+        ])  # fmt: skip
+
+    def computed(self, numbers: Array) -> Array:
+        """(row, measure) all that the scenes answer; NaN where they have no equilibrium."""
+        known = [search.at(numbers) for search in self.searches]
+        return np.array([
+            [np.nan if one is None else _value(one, name) for name in self.measures] for one in known
+        ])  # fmt: skip
+
+
+def _value(known: Candidate, name: str) -> float:
+    if name in MODE_OF:
+        return next((mode.frequency_hz for mode in known.known.modes if mode.name == MODE_OF[name]), np.nan)
+    return float(known.values(name)[0])
+
+
+def _slope(known: Candidate, name: str) -> Array:
+    if name in MODE_OF:
+        return np.array([known.ways[key].modes[MODE_OF[name]].imag / (2 * np.pi) for key in known.keys])
+    return np.asarray(known.slopes(name)[0])
+
+
+@documented
+def fit(
+    scene: SceneLike,
+    data: Data,
+    free: Mapping[str, Sequence[float]],
+    model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
+    spin: float = 0.0,
+    progress: bool | None = None,
+    **requested: Unpack[Requested],
+) -> xr.Dataset:
+    """Numbers of a scene that fit what was measured best, with their covariance: least squares by exact derivatives.
+
+    Parameters
+    ----------
+    data : path of a CSV or netCDF file, Dataset, or dict of columns
+        A row for each experiment: what was set, by keys of the scene file ("frequency_hz"), and what was measured:
+        "distance_mm", "lateral_offset_mm", "polar_angle_deg" and frequencies of modes in the rotor's frame ("axial_hz",
+        "forward_whirl_hz", "backward_whirl_hz", "precession_hz", "nutation_hz"). Standard deviations are in columns of
+        the same names with "_error" (of all or of none: then all are the same, and what is left tells how large). Empty
+        cells were not measured.
+    free : dict of str to (float, float)
+        Bounds of the numbers that are looked for, by dotted key; the scene's own are within, where the fit begins.
+
+    Returns
+    -------
+    xarray.Dataset
+        `estimate`, its standard deviation `error` and `covariance` by `key`; `measured`, `deviation` and `computed` by
+        `row` and `measure`; attributes `chi_squared` and `degrees_of_freedom`. `sl.draw` makes its figure.
+
+    Raises
+    ------
+    EquilibriumError
+        A row's scene has no equilibrium, nor have others within the bounds.
+    ComputationError
+        The data do not tell the numbers apart.
+
+    Examples
+    --------
+    >>> import spinlev as sl
+    >>> cube = sl.tilt(angle_deg=9.0, edge_mm=10.0, remanence_T=1.3)
+    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.3, density_kg_m3=7500.0)
+    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
+    >>> seen = {"frequency_hz": [110.0, 130.0, 150.0], "distance_mm": [21.2, 18.8, 17.1]}
+    >>> found = sl.fit(scene, seen, {"rotor.angle_deg": (5.0, 20.0)}, model="dipole")
+    >>> 5 < float(found.estimate[0]) < 20
+    True
+    """
+    bounds = checked_free(free)
+    levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
+    rows = _Rows(levitation, table_of(data), checked_free(free, levitation))
+    low, high = np.array(list(bounds.values())).T
+    found = scipy.optimize.least_squares(
+        lambda z: rows.residuals(low + z * (high - low)),
+        (rows.searches[0].first - low) / (high - low),
+        jac=lambda z: rows.slopes(low + z * (high - low)) * (high - low),
+        bounds=(0.0, 1.0), x_scale="jac", xtol=1e-10, ftol=1e-12, gtol=1e-10,
+    )  # fmt: skip
+    numbers = low + found.x * (high - low)
+    freedom, chi = len(found.fun) - len(numbers), float(found.fun @ found.fun)
+    normal = rows.slopes(numbers).T @ rows.slopes(numbers)
+    if np.linalg.cond(normal / np.sqrt(np.outer(*[np.diag(normal)] * 2))) > 1e12 or not np.all(np.diag(normal)):
+        raise ComputationError("The data do not tell the free numbers apart. Measure more, or free fewer.")
+    covariance = np.linalg.inv(normal) * (1.0 if rows.given else chi / max(freedom, 1))
+    labels = [label_of_key(key) for key in bounds]
+    over = ("row", "measure")
+    return xr.Dataset(
+        {
+            "estimate": variable(("key",), numbers, "as the key", "number that fits best"),
+            "error": variable(("key",), np.sqrt(np.diag(covariance)), "as the key", "its standard deviation"),
+            "covariance": (("key", "other_key"), covariance),
+            "bound": variable(("key", "end"), list(bounds.values()), "as the key", "its bounds"),
+            "measured": variable(over, rows.measured, "as the measure", "measured"),
+            "deviation": variable(over, rows.deviations, "as the measure", "its standard deviation"),
+            "computed": variable(over, rows.computed(numbers), "as the measure", "computed with the estimate"),
+            "set": variable(("row", "setting"), rows.set, "as the key", "what was set"),
+        },
+        {
+            "key": list(bounds), "other_key": list(bounds), "unit": ("key", [label["units"] for label in labels]),
+            "measure": rows.measures, "setting": rows.keys, "end": ["least", "most"],
+        },
+        {"study": "fitted", "chi_squared": chi, "degrees_of_freedom": freedom, "deviations_given": int(rows.given),
+         **levitation.labels},
+    )  # fmt: skip
+
+
+@styled
+def fit_figure(result: xr.Dataset) -> Figure:
+    """What was measured, with its standard deviations, and what is computed, one panel a measure."""
+    names, rows = result["measure"].values.tolist(), np.arange(result.sizes["row"])
+    figure, axes = panels(1, len(names), 2.8)
+    along, label = rows, "row"
+    if result.sizes["setting"]:
+        key = str(result["setting"].values[0])
+        along, label = result["set"].values[:, 0], f"{key} ({label_of_key(key)['units']})"
+    order = np.argsort(along)
+    for panel, name in zip(axes[0], names, strict=True):
+        here = result.sel(measure=name)
+        bars = here["deviation"].values if result.attrs["deviations_given"] else None
+        panel.errorbar(along, here["measured"], bars, fmt="o", ms=3, color=PALETTE[1], label="measured")
+        panel.plot(along[order], here["computed"].values[order], color=PALETTE[0], lw=0.9, label="computed")
+        unit, said = MEASURABLE.get(name, ("Hz", f"{name.removesuffix('_hz').replace('_', ' ')} mode"))
+        panel.set(xlabel=label, ylabel=f"{said} ({unit})")
+    legend_below(figure, axes[0][0])
+    return figure
