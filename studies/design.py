@@ -330,7 +330,7 @@ def design(
     >>> free, limits = {"frequency_hz": (60.0, 130.0)}, {"gap_mm": (0.0, 12.0)}
     >>> found = sl.design(scene, "lowest frequency", free, limits, model="dipole")
     >>> round(float(found.number.sel(key="frequency_hz")[0]), 2)
-    93.15
+    93.21
     """
     wanted, bounds, ends = checked_goals(goals, free, limits, points)
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
