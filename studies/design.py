@@ -97,8 +97,8 @@ def _range(name: str, value: object) -> tuple[float, float]:
     )
 
 
-class _SettledError(Exception):
-    """Nothing better is found any more."""
+class _SettledError(ComputationError):
+    """Nothing better is found any more; what is best so far is the answer."""
 
 
 class _Problem:
