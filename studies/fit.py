@@ -109,7 +109,9 @@ class _Rows:
         )
         self.searches = []
         for row in self.set:
-            there = Levitation(changed(scene, dict(zip(self.keys, row.tolist(), strict=True))), levitation.models)
+            there = Levitation(
+                changed(scene, dict(zip(self.keys, row.tolist(), strict=True))), levitation.models, levitation.spin
+            )
             there.share(levitation)
             self.searches.append(Search(there, free))
 
