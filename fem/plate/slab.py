@@ -109,6 +109,23 @@ def reaction_tensor(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> Comp
     return mutual_tensor(slab, places, places, frequency)
 
 
+def drag_and_lift(slab: Slab, height: float, speed: float) -> tuple[float, float]:
+    """Drag on and lift of a vertical dipole of 1 A m² over a `slab` that moves, N/(A m²)².
+
+    Each wave of the dipole's field comes back at the frequency kₓv/2π (J. R. Reitz, J. Appl. Phys. 41, 2067 (1970)).
+
+    Parameters
+    ----------
+    height : of the dipole over the face, m
+    speed : m/s
+    """
+    k, dk = wave_numbers(np.asarray(height))
+    along = np.cos((np.arange(4 * ANGLES) + 0.5) * np.pi / (2 * ANGLES))
+    back = slab.reflection(k[:, None], k[:, None] * along * speed / (2 * np.pi))
+    each = MU_0 / (4 * np.pi) * (dk * k**3 * np.exp(-2 * k * height)) @ back / len(along)
+    return float(along @ each.imag), float(each.real.sum())
+
+
 @dataclass(frozen=True, eq=False)
 class SlabFrame:
     """Frame of the cylinder."""

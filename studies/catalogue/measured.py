@@ -33,7 +33,7 @@ from ...fem.closed_forms.eddy_bodies import polarizability, sphere_reaction, tub
 from ...fem.closed_forms.potentials import Dipole, HomogeneousField
 from ...fem.plate.eddy import plate_reaction, solve_eddy
 from ...fem.plate.floating import FloatingModes, floating_modes, modes_along
-from ...fem.plate.slab import Slab
+from ...fem.plate.slab import Slab, drag_and_lift
 from ...geometry.common import MU_0, Array
 from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Coil, Plate, Scene
@@ -310,24 +310,6 @@ def plate_drag(quick: bool) -> list[Row]:
     return [(name, "closed form", float(exact), drag, 1e-3 * float(exact), "N s/m/(A m²)²")]
 
 
-def moving_plate(speed: float, height: float = 0.02, thickness: float = 0.01) -> tuple[float, float]:
-    """Drag on and lift of a vertical dipole of 1 A m² over an infinite plate that moves, N/(A m²)².
-
-    Reitz's integral over the waves of the dipole's field, each of which the plate reflects at the frequency kₓv/2π.
-
-    Parameters
-    ----------
-    speed : m/s
-    height, thickness : of the dipole over the plate, and the plate's, m
-    """
-    k = np.exp(np.linspace(-12.0, 4.0, 400)) / height
-    angles = (np.arange(360) + 0.5) * np.pi / 180
-    along = np.cos(angles)
-    back = Slab(ALUMINIUM, thickness).reflection(k[:, None], k[:, None] * along * speed / (2 * np.pi))
-    each = MU_0 / (8 * np.pi**2) * (np.exp(-2 * k * height) * k**4)[:, None] * back * np.log(k[1] / k[0]) * np.pi / 180
-    return float(np.sum(along * each.imag)), float(np.sum(each.real))
-
-
 def lift_and_drag(quick: bool) -> list[Row]:
     """A dipole that passes over a plate: means of its last way; their error includes the range there."""
     if quick:
@@ -353,7 +335,7 @@ def lift_and_drag(quick: bool) -> list[Row]:
         ranges.append([np.ptp(drag), np.ptp(lift)])
     names = (f"dipole that passes over a plate at 5 m/s: {force}" for force in ("drag", "lift"))
     errors = abs(np.diff(found, axis=0)[0]) + ranges[1]
-    known = moving_plate(speed, height, thickness)
+    known = drag_and_lift(Slab(ALUMINIUM, thickness), height, speed)
     return [
         (name, "closed form", *numbers, "N/(A m²)²")
         for name, *numbers in zip(names, known, found[1], errors, strict=True)

@@ -48,7 +48,8 @@ def test_the_largest_margin_is_that_of_a_grid():
         margins.append(float(there.value.sel(measure="margin")[0]))
     assert best == pytest.approx(margins[2], abs=1e-4)
     assert margins == sorted(margins)
-    assert best - margins[0] < 0.1
+    below, above = np.diff(margins)  # a smooth function of the edge: by equal steps it changes nearly as much
+    assert below == pytest.approx(above, rel=0.1)
     assert float(found.first_value.sel(measure="margin")) < best
     again = sl.parse_scene(str(found.scene[0].item()))
     assert sl.equilibria(again, **FEW).distance[0] == pytest.approx(20e-3, abs=5e-8)

@@ -28,7 +28,7 @@ from spinlev.studies.run import simulate_job
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 SITE = ROOT / "docs" / "_build" / "unrun"
 PHONE, DESK = 390, 1400
-HARMLESS = ("[PST]", '"scene,hashes"')
+HARMLESS = ("[PST]: Changed to", "[PST]: Scrolled sidebar", '"scene,hashes"')
 """What the documentation's theme says of its colours, and the viewer of what it was given."""
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium here (Debian: apt-get install chromium)"),

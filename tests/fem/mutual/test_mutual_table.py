@@ -134,6 +134,7 @@ def test_charges_need_fewer_degrees_than_the_remanence(rotor, monkeypatch):
     assert 0 < max(forces) < TAIL
 
 
+@pytest.mark.slow
 def test_two_permeabilities_are_met_as_stated():
     """The charges have their mean."""
     cube = replace(MAGNETS[0], recoil_permeability=1.05, transverse_permeability=1.15)

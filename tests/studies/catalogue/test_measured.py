@@ -6,6 +6,7 @@ from ngsolve import SetNumThreads
 from second_opinions.coaxial_rings import mutual
 
 from spinlev.fem.closed_forms.eddy_bodies import tube_drag
+from spinlev.fem.plate.slab import Slab, drag_and_lift
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.scene.files import parse_scene, scene_text
 from spinlev.studies.catalogue.measured import (
@@ -20,7 +21,6 @@ from spinlev.studies.catalogue.measured import (
     measured_fall,
     measured_heights,
     measured_numbers,
-    moving_plate,
     resting_height,
     swing,
 )
@@ -75,11 +75,12 @@ def test_a_cylinder_in_a_tube_brakes_as_the_rings_of_its_mantle_do():
 
 def test_a_plate_that_moves_slowly_brakes_and_one_that_moves_fast_lifts():
     """Reitz's limits: at low speed the drag of a thick plate, at high speed the lift of an image, 3μ0m²/(32πh⁴)."""
-    drag, lift = moving_plate(1e-3)
+    plate = Slab(3.4e7, 0.01)
+    drag, lift = drag_and_lift(plate, 0.02, 1e-3)
     slow = MU_0**2 * 3.4e7 / (128 * np.pi) * (0.02**-3 - 0.03**-3) * 1e-3
     assert drag == pytest.approx(slow, rel=1e-5)
     assert lift < 1e-3 * drag
-    assert moving_plate(1e9)[1] == pytest.approx(3 * MU_0 / (32 * np.pi * 0.02**4), rel=2e-3)
+    assert drag_and_lift(plate, 0.02, 1e9)[1] == pytest.approx(3 * MU_0 / (32 * np.pi * 0.02**4), rel=2e-3)
 
 
 @pytest.mark.slow
