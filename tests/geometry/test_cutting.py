@@ -64,6 +64,7 @@ def test_magnets_that_differ_or_only_meet_in_part_stay_two():
         assert united((first, other)) == (first, other)
 
 
+@pytest.mark.slow
 def test_a_magnet_in_blocks_has_the_tables_of_the_whole_and_dipoles_of_its_own():
     pieces, floater = blocks(WHOLE, (2, 2, 1)), Floater(6e-3, 1.3, 1.05, 7500.0)
     places = np.array(list(product([-0.02, 0.02], repeat=3)))

@@ -123,7 +123,7 @@ def test_the_command_line_writes_a_scene(tmp_path):
         ('scene = "scene.toml"\ngoals = "lightest"\nfree."rotor.edge_mm" = [7, 12]', "goals must name goals", 2),
         ("scene = [", "must be TOML", 2),
         (
-            'scene = "scene.toml"\ngoals = "lightest rotor"\nfree."rotor.edge_mm" = [9, 11]\nlimits.distance_mm = 40',
+            'scene = "scene.toml"\ngoals = "largest margin"\nfree."rotor.angle_deg" = [9, 11]\nlimits.distance_mm = 25',
             "meets all limits",
             1,
         ),

@@ -57,6 +57,7 @@ def test_files_that_are_no_table(tmp_path, data):
     assert kept.attrs["degrees_of_freedom"] == 6
 
 
+@pytest.mark.slow
 def test_covariance_is_that_of_differences_of_whole_equilibria(data):
     sizes = np.array([0.05, 0.1, 0.2])
     errors = {f"{name}_error": np.full(4, size) for name, size in zip(list(data)[1:], sizes, strict=True)}
@@ -77,6 +78,7 @@ def test_a_value_that_was_not_measured_is_left_out(data):
     assert found.attrs["degrees_of_freedom"] == 9
 
 
+@pytest.mark.slow
 def test_what_is_left_tells_the_error_where_none_is_given(data):
     noise = np.random.default_rng(3).normal(0, 0.05, 4)
     only = {"frequency_hz": FREQUENCIES, "distance_mm": data["distance_mm"] + noise}

@@ -68,7 +68,7 @@ def test_many_discs_are_refused():
         sl.ensemble(made(DISC), {"position_mm": [[0.0, 0.0, -30.0]]}, 0.1, model="dipole")
 
 
-@pytest.mark.parametrize("keys", [BRICK, DISC], ids=["brick", "disc"])
+@pytest.mark.parametrize("keys", [pytest.param(BRICK, marks=pytest.mark.slow), DISC], ids=["brick", "disc"])
 def test_a_plates_currents_act_on_other_shapes(keys):
     """By their dipole: energy is balanced, the plate changes the motion, and the result says what is left out."""
     scene = made(keys, plate=PLATE, start=HELD)

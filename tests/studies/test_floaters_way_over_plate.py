@@ -78,8 +78,9 @@ def test_a_magnet_thrown_at_cold_copper_turns_round_in_mid_air(model: str, error
 
 @pytest.mark.parametrize(
     ("height", "speed", "remanence", "rtol", "duration"),
-    [(0.02, 0.5, 5e-4, 0.1, 0.03), pytest.param(0.07, 0.3, 2e-3, 0.05, 0.2, marks=pytest.mark.slow)],
+    [(0.02, 0.5, 5e-4, 0.1, 0.03), (0.07, 0.3, 2e-3, 0.05, 0.2)],
 )
+@pytest.mark.slow
 def test_a_magnet_dropped_from_far_off_feels_the_plate_where_it_comes_to(height, speed, remanence, rtol, duration):
     """There the plate does less than a millionth of the weight and is left out; at its face it is not."""
     scene = dropped(height, (0.0, 0.0, -speed))
@@ -91,6 +92,7 @@ def test_a_magnet_dropped_from_far_off_feels_the_plate_where_it_comes_to(height,
     assert not flown.left_plate_table
 
 
+@pytest.mark.slow
 def test_a_flight_beyond_what_a_table_can_reach_ends_there_and_says_so():
     """At 2.5 m/s along the face, 10 mm over it: to the sides a table reaches 3 times its distance from it."""
     levitation = Levitation(dropped(0.01, (2.5, 0.0, 0.0)), Models(plate_model="slab", plate_rtol=0.1))
@@ -104,6 +106,7 @@ def test_a_flight_beyond_what_a_table_can_reach_ends_there_and_says_so():
     assert "infinite slab leaves out the plate's edges" in plate_words(levitation)[0]
 
 
+@pytest.mark.slow
 def test_a_flight_that_begins_off_its_equilibrium_has_a_table_there():
     """An offset of 5 mm is more than the 3 mm for which the equilibrium's own table is made."""
     scene = sl.scene(

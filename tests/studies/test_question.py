@@ -229,6 +229,7 @@ def test_a_study_has_no_scene_to_show(spinlev, tmp_path):
     shutil.rmtree(tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_a_sweep_is_beside_the_dipole_whatever_the_stability(tmp_path):
     """The dipoles of every point are those of `compare`'s table, which searches each for itself."""
     found = sl.sweep(SCENE, {"frequency_hz": [110.0, 118.0]}, model="surface", rtol=1e-3, out=tmp_path, workers=1)

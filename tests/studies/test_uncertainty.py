@@ -49,6 +49,7 @@ def test_an_equilibrium_of_a_draw_is_that_of_its_scene():
     assert moved.growth_per_s == pytest.approx(searched.growth_per_s, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_draws_past_a_fold_are_counted_as_lost():
     """With 15 Hz either way about a frequency 5 Hz above the fold of this rotor a third has no equilibrium."""
     scene = sl.load_scene(HORIZONTAL)

@@ -381,6 +381,7 @@ def test_streams_that_are_closed(tmp_path, closed, status, answer, said):
     assert (tmp_path / "file").read_text() == ""
 
 
+@pytest.mark.slow
 def test_a_shell_that_allows_too_few_open_files(tmp_path):
     """40 are enough; of fewer one sentence says what to do."""
     arguments = ("equilibria", SCENE, *DIPOLE, "--json", "--out", str(tmp_path))

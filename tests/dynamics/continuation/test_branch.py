@@ -114,6 +114,7 @@ def test_any_parameter_of_the_scene_ends_at_the_survey_s_equilibrium(compiled, m
     assert last.motion.stable == expected.stable
 
 
+@pytest.mark.slow
 def test_oscillatory_loss_of_stability_between_80_and_100_hz(compiled):
     """PHYSICS.md: stable at 80 Hz, unstable from about 100 Hz; the survey finds the change at the same frequency."""
     scene = replace(VERTICAL, frequency=80.0)

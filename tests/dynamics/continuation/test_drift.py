@@ -56,6 +56,7 @@ def assert_heights_agree(averaged, flight, distance, spin, parts, tolerance):
 
 
 @pytest.mark.parametrize("spin", [-0.2, 0.0, 0.1])
+@pytest.mark.slow
 def test_slow_torque_is_that_of_the_closed_forms(rates, spin):
     """-8πηR³Ω along the moment and (2π/15) σ R⁵ (B⊥² + (2/21) R² |m̂×G - Gm̂×|²) (cos θ - s) ω, by the table."""
     found = nearest(VERTICAL, VERTICAL_TABLE, spin, rates)
@@ -91,6 +92,7 @@ def test_air_on_a_swing_is_that_of_the_diffusing_layer():
     assert float(swinging(0.0)) == 1.0
 
 
+@pytest.mark.slow
 def test_air_alone_drives_the_spin_to_what_the_swing_asks(rates):
     """Where s is small: (h/f - 1) sin²θ, to the next order in θ and s; without the swing's layer it would be zero."""
     scene = replace(VERTICAL, frequency=80.0, floater=replace(FLOATER, conductivity=None))
@@ -134,6 +136,7 @@ def test_without_slow_torque_nothing_moves(rates):
     assert (found.ended_by, found.levitated_s, np.ptp(found.distance)) == ("duration", 250.0, 0.0)
 
 
+@pytest.mark.slow
 def test_loss_in_the_fold_as_in_the_full_motion(rates):
     """Slow torques 100 times as large: heights to 1e-3 (measured 3e-4), time of loss to 2 % (measured 0.9 %)."""
     scene = faster(VERTICAL, 100.0)

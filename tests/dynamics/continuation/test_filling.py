@@ -82,8 +82,9 @@ def test_an_eighth_of_the_starts_misses_one_in_a_hundred_at_most(name, model):
 
 @pytest.mark.parametrize(
     ("name", "model", "side"),
-    [("horizontal", "dipole", 12), *(pytest.param(*case, 30, marks=pytest.mark.slow) for case in CASES)],
+    [("horizontal", "dipole", 12), *((*case, 30) for case in CASES)],
 )
+@pytest.mark.slow
 def test_a_map_has_every_equilibrium_that_whole_searches_by_short_steps_find(name, model, side, monkeypatch):
     """At 144 or 900 points each: the same numbers, at the same places."""
     quick = equilibrium_map(*map_of(name, side, model))

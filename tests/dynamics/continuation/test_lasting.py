@@ -50,6 +50,7 @@ def test_flights_last_within_the_ends_and_not_beyond(rates):
     assert not lasts(found.high + 0.5)
 
 
+@pytest.mark.slow
 def test_where_nothing_lasts_there_is_no_interval(rates):
     """A disturbance that may not grow at all."""
     found = lasting_frequencies(SCENE, TABLE, rates, start_of(rates), SCENE.frequency, duration=2500.0, e_folds=1e-6)

@@ -42,6 +42,7 @@ def states(number):
 
 
 @pytest.mark.parametrize(("make", "measure", "move"), MOVES)
+@pytest.mark.slow
 def test_a_moved_effect_is_that_of_the_moved_rotor(make, measure, move):
     """Rates and derivatives, as expressions and about a pose, of currents and answers: the same to round-off."""
     cube, there = (tuple(replace(m, transverse_permeability=1.05) for m in make(x, *SHAPE)) for x in (0.0, measure))

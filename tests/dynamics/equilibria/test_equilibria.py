@@ -256,6 +256,7 @@ spin_hz = [0.0, 0.0, -40.0]
 """A floater that spins about its moment above a ring at rest, upside down."""
 
 
+@pytest.mark.slow
 def test_a_spinning_top_floats_above_a_ring_at_rest():
     """M. D. Simon et al., Am. J. Phys. 65 (1997) 286: between two spin rates; numbers of a quadrature of the ring."""
     scene = parse_scene(TOP, "top")

@@ -83,12 +83,13 @@ def test_gravity_across_the_axis_ends_levitation_in_the_same_fold_however_it_is_
 @pytest.mark.parametrize(
     ("face_mm", "distance_mm"),
     [
-        pytest.param(34.0, 29.2347, marks=pytest.mark.slow),
+        (34.0, 29.2347),
         (33.0, 28.7982),
-        pytest.param(32.0, 28.3160, marks=pytest.mark.slow),
-        pytest.param(31.0, 27.7854, marks=pytest.mark.slow),
+        (32.0, 28.3160),
+        (31.0, 27.7854),
     ],
 )
+@pytest.mark.slow
 def test_an_equilibrium_over_copper_goes_evenly_with_the_distance_of_the_plate(face_mm, distance_mm):
     """3 mm at 650 Hz, where Newton's steps end at 5e-12 to 1e-11 radii; against a solution by other means."""
     found = sl.equilibria(fast(3.0, 650.0, face_mm), model="dipole", plate_model="slab")

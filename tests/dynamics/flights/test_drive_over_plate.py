@@ -38,6 +38,7 @@ def flown(scene, memory, duration, start=START):
     return currents, integrate(flight, state, duration, currents=currents)
 
 
+@pytest.mark.slow
 def test_motion_and_motor_are_those_of_the_laboratory(memory):
     """Five turns, down and up again: SciPy, all states along the laboratory's axes."""
     scene = replace(SCENE, drive=(DriveStep(95.0, 0.02), DriveStep(130.0, 0.03)))

@@ -145,6 +145,7 @@ def test_a_kicked_floater_keeps_the_jacobi_integral(mutual, start):
     assert np.ptp(flight.lab.position[:, 2]) > 1e-4
 
 
+@pytest.mark.slow
 def test_a_floater_that_swings_wide_moves_as_by_the_tables_energy(mutual, start):
     """In balls ahead of it, alone and in lanes; the balls' force errs by 1e-5, of which most averages out."""
     flight = Flight(SCENE, mutual, 0.3, compact=True)

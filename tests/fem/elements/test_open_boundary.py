@@ -53,7 +53,7 @@ def test_its_loads_and_factors_are_its_map(system):
     assert np.abs(by_loads).max() > 0
 
 
-@pytest.mark.parametrize("order", [ORDER, 4, 5])
+@pytest.mark.parametrize("order", [ORDER, 4, pytest.param(5, marks=pytest.mark.slow)])
 def test_gradients_at_points_are_those_of_the_function(system, order):
     """The matrix of the basis' gradients against NGSolve's own evaluation; from order 4 on elements have 64 points."""
     mesh = system[-1]

@@ -68,7 +68,7 @@ def test_the_field_is_that_of_finite_elements(name):
     assert np.max(np.linalg.norm(charges.evaluate(points)[0] - rigid, axis=1) / scale) > 1e-3  # there is something
 
 
-@pytest.mark.parametrize("name", ["cube", "two that touch", "cylinder across"])
+@pytest.mark.parametrize("name", ["cube", pytest.param("two that touch", marks=pytest.mark.slow), "cylinder across"])
 @pytest.mark.parametrize("rtol", [1e-2, 1e-3, 1e-4])
 def test_the_stated_error_is_not_exceeded(name, rtol):
     rotor = ROTORS[name]
@@ -196,6 +196,7 @@ def test_equilibria_by_it_are_those_of_finite_elements():
     assert surface_.growth == pytest.approx(float(fem.growth), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_the_field_in_a_magnet_is_that_of_finite_elements():
     """They continue it there."""
     points = np.array([[3e-3, 1e-3, 2e-3], [6e-3, 0.0, 1e-3], [2e-3, 0.0, -15e-3]])

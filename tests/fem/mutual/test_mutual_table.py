@@ -225,6 +225,7 @@ def test_the_answer_to_charges_is_the_sum_of_its_degrees():
     assert told(np.concatenate([b, a]))[0] == pytest.approx(told(np.concatenate([a, b]))[0], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_two_magnets_written_out_and_by_pairs_have_one_energy(table):
     """Made-up weights: pairs of charges, what is mixed, and a coupling at inner points, with their derivatives."""
     generator, (grid,) = np.random.default_rng(3), table.grids

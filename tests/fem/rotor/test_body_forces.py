@@ -56,7 +56,12 @@ def summed(floater, place, turn, n):
     return total
 
 
-@pytest.mark.parametrize("name", BODIES)
+SLOW = {"disc", "ring"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in BODIES]
+)
 def test_force_and_torque_are_the_limit_of_magpylibs_sums(name):
     """The sums err by even powers of the cells' edges, of which two are taken off; its steps in place leave 4e-7."""
     floater = BODIES[name]

@@ -59,7 +59,8 @@ INPUTS = {"on_axis": 7.3, "displacement": 1.0, "radius": 1.0, "weight": 1.0}
 """Displaced by 1 mm and tilted by 2.3°: of its three flights one falls and two last."""
 
 
-@pytest.mark.parametrize("metal", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("metal", [False, True])
+@pytest.mark.slow
 def test_nodes_are_the_equilibria_of_the_branch_and_their_growth_that_of_its_points(metal):
     """Frequencies against the branch followed by arc length; first-order growth against eigenvalues with the losses."""
     scene = scene_of(INPUTS)
@@ -246,6 +247,7 @@ def test_flights_on_a_surrogate_are_the_averaged_ones(models):
     assert course["circle"][1] == pytest.approx(np.hypot(*start.position[:2]), rel=0.2)
 
 
+@pytest.mark.slow
 def test_made_up_facts_of_known_rotors_are_found_again(models):
     """Displacement and tilt do alike, so that their sum is known: within three deviations."""
     facts = synthetic_facts(models)

@@ -23,6 +23,7 @@ def test_all_have_the_volume_and_moment_of_the_sphere(shape, aspect):
     assert shape == SPHERE or size[2] / size[0] == pytest.approx(aspect)
 
 
+@pytest.mark.slow
 def test_the_limits_of_a_sphere_are_those_of_its_branch():
     found = limits({**ROTOR, "shape": SPHERE, "aspect": 1.0})
     scene = article.rotor_scene("horizontal", 2.0, permeability=1.0, drag=False, floater=floater_of(SPHERE, 1.0))

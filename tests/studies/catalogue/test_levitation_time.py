@@ -1,6 +1,7 @@
 """The study of the slow drift: rows, how they are joined, and what is drawn and said."""
 
 import numpy as np
+import pytest
 
 from spinlev.studies.catalogue.levitation_time import (
     OUTCOMES,
@@ -12,6 +13,7 @@ from spinlev.studies.catalogue.levitation_time import (
 )
 
 
+@pytest.mark.slow
 def test_vertical_rotor_below_within_and_above_its_range():
     """58 Hz has no equilibrium, at 75.5 Hz the floater stays, at 93 Hz it oscillates until it is lost."""
     row = levitation_times({"case": "vertical 14 mm", "variant": "nominal", "steps": 3, "model": "dipole"})

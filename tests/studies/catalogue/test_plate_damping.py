@@ -69,6 +69,7 @@ def test_every_rotor_that_levitated_has_a_plate_below_and_beside():
     assert len(set(found)) == len(found) == 24
 
 
+@pytest.mark.slow
 def test_an_equilibrium_that_a_plate_beside_pushes_far_is_known():
     """Out of the table about where it was without the plate, by more than three millimetres in the laboratory."""
     case = PlateCase(ROTORS[1], 12.0, upright=True, part=0.5, configuration="vertical", measure=12.0)

@@ -167,6 +167,7 @@ def test_a_page_too_many_says_so(reader, monkeypatch):
     assert server.FULL in [reader().answered()]
 
 
+@pytest.mark.slow
 def test_open_files_do_not_grow_with_the_moves_of_a_slider(reader):
     page = reader("plate_model=none")
     page.answered()

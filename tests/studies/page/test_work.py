@@ -99,6 +99,7 @@ def test_models_are_compared_under_the_same_conditions(tmp_path):
     assert "without the plate" not in found.comparison[0]
 
 
+@pytest.mark.slow
 def test_a_preview_from_a_scene_nearby_is_that_of_a_search():
     """By finite elements too, whose tables are in the cache by now; where equilibria were lost it searches again."""
     state = replace(STATE, model="fem")
