@@ -1,4 +1,4 @@
-"""A conductor over coils: what `simulate` computes of a scene with coils."""
+"""Coils: their field at t = 0, and what `simulate` computes of a conductor that they carry."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,9 @@ from ..dynamics.flights.conductor import (
     room_over,
     sources_of,
 )
+from ..fem.closed_forms.coil import CoilField
 from ..fem.plate.floating import FloatingModes, FreeModes, cached_floating_modes
+from ..geometry.common import Array
 from ..geometry.scene.contents import Scene
 from .cli.console import note
 from .cli.options import Answer
@@ -34,6 +36,19 @@ COLUMNS: Columns = {
     "heat": (("time",), "J", "Joule heat in the floater"),
     "current": (("time", "coil"), "A", "current of a turn"),
 }
+
+
+STEP = 1e-4  # m, of the differences for a coil's gradient, of fourth order: 1e-6 of it from a few mm off the winding on
+
+
+def coils_at_start(scene: Scene, points: Array) -> tuple[Array, Array]:
+    """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m of a scene's coils at points (n, 3) m at t = 0, also in their windings."""
+    if not scene.coils:
+        return np.zeros_like(points), np.zeros((len(points), 3, 3))
+    field = CoilField(scene.coils, [float(coil.amperes(0.0)) for coil in scene.coils])
+    ends = [field.flux_density(points + s * STEP * axis) for axis in np.eye(3) for s in (2, 1, -1, -2)]
+    slopes = np.tensordot([-1, 8, -8, 1], np.reshape(ends, (3, 4, len(points), 3)), (0, 1)) / (12 * STEP)
+    return field.flux_density(points), np.moveaxis(slopes, 0, -1)
 
 
 def modes_of(scene: Scene, rtol: float = 1e-3) -> tuple[FloatingModes | FreeModes, bool]:

@@ -19,6 +19,7 @@ from ..geometry.common import MU_0, Array, InputError
 from ..geometry.scene.contents import AbsoluteStart, Scene
 from .cli.console import note
 from .cli.options import Answer, Models
+from .coils import coils_at_start
 from .figures.pictures import plate_currents
 from .figures.style import NAMES, colour_bar, panels, save_figures, styled, titled
 from .levitation import Levitation
@@ -143,7 +144,7 @@ def _floater_state(levitation: Levitation) -> State | None:
     start = levitation.scene.start
     if isinstance(start, AbsoluteStart):
         return State(start.position, start.velocity, start.moment, start.spin)
-    known = free_of_bodies(levitation.scene, levitation.without_plate) if levitation.scene.frequency else None
+    known = free_of_bodies(levitation.scene, levitation.quiet.without_plate) if levitation.scene.frequency else None
     if known is None or not known.equilibria:
         note("There is no equilibrium: the floater is left out.")
         return None
@@ -168,6 +169,7 @@ def _fields(levitation: Levitation, state: State | None, points: Array) -> dict[
         body[magnet.body.distance(points) <= 0] = ROTOR
     known = (body == AIR) & table.in_range(points)
     h[known] = table.evaluate(points[known])[0] / MU_0
+    h += coils_at_start(scene, points)[0] / MU_0
     if state is not None:
         moment, radius = scene.floater.moment * state.moment, scene.floater.radius
         if scene.floater.is_sphere:
@@ -242,6 +244,8 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
     elements = near_field(scene.rotor, places[clear], highest=HIGHEST)
     for k, found in enumerate((closed, elements), start=1):
         b[k, clear], h[k, clear] = found.flux_density, found.field
+    coils = coils_at_start(scene, places)[0]
+    b, h = b + coils, h + coils
     error, magnet = np.full(len(places), np.nan), np.full(len(places), -1)
     error[clear], magnet[clear] = elements.error, elements.magnet
     size_b = np.linalg.norm(b, axis=2)
@@ -269,7 +273,7 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
             "study": "field-map",
             "plane": plane,
             "offset_m": offset,
-            "title": "Field of the rotor on a plane, in its frame at t = 0",
+            "title": f"Field of the rotor{' and the coils' if scene.coils else ''} on a plane, in its frame at t = 0",
         },
     )
 

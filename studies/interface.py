@@ -197,7 +197,7 @@ def simulate(
         The scene starts from an equilibrium and has none.
     """
     given = given_scene(scene)
-    if given.coils:
+    if given.carried_by_coils:
         modes, _ = modes_of(given, requested.get("plate_rtol", 1e-3))
         return coils_summary(given, duration_s, modes)[0].assign_attrs(scene=scene_text(given))
     given = given if drive is None else driven(given, drive)

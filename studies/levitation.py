@@ -48,6 +48,7 @@ from .plan import (
     RotorField,
     SceneLike,
     SharedTables,
+    check_coils,
     check_drive,
     check_room,
     check_way,
@@ -128,6 +129,14 @@ class Levitation:
         """That of the floater's mean over turns about its moment; this one where it is round about that."""
         floater = self.scene.floater
         return self if floater.round else self.elsewhere(floater=floater.averaged)
+
+    @cached_property
+    def quiet(self) -> Levitation:
+        """That without coils off the axis and currents that change, where a trajectory begins; this one without such.
+
+        Of steady coils about the axis the field stands still in the rotor's frame, and there are equilibria.
+        """
+        return self.elsewhere(coils=self.scene.axial_coils) if self.scene.other_coils else self
 
     # What a result says of its models
 
@@ -243,8 +252,10 @@ class Levitation:
         Raises
         ------
         EquilibriumError : the rotor is at rest
-        InputError : a conductor is in the floater's way, or the rotor turns too fast for its metal
+        InputError : a conductor is in the floater's way, the rotor turns too fast for its metal, or the field of a coil
+            does not stand still in the rotor's frame
         """
+        check_coils(self.scene)
         interaction = self.interaction
         note("Equilibria ...")
         with stages("Equilibria") as watch:
@@ -318,7 +329,9 @@ class Levitation:
 
         None where it does not begin at an equilibrium, or gravity is not along the axis.
         """
-        chosen = None if self.absolute or self.scene.gravity[:2].any() else _first(self.without_plate.equilibria)
+        if self.absolute or self.scene.gravity[:2].any() or self.scene.other_coils:
+            return ()
+        chosen = _first(self.without_plate.equilibria)
         if chosen is None:
             return ()
         mean = self.mean
@@ -369,7 +382,7 @@ class Levitation:
         """
         scene = self.scene
         alone = self.absolute or scene.plate is None or not scene.frequency
-        place = self._place(() if alone else self.without_plate.equilibria)
+        place = self._place(() if alone else self.quiet.without_plate.equilibria)
         if place is not None:
             check_room(scene, place)
         plan = plate_plan(scene, self.models, place if self._nearest is None else self._nearest)
@@ -443,7 +456,7 @@ class Levitation:
 
     @property
     def _flight_place(self) -> Array | None:
-        return self._place(() if self.absolute else self.equilibria)
+        return self._place(() if self.absolute else self.quiet.equilibria)
 
     @property
     def flight_plate(self) -> PlateMemory | None:
@@ -466,9 +479,10 @@ class Levitation:
         """The equilibria at which a trajectory may begin, with the currents of its own table."""
         if self.absolute:
             return ()
+        quiet = self.quiet
         if self.wider is None:
-            return self.equilibria
-        return with_plate(self.still, self.interaction, self.without_plate, self.wider, self.rates).equilibria
+            return quiet.equilibria
+        return with_plate(quiet.still, quiet.interaction, quiet.without_plate, self.wider, quiet.rates).equilibria
 
     def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.

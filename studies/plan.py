@@ -91,10 +91,10 @@ def levitating_scene(scene: SceneLike) -> Scene:
     Raises InputError: it has coils, or several floaters, of which trajectories alone are computed.
     """
     found = given_scene(scene)
-    if found.coils:
+    if found.carried_by_coils:
         raise InputError(
-            "Input scene must have no coils here; instead it has. Coils carry a conductor along their axis: "
-            "spinlev simulate computes that, and nothing else yet."
+            "Input rotor must be given here; instead the scene has coils alone, which carry a conductor: spinlev "
+            "simulate computes its motion and nothing else."
         )
     if found.companions:
         raise InputError(
@@ -191,8 +191,20 @@ def equations_key(scene: Scene, models: Models) -> str:
             "" if models.interaction == "rigid" else mutual_key(scene.rotor, floater.ball),
             losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
             shape,
+            *([key_of("equilibria", scene.coils)] if scene.coils else []),
         )
     )
+
+
+def check_coils(scene: Scene) -> None:
+    """A coil whose field does not stand still in the rotor's frame is a wrong scene for equilibria: InputError."""
+    for k, coil in enumerate(scene.coils):
+        if not coil.axial:
+            where = "its current changes" if not coil.steady else f"it is {1e3 * np.hypot(*coil.center[:2]):.4g} mm off"
+            raise InputError(
+                f"Input coils[{k}] must have a steady current about the rotor's axis for equilibria, as else its field "
+                f"does not stand still in the rotor's frame; instead {where}. spinlev simulate computes such motions."
+            )
 
 
 def check_drive(scene: Scene, duration: float) -> None:

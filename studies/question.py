@@ -26,7 +26,7 @@ from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text
 from .cli.options import NAMES, Models, Quantity, positive
 from .compare import compared_models
 from .levitation import Levitation
-from .plan import equations_key, nearest_faces, sources
+from .plan import check_coils, equations_key, nearest_faces, sources
 from .result import AXIS, found_dataset, label_of_key, variable
 from .study import Point
 from .words import kind_of_flight
@@ -53,6 +53,7 @@ def _find_together(members: Sequence[tuple[Levitation, str, float, tuple[int, ..
     for member in members:
         one = member[0]
         with suppress(SpinlevError):
+            check_coils(one.scene)
             one.interaction  # noqa: B018  # equations are shared, the limits of what acts in each scene are not
             key = f"{startless_text(one.scene)} {one.spin!r}"
             chosen += [] if key in same else [member]
@@ -84,6 +85,7 @@ def _simulate_together(levitations: Sequence[Levitation], duration: float) -> No
     for one in levitations:
         with suppress(SpinlevError):
             still = one.scene.plate is None or one.models.plate_model == "none"
+            still &= not one.scene.other_coils
             if still and one.scene.floater.is_sphere and is_long(one.interaction):
                 key = (
                     one.equations_key,

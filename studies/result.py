@@ -162,7 +162,9 @@ class Result:
     def _effects(self) -> list[ListedEffect]:
         # A trajectory that begins where the scene says needs no equilibrium, and searches for none.
         alone = self.flight is not None and self.levitation.absolute
-        return listed_effects(self.levitation, () if alone else (self.survey or self.levitation.survey).equilibria)
+        return listed_effects(
+            self.levitation, () if alone else (self.survey or self.levitation.quiet.survey).equilibria
+        )
 
     def text(self) -> list[str]:
         """Lines for a person."""
@@ -251,7 +253,7 @@ def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr
 
 # How a key of the scene file ends, for its unit
 ENDS = {"kg_m3": "kg/m³", "S_m": "S/m", "kA_m": "kA/m", "mm_s": "mm/s", "m_s2": "m/s²", "N_s_m": "N s/m"}
-ENDS |= {"N_m_s": "N m s", "hz": "Hz", "mm": "mm", "deg": "deg", "T": "T", "s": "s"}
+ENDS |= {"N_m_s": "N m s", "hz": "Hz", "mm": "mm", "deg": "deg", "T": "T", "A": "A", "s": "s"}
 
 
 def label_of_key(key: str) -> dict[str, str]:

@@ -31,7 +31,7 @@ from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
 from .cli.console import note, to_json
 from .cli.options import COLUMNS, Answer, Models
-from .coils import coils_job
+from .coils import coils_at_start, coils_job
 from .compare import compared_models
 from .demagnetising import write_working_point
 from .figures.drive import drive_figure
@@ -41,7 +41,7 @@ from .figures.run import field_figure, force_figure, trajectory_figure
 from .figures.style import save_figures
 from .gradient import gradient_job
 from .levitation import Levitation
-from .plan import check_drive, sources
+from .plan import check_coils, check_drive, sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
 from .several import several_job
 from .uncertainty import uncertainty_job
@@ -57,7 +57,7 @@ def field_job(scene: Scene, points: Array, requested: Models, out: Path) -> Answ
     levitation = Levitation(scene, requested)
     table = levitation.table
     known = complete(table, max(requested.rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
-    values = _field(known, points)
+    values = _field(known, points, *coils_at_start(levitation.scene, points))
     b, gradient, error = values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"]
     slopes = (f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz")
     stream = io.StringIO(newline="")
@@ -74,8 +74,11 @@ def field_job(scene: Scene, points: Array, requested: Models, out: Path) -> Answ
     return {**values, "tables_from_cache": levitation.from_cache}, lines
 
 
-def _field(table: FieldTable, points: Array) -> dict[str, Any]:
-    """B, its gradient and their estimated errors at points (n, 3) m; H and M too if the table does not reach all."""
+def _field(table: FieldTable, points: Array, coils: Array, slopes: Array) -> dict[str, Any]:
+    """B, its gradient and their estimated errors at points (n, 3) m; H and M too if the table does not reach all.
+
+    `coils` and `slopes` are B (n, 3) and its gradient (n, 3, 3) of the scene's coils there.
+    """
     near: dict[str, Any] = {}
     if isinstance(table, CompleteTable) and not table.in_range(points).all():
         found, tiny = table.fields(points), np.finfo(float).tiny
@@ -83,19 +86,23 @@ def _field(table: FieldTable, points: Array) -> dict[str, Any]:
         error = found.error / (np.linalg.norm(b, axis=1) + tiny)
         gradient_error = found.gradient_error / (np.linalg.norm(gradient, axis=(1, 2)) + tiny)
         near = {
-            "H_A_per_m": found.field / MU_0,
+            "H_A_per_m": (found.field + coils) / MU_0,
             "M_A_per_m": found.magnetization / MU_0,
             "inside_magnet": (found.magnet + 1).tolist(),
         }
     else:
         b, gradient = table.evaluate(points)
         error, gradient_error = table.relative_error(points)
+    if coils.any():  # errors are those of the rotor's part
+        error = error * np.linalg.norm(b, axis=1) / np.linalg.norm(b + coils, axis=1)
+        sizes = (np.linalg.norm(slope, axis=(1, 2)) for slope in (gradient, gradient + slopes))
+        gradient_error = gradient_error * next(sizes) / next(sizes)
     return {
         "model": table.model,
         "error_estimate": float(error.max()),
         "gradient_error_estimate": float(gradient_error.max()),
-        "B_T": b,
-        "dB_T_per_m": gradient,
+        "B_T": b + coils,
+        "dB_T_per_m": gradient + slopes,
         **near,
         "B_relative_error": error,
         "dB_relative_error": gradient_error,
@@ -213,7 +220,7 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
 
     A checkpoint is kept while it lasts; `resume` goes on from there.
     """
-    if scene.coils:
+    if scene.carried_by_coils:
         return coils_job(scene, duration, requested.plate_rtol, out)
     request = {"scene": scene_digest(scene), "duration_s": duration, **vars(requested)}
     identity = to_json({**request, "program": program_digest()})
@@ -227,9 +234,9 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
     check_drive(scene, duration)
     levitation = Levitation(scene, requested)
     if isinstance(scene.start, OffsetStart):
-        for line in left_out_words(levitation, levitation.survey.unknown):
+        for line in left_out_words(levitation, levitation.quiet.survey.unknown):
             note(line)
-        begin = starting_point(levitation.equilibria)
+        begin = starting_point(levitation.quiet.equilibria)
         if begin is not None and not begin.stable:
             note(f"The simulation begins at an unstable equilibrium, e-folding time {1 / begin.growth_per_s:.2g} s.")
     path = out / "trajectory.nc"
@@ -272,6 +279,7 @@ def main_job(
     curves, a trajectory that the user stops its beginning; then the error goes on to the caller.
     """
     check_drive(scene, duration)
+    check_coils(scene)
     levitation = Levitation(scene, requested, spin)
     exact = "cuboid" if all(magnet.contrast == 0 for magnet in scene.rotor) else "fem"
     chosen = levitation.table.model

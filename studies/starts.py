@@ -35,7 +35,7 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> State:
     count = next(iter(lengths.values()), 1)
     if "offset_mm" in columns:
         scene = levitation.elsewhere(start=OffsetStart(np.zeros(3)))
-        begun, _ = initial_state(scene.scene, levitation.interaction, levitation.equilibria)
+        begun, _ = initial_state(scene.scene, levitation.interaction, levitation.quiet.equilibria)
         return displaced(begun, columns["offset_mm"], levitation.scene.angular_velocity)
     defaults = {"velocity_mm_s": (0.0, 0.0, 0.0), "moment": (0.0, 0.0, 1.0), "spin_hz": (0.0, 0.0, 0.0)}
     whole = {key: columns.get(key, np.array([defaults.get(key)])) for key in list(UNITS)[1:]}
@@ -62,7 +62,7 @@ def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: M
         )
     draws = np.random.default_rng(int(seed)).normal(size=(int(count or 0), len(SPREADS), 3))
     offset, velocity, moment, spin = (draws[:, k] * sizes.get(key, np.zeros(3)) for k, key in enumerate(SPREADS))
-    known = () if levitation.absolute else levitation.equilibria
+    known = () if levitation.absolute else levitation.quiet.equilibria
     begun, _ = initial_state(levitation.scene, levitation.interaction, known)
     begun = displaced(begun, offset, levitation.scene.angular_velocity)
     turned = begun.moment + moment

@@ -223,7 +223,7 @@ def comparison_words(compared: Mapping[str, Any] | None, plate: bool = False) ->
 def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:
     """Kind of a trajectory; one that lasted, but had begun at an unstable equilibrium, is no stable one."""
     kind = flight_kind(flight)
-    return kind if kind != STABLE or levitation.absolute or levitation.stability.stable else GROWING
+    return kind if kind != STABLE or levitation.absolute or levitation.quiet.stability.stable else GROWING
 
 
 def flight_words(levitation: Levitation, flight: Trajectory) -> str:
@@ -242,7 +242,7 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
     if flight.given is not None:
         return f"Simulated {time}: still levitating at {flight.rate[-1] / (2 * math.pi):.5g} Hz."
     how = {DRIFTING: ", drifting slowly", GROWING: ", with a growing oscillation"}.get(kind, "")
-    if not levitation.absolute and (efolding := levitation.stability.efolding_s):
+    if not levitation.absolute and (efolding := levitation.quiet.stability.efolding_s):
         how = f", with a growing oscillation (e-folding time {spoken_time(efolding)})"
     return f"Simulated {time}: still levitating{how}."
 

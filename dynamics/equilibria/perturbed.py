@@ -10,7 +10,8 @@ from ...fem.rotor.table import FieldTable
 from ...fem.rotor_metal import RotorLosses
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..motion.effect import Interaction, interaction_of
+from ..motion.coils import with_coils
+from ..motion.effect import Interaction
 from ..motion.equations import parameters
 from ..motion.floater_effects import FloaterCurrents
 from ..motion.plate import PlateForce, PlateMemory
@@ -140,7 +141,7 @@ def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium,
     values = parameters(scene, scales, frozen_spin=True)
     still = values.copy()
     still[Parameter.TILT_EDDY] = 0.0
-    rates = Rates(Interaction(interaction_of(table).field, (FloaterCurrents(),)))
+    rates = Rates(Interaction(with_coils(scene, table).field, (FloaterCurrents(),)))
     slopes = [rates(scales.pack(fixed.state)[None], each)[1][0] for each in (values, still)]
     return _growth(scene, fixed, slopes[0] - slopes[1], included)
 

@@ -12,6 +12,7 @@ from ...fem.cache import TableKind
 from ...fem.rotor.table import ROUND_OFF, FieldTable, RangeError, RotorTable
 from ...geometry.common import Array, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
+from ..motion.coils import BesideCoils
 from ..motion.effect import Interaction
 from ..motion.effects import mean_over_turns, with_effects
 from ..motion.equations import parameters
@@ -260,6 +261,7 @@ def field_doubts(table: FieldTable, places: Array) -> tuple[NDArray[np.bool_], A
     sizes = np.linalg.norm(field, axis=1), np.linalg.norm(gradient, axis=(1, 2))
     errors = np.column_stack([error * size for error, size in zip(table.relative_error(here), sizes, strict=True)])
     inner = table.field if isinstance(table, Interaction) else table
+    inner = inner.table if isinstance(inner, BesideCoils) else inner
     left_out = inner.left_out(here) if isinstance(inner, RotorTable) else np.zeros((len(here), 0, 4, 3))
     if isinstance(inner, RotorTable) and left_out.any():
         unsigned = inner.without_left_out.absolute_error(here)

@@ -16,6 +16,7 @@ from ...fem.harmonics.interior import Ball, BallField
 from ...fem.rotor.table import FieldTable, RangeError
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
+from ..motion.coils import BesideCoils
 from ..motion.effect import Effect, Fittable, Interaction, interaction_of
 from ..motion.events import clearance, rotor_gap
 from ..motion.state import Parameter, turned_about_z
@@ -55,7 +56,8 @@ NEIGHBOURS = np.indices((3, 3, 3)).reshape(3, -1).T - 1.0  # (27, 3) of a cell, 
 
 def is_long(table: FieldTable) -> bool:
     """Whether a field's or an effect's expressions are longer than those of a ball."""
-    if any(isinstance(effect, Fittable) for effect in interaction_of(table).effects):
+    whole = interaction_of(table)
+    if isinstance(whole.field, BesideCoils) or any(isinstance(effect, Fittable) for effect in whole.effects):
         return True
     field, gradient = table.expressions(hy.make_vars("x", "y", "z"))
     return sum(len(e) for e in [*field, *(e for row in gradient for e in row)]) > WORTH
@@ -222,14 +224,14 @@ def _fitted(whole: Interaction, formula: BallField) -> list[Fittable]:
 
 def _room(scene: Scene, center: Array, reach: float) -> float:
     """Radius of a ball in the rotor's frame in which the floater neither touches a body nor is lost, m."""
-    rotor = rotor_gap(scene, center) if scene.turning_bodies else np.inf
+    rotor = rotor_gap(scene, center) if scene.turning_bodies or scene.axial_coils else np.inf
     room = min(rotor, reach - float(np.linalg.norm(center)))
-    if scene.plate is None:
+    if not scene.standing_bodies:
         return room
     angles = 2 * np.pi * np.arange(ANGLES) / ANGLES
     places, slack = turned_about_z(center, angles), float(np.hypot(*center[:2])) * np.pi / ANGLES
-    still = replace(scene, rotor=(), conductors=(), plate=replace(scene.plate, lowering=None))
-    way = scene.plate.way
+    plate = replace(scene.plate, lowering=None) if scene.plate else None
+    still, way = replace(scene, rotor=(), conductors=(), plate=plate), scene.plate.way if scene.plate else 0.0
     depths = np.linspace(0.0, way, DEPTHS if way else 1)
     seen = (places[:, None] + depths[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 3)
     return min(room, float(clearance(still, np.zeros(len(seen)), seen).min()) - slack - way / DEPTHS / 2)

@@ -69,8 +69,7 @@ class Supply:
     @property
     def knots(self) -> Array:
         """Times (n,) s at which a current has a corner."""
-        tables = [coil.current[:, 0] for coil in self.coils if isinstance(coil.current, np.ndarray)]
-        return np.unique(np.concatenate([np.zeros(1), *tables]))
+        return np.unique([0.0, *(time for coil in self.coils for time in coil.corners)])
 
     @property
     def first(self) -> Array:
@@ -139,13 +138,15 @@ def heights_over(scene: Scene) -> tuple[float, float]:
     start, floater, coils = scene.start, scene.floater, scene.coils
     if not floater.conductivity or floater.remanence or len(floater.bodies) > 1:
         raise InputError(
-            "Input floater must be one body with conductivity_S_m and no remanence_T beside coils; instead received "
-            f"{floater.conductivity or 0:g} S/m and {floater.remanence:g} T."
+            "Input floater must be one body with conductivity_S_m and no remanence_T beside coils alone; instead "
+            f"received {floater.conductivity or 0:g} S/m and {floater.remanence:g} T."
         )
-    if scene.rotor or scene.plate:
-        raise InputError("Input scene must have no rotor and no plate beside coils; instead it has. Leave them out.")
+    if scene.plate:
+        raise InputError("Input plate must be left out where coils alone carry the floater; instead it is given.")
     if not isinstance(start, AbsoluteStart):
-        raise InputError("Input start.position_mm must be given beside coils; instead it is missing.")
+        raise InputError(
+            "Input start.position_mm must be given where coils alone carry the floater; instead it is missing."
+        )
     top = max(coil.center[2] + coil.height / 2 for coil in coils)
     down = -floater.axes(start.moment, start.body_x)[2]
     half = float(floater.bodies[0].support(down[None])[0] + floater.bodies[0].center @ down)

@@ -12,7 +12,8 @@ from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
 from .body_shape import BodyShape
-from .effect import Interaction, interaction_of
+from .coils import with_coils
+from .effect import Interaction
 from .floater_effects import (
     FLOATER_SHAPE,
     INDUCED_SHAPE,
@@ -91,11 +92,13 @@ def rough_part(scene: Scene, table: FieldTable) -> float:
 
 
 def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
-    """A table with the effects of a scene's conductivities and air, that of the rotor's from the cache; others stay.
+    """A table with the field of a scene's coils, and with the effects of its conductivities and air; others stay.
+
+    Those of the rotor's conductivity are from the cache.
 
     Raises InputError: the rotor turns too fast for its metal or the floater's.
     """
-    whole = interaction_of(table)
+    whole = with_coils(scene, table)
     check_floater_metal(scene)
     effects = scene_effects(scene)
     if not scene.floater.is_sphere and FLOATER_SHAPE not in {effect.name for effect in whole.effects}:
@@ -120,7 +123,7 @@ def mean_over_turns(scene: Scene, table: FieldFormula) -> tuple[Scene, Interacti
 
     The last is the same with the mean's multipoles about its moment as dipoles up to degree 7, for searches.
     """
-    whole, round_scene = interaction_of(table), replace(scene, floater=scene.floater.averaged)
+    whole, round_scene = with_coils(scene, table), replace(scene, floater=scene.floater.averaged)
     # Beside what the shape does all effects are those of a round body as well.
     kept = tuple(e for e in whole.effects if e.name not in (FLOATER_SHAPE, INDUCED_SHAPE))
     others = replace(whole, turning=False, effects=kept)

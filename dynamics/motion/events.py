@@ -1,4 +1,4 @@
-"""What ends a trajectory: contact with a magnet or the plate, and loss.
+"""What ends a trajectory: contact with a magnet, a plate or a coil, and loss.
 
 The distance of the floater's centre from a box is exact, faces, edges and corners.  A Taylor step knows only the part
 of the box that was nearest when it began; a contact that this may miss is found by `clearance` at the samples.
@@ -12,7 +12,7 @@ import numpy as np
 from ...geometry.common import Array
 from ...geometry.overlap import body_overlap
 from ...geometry.scene.contents import Plate, Scene, Stretch
-from ...geometry.shapes import Box
+from ...geometry.shapes import Box, Cylinder
 from ...geometry.solids import Solid
 from .plate import PlateMemory, raised, seen_by_plate
 from .state import STEADY, Parameter, Scales, Turn, Vector, turned_about_z
@@ -30,16 +30,17 @@ def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events
 
     Parameters
     ----------
-    scene : the rotor's magnets, the plate if there is one, and the floater
+    scene : the rotor's magnets, plates, coils, and the floater
     position : three scaled expressions, rotor's frame
     turn : of the rotor; of a drive `DRIVEN`
     """
     length = hy.par[Parameter.LENGTH]
     metres = [length * p for p in position]
-    gaps = [_excess(body, metres) for body in scene.turning_bodies]
-    if scene.plate is not None:
+    inner = scene.floater.inner_radius
+    gaps = [_excess(body, metres, inner) for body in scene.turning_bodies]
+    if scene.standing_bodies:
         seen = raised(position, turn)
-        gaps += [_excess(body, seen) for body in scene.plate.body.placed]
+        gaps += [_excess(body, seen, inner) for body in scene.standing_bodies]
     within = (scene.floater.inner_radius / scene.floater.radius) ** 2  # its own contact is found at the samples
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
     return [*((gap / (length * length) - within, CONTACT) for gap in gaps), (reach, LOST)]
@@ -59,16 +60,22 @@ def range_events(memory: PlateMemory, position: Vector, turn: Turn = STEADY) -> 
     return [(1.0 - (a * a) / float(h) ** 2, BEYOND) for a, h in zip(away, half, strict=True)]
 
 
-def _excess(body: Solid, position: Vector) -> hy.expression:
-    """Squared distance of a point outside a body from its surface, m²."""
+def _excess(body: Solid, position: Vector, contact: float) -> hy.expression:
+    """Squared distance of a point outside a body from its surface, m²; from the wall of a hole exact at a `contact`, m.
+
+    Elsewhere in the hole it is larger, as a root that vanishes on the axis would make all steps short.
+    """
     shifted = [position[i] - float(body.center[i]) for i in range(3)]
     turn, half = body.rotation, [float(size / 2) for size in body.size]
     along = [hy.sum([float(turn[i, axis]) * shifted[i] for i in range(3) if turn[i, axis]]) for axis in range(3)]
     beyond = [hy.relu(x - edge) + hy.relu(-x - edge) for x, edge in zip(along, half, strict=True)]
     if not isinstance(body, Box):  # the root is never that of zero
-        radius = half[0]
-        outside = hy.relu(along[0] * along[0] + along[1] * along[1] - radius**2)
-        beyond = [hy.sqrt(radius**2 + outside) - radius, beyond[2]]
+        radius, square = half[0], along[0] * along[0] + along[1] * along[1]
+        across = hy.sqrt(radius**2 + hy.relu(square - radius**2)) - radius
+        hole = body.inner_radius if isinstance(body, Cylinder) else 0.0
+        if hole > contact:
+            across = across + hy.relu(hole**2 - square) / (2 * hole - contact)
+        beyond = [across, beyond[2]]
     return hy.sum([b * b for b in beyond])
 
 
@@ -84,10 +91,10 @@ def clearance(scene: Scene, time: Array, position: Array, orientation: Array | N
     its `orientation` (see `State`), that of the sphere.
     """
     gaps = [body.distance(position) for body in scene.turning_bodies]
-    if scene.plate is not None:
+    if scene.standing_bodies:
         seen = turned_about_z(position, scene.angle(time))
         seen[:, 2] += plate_depth(scene.plate, time)
-        gaps.append(scene.plate.body.distance(seen))
+        gaps += [body.distance(seen) for body in scene.standing_bodies]
     found = np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
     if not scene.floater.is_sphere and orientation is not None:
         for k in np.flatnonzero(found < 0):
@@ -99,32 +106,38 @@ def _own_gap(scene: Scene, time: float, position: Array, orientation: Array) -> 
     """Gap of a floater that is no sphere in one place, m."""
     parts = scene.floater.placed(position, orientation)
     gaps = [-body_overlap(body, part) for body in scene.turning_bodies for part in parts]
-    if scene.plate is not None:
+    if scene.standing_bodies:
         turn = scene.angle(time)
         seen = turned_about_z(position, turn) + plate_depth(scene.plate, np.array([time])) * [0.0, 0.0, 1.0]
         axes = turned_about_z(scene.floater.axes(orientation).T, turn).T
         floater = scene.floater.placed(seen, axes)
-        gaps += [-body_overlap(body, part) for body in scene.plate.body.placed for part in floater]
+        gaps += [-body_overlap(body, part) for body in scene.standing_bodies for part in floater]
     return min(gaps)
 
 
 def rotor_gap(scene: Scene, position: Array, orientation: Array | None = None) -> float:
     """Gap in m between floater at `position` (3,) m, rotor's frame, and rotor of `scene`; negative where they overlap.
 
-    See `clearance` for a floater that is no sphere, whose `orientation` it needs.
+    Coils about the axis, which stand still in that frame, count as the rotor. See `clearance` for a floater that is no
+    sphere, whose `orientation` it needs.
     """
     pointing = None if orientation is None else orientation[None]
-    return float(clearance(replace(scene, plate=None), np.zeros(1), position[None], pointing)[0])
+    return float(
+        clearance(replace(scene, plate=None, coils=scene.axial_coils), np.zeros(1), position[None], pointing)[0]
+    )
 
 
-def plate_depth(plate: Plate, time: Array) -> Array:
-    """Distance (n,) m by which the plate is lowered at `time` (n,) s."""
-    return np.zeros(len(time)) if plate.lowering is None else plate.lowering.depth(time)
+def plate_depth(plate: Plate | None, time: Array) -> Array:
+    """Distance (n,) m by which the plate, if there is one, is lowered at `time` (n,) s."""
+    return np.zeros(len(time)) if plate is None or plate.lowering is None else plate.lowering.depth(time)
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A stretch in which plate and drive go on steadily, SI units; but for `end` as at t = 0, if they always did."""
+    """A stretch in which plate, drive and tables of currents go on steadily, SI units.
+
+    All but `end` is as at t = 0, if they always did.
+    """
 
     end: float
     depth: float  # of the plate
@@ -165,8 +178,9 @@ def motion_legs(scene: Scene, duration: float) -> list[Leg]:
     begins = rates - slopes * times
     angles = angles - (begins + rates) / 2 * times
     ends = [min(end, duration) for end in (*times[1:].tolist(), duration)]
+    corners = [end for coil in scene.coils for end in coil.corners if 0 < end < duration]
     legs = []
-    for end in sorted({*ends, *(end for end, _, _ in plate)}):
+    for end in sorted({*ends, *corners, *(end for end, _, _ in plate)}):
         _, depth, speed = next(leg for leg in plate if end <= leg[0])
         k = next(k for k, last in enumerate(ends) if end <= last)
         way = scene.stretches[k] if scene.moving else None

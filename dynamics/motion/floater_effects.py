@@ -57,6 +57,7 @@ from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AIR_VISCOSITY, Scene
 from ...geometry.scene.floater import Floater
+from .coils import CoilForce
 from .effect import ZERO, Added, Effect, Motion, Poses, dissipative
 from .state import Parameter, Vector, cross, dot
 
@@ -447,7 +448,7 @@ def _contracted(a: Matrix, b: Matrix) -> hy.expression:
 # The effects that a scene alone decides: `of(scene)` is one, or None where the scene is without it. Searches, motion,
 # lists of effects and the keys of shared equations take from here what there is. Scenes that differ in frequency alone
 # share their equations: what depends on it an effect takes from the runtime parameters.
-OF_SCENE = FloaterCurrents, RealAir
+OF_SCENE = FloaterCurrents, RealAir, CoilForce
 
 
 def scene_effects(scene: Scene) -> list[Effect]:

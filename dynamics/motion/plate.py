@@ -39,7 +39,20 @@ from ...fem.plate.table import PlateTable, RotorShare
 from ...geometry.common import Array
 from ...geometry.scene.contents import Plate
 from .effect import Added
-from .state import DRIVEN, STEADY, Parameter, Turn, Vector, cross, dot, dotted, subtract, turned, turned_about_z
+from .state import (
+    DRIVEN,
+    STEADY,
+    Parameter,
+    Turn,
+    Vector,
+    about_z,
+    cross,
+    dot,
+    dotted,
+    subtract,
+    turned,
+    turned_about_z,
+)
 
 ENDLESS = 1e30  # Rate of a rotor, rad/s, that no current follows
 
@@ -127,7 +140,7 @@ def memory_terms(
     rotor = DRIVEN if driven else STEADY
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place = seen_by_plate(plate, position, rotor)
-    pointing = _product(plate.box.rotation.T, _turned(moment, rotor.angle, 1.0))
+    pointing = _product(plate.box.rotation.T, about_z(moment, rotor.angle, 1.0))
     source = [strength * m for m in pointing]
     # x, y and z enter only after the sums over multipoles: every operation counts in Taylor's method
     flux, slopes = (table.multipoles.derivatives(place, order) for order in (1, 2))
@@ -208,7 +221,7 @@ def _rotor_terms(
 def raised(position: Vector, rotor: Turn) -> Vector:
     """A scaled position in the rotor's frame along the laboratory's axes, raised by what the plate has gone down, m."""
     depth = hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time
-    x, y, z = _turned([hy.par[Parameter.LENGTH] * p for p in position], rotor.angle, 1.0)
+    x, y, z = about_z([hy.par[Parameter.LENGTH] * p for p in position], rotor.angle, 1.0)
     return [x, y, z + hy.par[Parameter.LENGTH] * depth]
 
 
@@ -220,13 +233,7 @@ def seen_by_plate(plate: Plate, position: Vector, rotor: Turn) -> Vector:
 
 
 def _seen_by_rotor(plate: Plate, vector: Vector, rotor: Turn) -> Vector:
-    return _turned(_product(plate.box.rotation, vector), rotor.angle, -1.0)
-
-
-def _turned(vector: Vector, angle: hy.expression, sense: float) -> list[hy.expression]:
-    cosine, sine = hy.cos(angle), sense * hy.sin(angle)
-    x, y, z = vector
-    return [cosine * x - sine * y, sine * x + cosine * y, z]
+    return about_z(_product(plate.box.rotation, vector), rotor.angle, -1.0)
 
 
 def _product(matrix: np.ndarray, vector: Vector) -> list[hy.expression]:

@@ -144,6 +144,13 @@ def turned(vector: Vector, rate: hy.expression, across: Vector = ()) -> list[hy.
     return [a + b for a, b in zip(about_z, cross([*across, hy.expression(0.0)], vector), strict=True)]
 
 
+def about_z(vector: Vector, angle: hy.expression, sense: float) -> list[hy.expression]:
+    """A vector (3) turned about z by an angle, or, with the sense -1, by as much the other way."""
+    cosine, sine = hy.cos(angle), sense * hy.sin(angle)
+    x, y, z = vector
+    return [cosine * x - sine * y, sine * x + cosine * y, z]
+
+
 def subtract(a: Vector, b: Vector) -> list[hy.expression]:
     """Difference of the first three components."""
     return [a[i] - b[i] for i in range(3)]

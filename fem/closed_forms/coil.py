@@ -9,25 +9,42 @@ A cylindrical sheet of radius a with the current K along z has, from its ends at
 [R_D(0, 1-k², 1) - (1-h²) R_J(0, 1-k², 1, 1-h²)]/3h².  A winding is the sum of its sheets by Gauss's rule, on either
 side of the point's own radius, with nodes that crowd there.
 
-N. Derby, S. Olbert, Am. J. Phys. 78, 229 (2010) (B_z of a sheet); B. C. Carlson, Numer. Algorithms 10, 13 (1995).
+Off its winding a coil is as well a few filaments, at the nodes of Gauss's rule in its section, which the equations of
+motion are written with. One of radius a and current I has, by the arithmetic-geometric mean of its largest and
+smallest distance from the point, with q = A_φ/ρ, s = a² + ρ² + ζ² and p = √(s² - 4a²ρ²),
+
+    q = μ0 I/(4M) Σ 2ⁿ⁻¹ (c_n/ρ)²,   c_1² = 2a²ρ²/(s + p),   c_n+1 = c_n²/(4a_n+1),   B = (-x q_ζ, -y q_ζ, 2q + ρ q_ρ),
+
+where a_1 = √((s + p)/2), b_1 = √p, and a_n is the mean of a_n-1 and b_n-1, M the last: a function of ρ², smooth on the
+axis, and without cancellation there.
+
+N. Derby, S. Olbert, Am. J. Phys. 78, 229 (2010) (B_z of a sheet); B. C. Carlson, Numer. Algorithms 10, 13 (1995);
+M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, section 17.6.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
+import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import elliprd, elliprf, elliprj
 
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Coil
-from ..harmonics.solid import gauss_legendre
+from ..compiled_code import compiled
+from ..harmonics.expressions import UPPER, FieldExpressions, differentiated, whole_gradient
+from ..harmonics.solid import entries, gauss_legendre
 
 NODES, CROWD = 24, 3  # Gauss points on either side of a point's radius, and the power by which they crowd there
 NEAR_AXIS = 0.05  # h² below which the integral of the sheet is a sum over equidistant angles: 1/h² would cancel
 ANGLES = np.pi / 2 * (np.arange(16) + 0.5) / 16
 LEAST = 1e-30  # Parameter of R_J in place of zero, where its factor is zero
 BLOCK = 20_000  # Points at a time
+MEANS = 4  # of the arithmetic-geometric mean: 1e-12 of a filament's field from a fifth of its radius on
+FILAMENT_ERROR = 1e-4  # By which the filaments' number is chosen where a floater touches the winding; it is 1e-5
 
 
 def _wave(h: Array, k: Array) -> Array:
@@ -122,3 +139,98 @@ class CoilField:
             return np.stack([local[:, 0] * outwards, local[:, 1] * outwards, axial], axis=1)
 
         return self._total(points, part)
+
+
+@dataclass(frozen=True, eq=False)
+class Filaments:
+FILAMENT_ERROR = 1e-4  # By which their number is chosen where a floater touches the winding; it is 1e-5
+
+    centers: Array  # (n, 3) m
+    radii: Array  # (n,) m
+    turns: Array  # (n,), the currents (A) for 1 A in each turn
+    owners: Array  # (n,) numbers of their coils
+
+    @classmethod
+    def of(cls, coils: Sequence[Coil], nearest: float) -> "Filaments":
+        """Those of coils for points at a distance (m) from their windings and more."""
+        rows = []
+        for k, coil in enumerate(coils):
+            rules = []
+            for size in (coil.width, coil.height):
+                ratio = 2 * nearest / size  # Gauss's rule converges by the ellipse through the nearest singularity
+                count = np.log(1 / FILAMENT_ERROR) / (2 * np.arcsinh(ratio))
+                nodes, weights = gauss_legendre(int(np.clip(np.ceil(count), 1, NODES)))
+                rules.append((size / 2 * nodes, weights / 2))
+            rows += [
+                [*coil.center[:2], coil.center[2] + up, coil.radius + out, coil.turns * one * other, k]
+                for out, one in zip(*rules[0], strict=True)
+                for up, other in zip(*rules[1], strict=True)
+            ]
+        x, y, z, radii, turns, owners = np.array(rows).T
+        return cls(np.stack([x, y, z], axis=1), radii, turns, owners.astype(int))
+
+    def expressions(self, position: Sequence[hy.expression], currents: Sequence[Any]) -> FieldExpressions:
+        """B and its gradient as heyoka expressions of a position (m), for currents (coils,) A in each turn."""
+        axes: dict[tuple[float, float], list[hy.expression]] = {}
+        x, y, z = position
+        square, height = hy.make_vars("square", "height")
+        for (a, b, c), radius, turns, owner in zip(
+            self.centers.tolist(), self.radii.tolist(), self.turns.tolist(), self.owners, strict=True
+        ):
+            axes.setdefault((a, b), []).append(_filament(square, height - c, radius, turns * currents[owner]))
+        parts = [_field_of(hy.sum(sources), [x - a, y - b, z], square, height) for (a, b), sources in axes.items()]
+        field = [hy.sum([b[i] for b, _ in parts]) for i in range(3)]
+        return field, [[hy.sum([slope[i][j] for _, slope in parts]) for j in range(3)] for i in range(3)]
+
+    def derivatives(self, points: Array, order: int, currents: Array) -> Array:
+        """B and its derivatives up to `order` - 1, T, T/m, ..., by their `entries` (n, k), at points (n, 3) m.
+
+        `currents` are (coils,) A in each turn.
+        """
+        function, found = _compiled_filament(order), np.zeros((len(points), order * (order + 2)))
+        for center, radius, turns, owner in zip(self.centers, self.radii, self.turns, self.owners, strict=True):
+            given = np.repeat([[radius], [turns * currents[owner]]], len(points), axis=1)
+            found += function(np.ascontiguousarray((points - center).T), pars=given).T
+        return found
+
+
+def _filament(square: hy.expression, height: hy.expression, radius: Any, current: Any) -> hy.expression:
+    """A_φ/ρ of a filament (T) at ρ² and ζ (m)."""
+    size = radius * radius
+    sum_ = size + square + height * height
+    root = hy.sqrt(sum_ * sum_ - 4.0 * size * square)
+    mean, other, part = hy.sqrt(0.5 * (sum_ + root)), hy.sqrt(root), 2.0 * size / (sum_ + root)
+    total, whole = part, part * square  # c_n²/ρ², and c_n²
+    for n in range(1, MEANS):
+        mean, other = 0.5 * (mean + other), hy.sqrt(mean * other)
+        factor = whole / (16.0 * mean * mean)
+        part, whole = part * factor, whole * factor
+        total = total + 2.0**n * part
+    return MU_0 / 4 * current * total / mean
+
+
+def _field_of(
+    source: hy.expression, position: Sequence[hy.expression], square: hy.expression, height: hy.expression
+) -> FieldExpressions:
+    """B and its gradient of A_φ/ρ, a function of the variables `square` and `height`, at a position from its axis."""
+    tensors = hy.diff_tensors([source], diff_args=[square, height], diff_order=2)
+    x, y, z = position
+    here = {square: x * x + y * y, height: z}
+    a, s, z_, ss, sz = hy.subs([tensors[0, *k] for k in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1))], here)
+    rho = here[square]
+    field = [-x * z_, -y * z_, 2.0 * (a + rho * s)]
+    up = 4.0 * (2.0 * s + rho * ss)
+    known = {(0, 0): -z_ - 2.0 * x * x * sz, (0, 1): -2.0 * x * y * sz, (0, 2): x * up,
+             (1, 1): -z_ - 2.0 * y * y * sz, (1, 2): y * up}  # fmt: skip
+    return field, whole_gradient([known[each] for each in UPPER])
+
+
+@cache
+def _compiled_filament(order: int) -> Any:
+    """B and its derivatives of a filament about z at the origin, by their `entries`, for a radius and a current."""
+    variables = hy.make_vars("x", "y", "z")
+    square, height = hy.make_vars("square", "height")
+    field, gradient = _field_of(_filament(square, height, hy.par[0], hy.par[1]), variables, square, height)
+    known = {each: gradient[each[0]][each[1]] for each in entries(2)}
+    rest = differentiated(known, variables, order)
+    return compiled(hy.cfunc, [*field, *known.values(), *rest], variables, opt_level=0)

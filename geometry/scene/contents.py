@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from ..common import Array, frozen_array, html_table, listed, millimetres
 from ..magnets import Magnet
 from ..rotor import Conductor
-from ..shapes import Box
+from ..shapes import Box, Cylinder
 from ..solids import Compound, Part, Solid, Solids
 from .floater import Floater
 
@@ -103,6 +103,27 @@ class Coil:
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", frozen_array(self.center, (3,)))
 
+    @property
+    def body(self) -> Cylinder:
+        """Its winding."""
+        outer, inner = self.radius + self.width / 2, self.radius - self.width / 2
+        return Cylinder(outer, self.height, self.center, inner_radius=inner)
+
+    @property
+    def steady(self) -> bool:
+        """Whether its current never changes."""
+        return not isinstance(self.current, np.ndarray) and not self.frequency
+
+    @property
+    def axial(self) -> bool:
+        """Whether its field stands still in the frame of a rotor: a steady current about the rotor's axis."""
+        return self.steady and not self.center[:2].any()
+
+    @property
+    def corners(self) -> list[float]:
+        """Times (s) at which the current has a corner."""
+        return self.current[:, 0].tolist() if isinstance(self.current, np.ndarray) else []
+
     def amperes(self, time: ArrayLike) -> Array:
         """The current, A, at each `time`, s."""
         if isinstance(self.current, np.ndarray):
@@ -111,6 +132,16 @@ class Coil:
         if not self.frequency:
             return np.full(time.shape, self.current)
         return np.asarray(self.current * np.sin(2 * np.pi * self.frequency * time + self.phase))
+
+    def __repr__(self) -> str:
+        size = f"Ø {2e3 * self.radius:.4g}, {1e3 * self.width:.4g} × {1e3 * self.height:.4g} mm"
+        current = (
+            f"a table of {len(self.current)} currents"
+            if isinstance(self.current, np.ndarray)
+            else f"{self.current:g} A"
+        )
+        current += f" at {self.frequency:g} Hz" if self.frequency else ""
+        return f"Coil {size} at {millimetres(self.center)}, {self.turns:g} turns of {current}"
 
 
 @dataclass(frozen=True)
@@ -222,7 +253,7 @@ class Scene:
     files : path of each file that it names, with the SHA-256 of its content when the scene was read
     parts : the solids of the STEP files that its keys name, in canonical pose, also of those computed as another shape
     drive : what the rotor's frequency does in time, step by step; after the last it stays
-    coils : that drive currents in the conductors
+    coils : whose field acts on the floater; without a rotor they drive currents in it
     companions : further floaters beside the first, to which floater, drag and start belong
     keys : the tables of a scene file that it was made of, and the scene that they made: what of that was not replaced
         since is as they say. None of a scene that was put together from its parts
@@ -322,6 +353,26 @@ class Scene:
         return center, axes
 
     @property
+    def carried_by_coils(self) -> bool:
+        """Whether there is no rotor, so that coils alone carry the floater."""
+        return bool(self.coils) and not (self.rotor or self.field_map)
+
+    @property
+    def axial_coils(self) -> tuple[Coil, ...]:
+        """Coils whose field stands still in the rotor's frame."""
+        return tuple(coil for coil in self.coils if coil.axial)
+
+    @property
+    def other_coils(self) -> tuple[Coil, ...]:
+        """Coils off the rotor's axis, or with a current that changes."""
+        return tuple(coil for coil in self.coils if not coil.axial)
+
+    @property
+    def standing_bodies(self) -> tuple[Solid, ...]:
+        """Plates and windings of coils, which stand in the laboratory."""
+        return (*(self.plate.body.placed if self.plate else ()), *(coil.body for coil in self.coils))
+
+    @property
     def turning_bodies(self) -> tuple[Solid, ...]:
         """The rotor's magnets and conductors."""
         return (*(magnet.body for magnet in self.rotor), *(conductor.body for conductor in self.conductors))
@@ -332,6 +383,7 @@ class Scene:
         lines += [f"  {body!r}" for body in (*self.rotor, *self.conductors)]
         lines += [f"  Field from {self.field_map}"] if self.field_map else []
         lines += [f"  {body!r}" for body in (self.floater, *(c.floater for c in self.companions), self.plate) if body]
+        lines += [f"  {coil!r}" for coil in self.coils]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -339,6 +391,7 @@ class Scene:
         rows |= {"field": str(self.field_map)} if self.field_map else {}
         rows["floater"] = repr(self.floater).removeprefix("Floater ")
         rows |= {"plate": repr(self.plate).removeprefix("Plate ")} if self.plate else {}
+        rows |= {f"coil {k}": repr(coil).removeprefix("Coil ") for k, coil in enumerate(self.coils, 1)}
         rows["gravity"] = f"({listed(self.gravity)}) m/s²"
         return html_table(f"Scene at {self._frequencies}", rows)
 

@@ -330,7 +330,9 @@ def scene_keys(scene: Scene) -> dict[str, Any]:
 
 
 # Beginnings of keys whose numbers decide no equilibrium.
-OF_MOTION = ("start", "drive", "coils", "plate.lowering", "rotor.coercivity_kA_m")
+OF_MOTION = re.compile(
+    r"start|drive|coils\.\d+\.(center_mm\.[01]|frequency_hz|phase_deg)|plate\.lowering|rotor\.coercivity_kA_m"
+)
 
 
 def scene_numbers(scene: Scene) -> tuple[Scene, dict[str, float]]:
@@ -343,7 +345,7 @@ def scene_numbers(scene: Scene) -> tuple[Scene, dict[str, float]]:
     found = dict(_flattened(keys))
     whole = replace(assemble(keys, "scene", Path()), tolerances=scene.tolerances)
     _check_same(scene, whole.files, "scene")
-    return whole, {key: value for key, value in found.items() if not key.startswith(OF_MOTION)}
+    return whole, {key: value for key, value in found.items() if not OF_MOTION.match(key)}
 
 
 def _flattened(value: Any, key: str = "") -> Iterator[tuple[str, float]]:

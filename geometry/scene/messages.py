@@ -213,8 +213,15 @@ def key_faults(table: schema.SceneTable) -> list[str]:
                 f"Input coils[{k}].width_mm must be less than twice radius_mm, of the middle of the winding; instead "
                 f"received {coil.width_mm:g}."
             )
+        if isinstance(coil.current_A, list) and (coil.frequency_hz or coil.phase_deg):
+            faults.append(
+                f"Input coils[{k}].current_A must be a number beside frequency_hz and phase_deg; instead received a "
+                "table."
+            )
         if isinstance(coil.current_A, list) and np.any(np.diff(np.array(coil.current_A)[:, 0]) <= 0):
             faults.append(f"Input coils[{k}].current_A must have increasing times; instead they are not.")
+    if table.coils and "rotor" in table.model_fields_set:
+        faults += _coil_faults(table, table.coils)
     for name, floater in table.floaters.items():
         faults += [re.sub("(?<!the )floater", name, fault) for fault in _floater_faults(floater, table)]
     faults += _several_faults(table)
@@ -256,6 +263,40 @@ def _way_faults(place: str, step: schema.DriveTable, table: schema.SceneTable) -
             f"Input {place}.{key} must be left out beside a plate, whose currents are known for a rotor that stays "
             "where it is; instead it is given. Leave the plate out, or lower it (plate.lowering)."
         )
+    return faults
+
+
+def _coil_faults(table: schema.SceneTable, coils: Sequence[schema.CoilTable]) -> list[str]:
+    """Faults of coils beside a rotor, with what their field would do and is not computed."""
+    faults, steady = [], [not (isinstance(coil.current_A, list) or coil.frequency_hz) for coil in coils]
+    if any(step.center_mm is not None or step.axis is not None for step in table.drive or ()):
+        faults.append(
+            "Input drive must have no center_mm and no axis beside coils, which stay where they are; instead it has."
+        )
+    if isinstance(table.floater, list):
+        return [*faults, "Input floater must be one table beside coils and a rotor; instead received a list."]
+    others = [
+        k for k, (coil, same) in enumerate(zip(coils, steady, strict=True)) if any(coil.center_mm[:2]) or not same
+    ]
+    floater = table.floater
+    if others and (floater.conductivity_S_m or floater.composite or floater.shape != "sphere"):
+        faults.append(
+            f"Input floater must be a sphere without conductivity_S_m beside coils[{others[0]}], which is off the "
+            "rotor's axis or has a current that changes: other floaters are not computed there; instead it is none. "
+            "Steady currents about the axis act on any floater."
+        )
+    for k, plate in table.plates:
+        name = f"plate[{k}]" if k >= 0 else "plate"
+        if not all(steady):
+            faults.append(
+                f"Input {name} must be left out beside coils[{steady.index(False)}], whose current changes and would "
+                "drive currents in it, which is not computed; instead it is given. Steady currents drive none."
+            )
+        elif plate.lowering is not None:
+            faults.append(
+                f"Input {name}.lowering must be left out beside coils, whose field would drive currents in a plate "
+                "that moves, which is not computed; instead it is given."
+            )
     return faults
 
 
@@ -426,7 +467,17 @@ def overlap_faults(scene: Scene) -> list[str]:
         for (first, one), (second, other) in combinations(plates, 2)
         if (depth := body_overlap(one, other)) > -TOUCHING
     ]
-    obstacles = [(f"rotor {name}", body) for name, body in bodies]
+    windings = [] if scene.carried_by_coils else [(f"coils[{k}]", coil.body) for k, coil in enumerate(scene.coils)]
+    for name, winding in windings:
+        beside = [(f"the turning rotor's {other}", deepest_overlap_in_a_turn(body, winding)) for other, body in bodies]
+        beside += [(f"the {other}", body_overlap(body, winding)) for other, body in plates]
+        faults += [
+            f"Input {name} must stay clear of all bodies; instead it overlaps {other} by {depth * 1e3:.4g} mm; move it "
+            "away."
+            for other, depth in beside
+            if depth > TOUCHING
+        ]
+    obstacles = [*((f"rotor {name}", body) for name, body in bodies), *windings]
     obstacles += [("the plate" if len(plates) == 1 else name, body) for name, body in plates]
     placed: list[tuple[Solid, ...]] = []
     for k, one in enumerate(scene.each):

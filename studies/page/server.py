@@ -31,7 +31,7 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from ...geometry.common import ComputationError, InputError, SpinlevError
 from ...geometry.scene.contents import Scene
-from ..plan import levitating_scene
+from ..plan import check_coils, levitating_scene
 from .page import Page
 from .state import PageState, first_state
 from .work import Shown, preview
@@ -142,7 +142,7 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
     InputError : a host or a port that cannot be, or a scene of which trajectories alone are computed
     ComputationError : the port is taken, or the address is not this machine's
     """
-    levitating_scene(scene)
+    check_coils(levitating_scene(scene))
     if not 0 <= port <= 65535:
         raise InputError(f"Input port must be between 0 and 65535; instead received {port}.")
     if not host:

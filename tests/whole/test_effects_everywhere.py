@@ -10,6 +10,7 @@ import pytest
 from places import DOCS
 
 import spinlev as sl
+from spinlev.geometry.common import SpinlevError
 
 BASE = """
 frequency_hz = 130.0
@@ -38,6 +39,15 @@ START = """
 position_mm = [0.0, 0.0, -18.9]
 velocity_mm_s = [0.0, 0.0, 5.0]
 """
+COIL = """
+[[coils]]
+radius_mm = 30.0
+width_mm = 0.5
+height_mm = 0.5
+turns = 100
+center_mm = [0.0, 0.0, -40.0]
+current_A = 0.5
+"""
 DIPOLE = sl.Models("dipole", "none", interaction="rigid")
 EFFECTS = {
     "mutual magnetisation": (BASE, BASE, sl.Models("fem", "none", 1e-3, interaction="rigid"), "mutual"),
@@ -51,6 +61,8 @@ EFFECTS = {
     "a floater that is not round": (
         BASE, BASE.replace("diameter_mm = 12.7", 'shape = "cuboid"\nsize_mm = [10.0, 10.0, 10.0]'), DIPOLE, "rigid",
     ),
+    "steady coils about the axis": (BASE, BASE + COIL, DIPOLE, "rigid"),
+    "other coils": (BASE, BASE + COIL + "frequency_hz = 20.0", DIPOLE, "rigid"),
 }  # fmt: skip
 
 
@@ -100,7 +112,7 @@ USES = (equilibria, modes, trajectory, ensemble, sweep, live_motion)
 REFUSED = {
     (name, "ensemble"): "many are simulated as one batch"
     for name in ("a floater that is no sphere", "a floater that is not round")
-}
+} | {("other coils", name): "field does not stand still" for name in ("equilibria", "modes", "sweep")}
 """What is refused in a sentence; all else answers, and otherwise than without the effect, but for what is left out."""
 LEFT_OUT = {("eddy currents in a plate", "ensemble")}
 
@@ -112,7 +124,7 @@ def test_the_effect_is_in_the_answer(effect, use):
     without, text, *_ = EFFECTS[effect]
     refused = REFUSED.get((effect, use.__name__))
     if refused:
-        with pytest.raises(sl.InputError, match=refused):
+        with pytest.raises(SpinlevError, match=refused):
             use(text, models(effect, True))
         return
     bare, whole = use(without, models(effect, False)), use(text, models(effect, True))

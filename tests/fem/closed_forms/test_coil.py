@@ -1,10 +1,14 @@
 """Field of a round coil: against loops over its cross-section, its own curl, and the dipole that it is far off."""
 
+from dataclasses import replace
+
+import heyoka as hy
 import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
 
-from spinlev.fem.closed_forms.coil import CoilField
+from spinlev.fem.closed_forms.coil import CoilField, Filaments
+from spinlev.fem.harmonics.solid import tensors
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.scene.contents import Coil
 
@@ -58,3 +62,34 @@ def test_shares_are_currents():
     other, place = Coil(np.array([0.0, 0.0, -0.1]), 0.05, 0.01, 0.02, 10.0, 1.0), at(0.02, 0.05)
     both = CoilField([COIL, other], [2.0, -3.0]).flux_density(place)
     assert both == pytest.approx(2 * FIELD.flux_density(place) - 3 * CoilField([other]).flux_density(place))
+
+
+def test_filaments_have_the_field_of_their_coils_where_a_floater_can_be():
+    """1e-5 of the largest field where it touches a winding, 1e-8 three of its radii off; the gradient is its slope."""
+    other, near = Coil(np.array([0.0, 0.0, -0.1]), 0.03, 0.005, 0.02, 10.0, 1.0), 6.35e-3
+    coils, currents = (COIL, other), np.array([2.0, -300.0])
+    known, filaments = CoilField(coils, currents.tolist()), Filaments.of(coils, near)
+    points = np.random.default_rng(5).uniform(-0.1, 0.1, (400, 3)) - [0.0, 0.0, 0.05]
+    points[:20, :2] = 0.0  # on an axis, where ρ has no derivative
+    apart = np.min([coil.body.distance(points) for coil in coils], axis=0)
+    points, apart = points[apart > near], apart[apart > near]
+    b, gradient = tensors(filaments.derivatives(points, 2, currents))
+    missed, largest = np.abs(b - known.flux_density(points)).max(axis=1), np.abs(b).max()
+    assert missed.max() < 1e-5 * largest
+    assert missed[apart > 3 * near].max() < 1e-8 * largest
+    ends = [known.flux_density(points + s * 1e-4 * axis) for axis in np.eye(3) for s in (2, 1, -1, -2)]
+    slopes = np.tensordot([-1, 8, -8, 1], np.reshape(ends, (3, 4, -1, 3)), (0, 1)) / 12e-4
+    assert np.moveaxis(slopes, 0, -1) == pytest.approx(gradient, abs=2e-4 * np.abs(gradient).max())
+
+
+def test_expressions_of_filaments_are_what_is_evaluated():
+    filaments, currents = Filaments.of((replace(COIL, width=1e-3, height=1e-3),), 0.02), np.array([3.0])
+    variables = hy.make_vars("x", "y", "z")
+    field, gradient = filaments.expressions(variables, currents.tolist())
+    function = hy.cfunc(
+        [*field, *(entry for row in gradient for entry in row)], variables, compact_mode=True, opt_level=0
+    )
+    points = np.array([[*COIL.center[:2], 0.035], [0.05, 0.1, 0.0]])
+    b, slopes = tensors(filaments.derivatives(points, 2, currents))
+    expected = np.concatenate([b, slopes.reshape(-1, 9)], axis=1)
+    np.testing.assert_allclose(function(np.ascontiguousarray(points.T)).T, expected, rtol=1e-12, atol=1e-18)
