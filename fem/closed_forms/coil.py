@@ -143,7 +143,10 @@ class CoilField:
 
 @dataclass(frozen=True, eq=False)
 class Filaments:
-FILAMENT_ERROR = 1e-4  # By which their number is chosen where a floater touches the winding; it is 1e-5
+    """Filaments about axes along z that stand for coils, to 1e-5 of their largest field from a distance on.
+
+    Three times as far off it is 1e-8.
+    """
 
     centers: Array  # (n, 3) m
     radii: Array  # (n,) m
