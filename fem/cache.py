@@ -41,7 +41,7 @@ FORMATS = {
     "plate": 2,
     "driven-plate": 3,
     "plate-currents": 2,
-    "changed-share": 1,
+    "changed-share": 2,
     "slab": 3,
     "edges": 2,
     "rotor-losses": 2,

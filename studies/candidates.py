@@ -164,7 +164,7 @@ class Candidate:
         rows = []
         for end in self.ends:
             there = Gradient(self.levitation.elsewhere(frequency=end.parameter))
-            rows.append([0.0 if end.kind == BORDER else there.end_by(end, key) for key in self.keys])
+            rows.append([0.0 if end.kind == BORDER else there.end_by(end, key)[0] for key in self.keys])
         return np.array(rows)
 
     def _of_scenes(self, quantity: Callable[[Scene], Array]) -> Array:

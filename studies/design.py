@@ -33,8 +33,9 @@ from .candidates import OF_SCENE, Candidate, Search, survey_near
 from .cli.console import note, to_json
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
 from .figures.style import PALETTE, legend_below, panels, plot_branch, save_figures, styled
-from .gradient import Gradient, unknown_over_plate
+from .gradient import Gradient
 from .levitation import Levitation
+from .nearby_scenes import unknown_over_plate
 from .plan import SceneLike
 from .result import label_of_key, variable, write_dataset
 

@@ -33,6 +33,7 @@ COLLIDED = 1e-7  # |uᴴ T_λ v| by ‖T_λ v‖ below which two eigenvalues hav
 STEP = 1e-5  # Of differences along the tangent of what is a plain function of the state, scaled
 NEWTON_STEPS, FARTHEST = 20, 0.5  # Most steps to an equilibrium nearby, and the longest, in floater radii and rad
 POLISHED = 3  # Steps of Newton's method that make a known λ one of the pencil
+SOLVED = 10.0  # Relative error of a derivative, by the Newton step that is left at the equilibrium, in radii and rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,11 @@ class Setting:
         rate = abs(float(self.values[Parameter.RATE]))
         return residual, pencil, *conserved(states, spin * self.scales.spin_ratio * rate)
 
+    def jacobi(self, turn: State) -> float:
+        """Jacobi integral of a fixed point, energy less ω times the angular momentum about the axis, J."""
+        scaled = self.rates.jacobi(self.scales.pack(turn), self.values)[0]
+        return float(scaled / self.values[Parameter.PLATE_SHARE] ** 2)
+
 
 @dataclass(frozen=True, eq=False)
 class Nearby:
@@ -61,6 +67,7 @@ class Nearby:
 
     offset: float
     weight: float
+    lower: float  # its weight in a difference of two orders less, which tells how far the derivative may be off
     setting: Setting
 
 
@@ -83,6 +90,9 @@ class Tangent:
     change: Array  # (n, 12) their derivatives
     modes: dict[str, complex]  # derivatives of growth rate + 2πi frequency of each mode, 1/s
     unpack: Callable[[Array], Equilibrium] = field(repr=False)
+    unsolved: float = 0.0  # relative error by how far the equilibrium is off
+    lower: "Tangent | None" = field(default=None, repr=False)  # by differences of two orders less
+    without: "Tangent | None" = field(default=None, repr=False)  # of the fixed point that it is without the plate
 
     def of(self, quantity: Callable[[Equilibrium], Any]) -> Array:
         """Derivative of a function of the motion alone, such as its distance."""
@@ -125,11 +135,12 @@ class Implicit:
         self.known, self.setting = known, setting
         turn = known.turn or State(*(vector[None] for vector in known.state.vectors))
         self.start = setting.scales.pack(turn)
-        _, self._pencil, rows, _ = setting.linear(turn, known.spin)
+        residual, self._pencil, rows, aims = setting.linear(turn, known.spin)
         left, values, right = np.linalg.svd(np.vstack([self._pencil.matrix(0.0), rows]), full_matrices=False)
         self.conditioning = float(values[-1] / values[0])  # zero at a fold
         self._lost = left[:, -1]  # what balances no change of the state there
         self._inverse = (right.T / values) @ left.T
+        self.unsolved = SOLVED * float(np.abs(self._inverse @ np.append(residual, aims)).max())
 
     @property
     def at_fold(self) -> bool:
@@ -163,23 +174,24 @@ class Implicit:
         return complex(np.vdot(left, (ends[0] - ends[1]) / (2 * STEP)))
 
     def missed(self, nearby: Sequence[Nearby]) -> Array:
-        """F_p (12 n + 2,) by a number, from the equations at some values of it."""
-        turn, found = self.setting.scales.unpack(self.start), np.zeros(self._inverse.shape[1])
+        """F_p (2, 12 n + 2) by a number, from the equations at some values of it, and the same of two orders less."""
+        turn, found = self.setting.scales.unpack(self.start), np.zeros((2, self._inverse.shape[1]))
         for there in nearby:
             residual, _, _, aims = there.setting.linear(turn, self.known.spin)
-            found = found + there.weight * np.append(residual, aims)
+            found += np.outer([there.weight, there.lower], np.append(residual, aims))
         return found
 
-    def fold_by(self, missed: Array, by_parameter: Array) -> float:
-        """Derivative of the parameter of a fold, here, by a number, from what both have `missed`."""
-        return float(-(self._lost @ missed) / (self._lost @ by_parameter))
+    def fold_by(self, missed: Array, by_parameter: Array) -> Array:
+        """Derivatives (2,) of the parameter of a fold, here, by a number, from what both have `missed`."""
+        return np.asarray(-(missed @ self._lost) / (by_parameter @ self._lost))
 
     def by(self, nearby: Sequence[Nearby]) -> Tangent:
         """The way by a number, from the equations at some values of it."""
         scales, spin = self.setting.scales, self.known.spin
-        missed = self.missed(nearby)
-        change = (np.nan if self.at_fold else -1.0) * (self._inverse @ missed).reshape(self.start.shape)
-        by = {mode.name: 0j if not self.at_fold and mode.speed else complex(np.nan, np.nan) for mode in self.modes}
+        changes = (np.nan if self.at_fold else -1.0) * self.missed(nearby) @ self._inverse.T
+        change, lower = changes.reshape(2, *self.start.shape)
+        lost = complex(np.nan, np.nan)
+        by = {mode.name: np.full(2, 0j if not self.at_fold and mode.speed else lost) for mode in self.modes}
         faster = 0.0  # derivative of the unit of the eigenvalues
         for there in nearby:
             faster += there.weight / there.setting.scales.time
@@ -189,9 +201,22 @@ class Implicit:
             for mode in self.modes:
                 if mode.speed:
                     found = np.vdot(mode.left, pencil.applied(mode.right, mode.value))
-                    by[mode.name] -= there.weight * complex(found) / mode.speed
-        rates = {mode.name: by[mode.name] / scales.time + mode.value * faster for mode in self.modes}
-        return Tangent(self.start, change, rates, self._equilibrium)
+                    by[mode.name] -= np.array([there.weight, there.lower]) * complex(found) / mode.speed
+        rates = [
+            {mode.name: complex(by[mode.name][k]) / scales.time + mode.value * faster for mode in self.modes}
+            for k in range(2)
+        ]
+        below = Tangent(self.start, lower, rates[1], self._equilibrium)
+        return Tangent(self.start, change, rates[0], self._equilibrium, self.unsolved, below)
+
+    def jacobi_by(self, nearby: Sequence[Nearby]) -> Array:
+        """Derivatives (2,) of a fixed point's Jacobi integral, J, as of `missed`."""
+        change = -(self._inverse @ self.missed(nearby)[0]).reshape(self.start.shape)
+        found, scales = np.zeros(2), self.setting.scales
+        for there in nearby:
+            energy = there.setting.jacobi(scales.unpack(self.start + there.offset * change))
+            found += energy * np.array([there.weight, there.lower])
+        return found
 
     def moved(
         self, setting: Setting, tangents: Sequence[tuple[float, Tangent]], with_modes: bool = True

@@ -93,6 +93,11 @@ class Rates:
         found = _called(self._function, states.T, self._about(states[:, :3], states[:, 6 : size - 3], values)).T
         return found[:, :size], found[:, size:].reshape(-1, size, size)
 
+    def jacobi(self, states: Array, values: Array) -> Array:
+        """Jacobi integral (n,) at scaled `states` (n, 12) of a round body, in the unit of energy of `values`."""
+        given = self._about(states[:, :3], states[:, 6:9], values)
+        return np.asarray(_called(self._energies, states.T, given)[0])
+
     def locked_balance(self, position: Array, quaternion: Array, values: Array) -> tuple[Array, Array]:
         """What has to vanish of a turning body at rest in the rotor's frame (n, 6), and its derivatives (n, 6, 6).
 
@@ -168,6 +173,10 @@ class Rates:
         return self._compiled(_with_jacobian)
 
     @cached_property
+    def _energies(self) -> Any:
+        return self._compiled(_jacobi_integral)
+
+    @cached_property
     def _balances(self) -> Any:
         return self._compiled(balances)
 
@@ -189,6 +198,10 @@ def _with_jacobian(equations: Equations) -> tuple[list[hy.expression], list[hy.e
     variables = list(equations.variables)
     tensors = hy.diff_tensors(list(equations.rates), diff_args=variables, diff_order=1)
     return [*equations.rates, *np.asarray(tensors.jacobian).ravel()], variables
+
+
+def _jacobi_integral(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
+    return [hy.sum(list(equations.jacobi))], list(equations.variables)
 
 
 def _called(function: Any, given: Array, values: Array) -> Array:

@@ -283,12 +283,12 @@ def cached_mutual_table(
 
 
 def moved_mutual(table: MutualTable, magnets: tuple[Magnet, ...]) -> MutualTable:
-    """The table of magnets that differ from its own in the pose of a lone one."""
+    """The table of magnets that differ from its own in the pose of a lone one, whose points keep their size."""
     if len(magnets) != 1:
         return replace(table, magnets=magnets)
     (magnet,), (grid,) = magnets, table.grids
     turn = np.kron(np.eye(len(table.coupling) // 3), magnet.box.rotation @ grid.box.rotation.T)
-    grids = (replace(grid, box=response_box(magnet.body)),)
+    grids = (replace(grid, box=replace(grid.box, center=magnet.box.center, rotation=magnet.box.rotation)),)
     return replace(table, magnets=magnets, grids=grids, coupling=turn @ table.coupling @ turn.T)
 
 

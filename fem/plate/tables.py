@@ -17,7 +17,6 @@ from .network import CONDUCTOR, NETWORK_SHARE, PassiveNetwork, Reduction, checke
 from .rotor_share import (
     MISSED,
     SHARE_PART,
-    UNNOTICED,
     posed_rotor,
     rotor_box,
     rotor_parts,
@@ -182,7 +181,7 @@ def changed_shares(
     fourier = np.linalg.pinv(turn_harmonics(angles, SEEN - 1))[: len(share.series)]
 
     def series(plate: Plate, rotor: RotorTable) -> Array:
-        parts = rotor_parts(rotor, seen(plate), UNNOTICED * SHARE_PART * rtol)
+        parts = rotor_parts(rotor, seen(plate), 0.0)  # degrees that come and go would be steps
         return fourier @ network.couplings([posed_rotor(parts, seen(plate), angle, 0.0) for angle in angles])
 
     first, stored = series(plate, rotor), share.series @ share.by_depth(0.0)

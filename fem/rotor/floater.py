@@ -26,6 +26,7 @@ from ..harmonics.interior import sphere
 from ..harmonics.rigid import field_coefficients, harmonics, matrices, shells as multipole_degrees
 from ..harmonics.solid import factorials, regular_values, tensors
 from .choice import cached_rotor_table
+from .models import changed_table
 from .table import DerivedField, FieldTable
 
 DEGREE = 20  # of polynomials over the body that the dipoles integrate exactly
@@ -120,7 +121,10 @@ def polarizability_tensor(floater: Floater) -> Array:
 
 
 def floater_sources(
-    floater: Floater, report: Callable[[str], None] = lambda _: None, degree: int = DEGREE
+    floater: Floater,
+    report: Callable[[str], None] = lambda _: None,
+    degree: int = DEGREE,
+    near: Floater | None = None,
 ) -> FloaterSources:
     """Sources of a floater of any shape, in its frame.
 
@@ -132,12 +136,16 @@ def floater_sources(
     floater : a sphere is one dipole
     report : called with a message where the cache is damaged
     degree : of the polynomials over the body that are integrated exactly
+    near : one of nearly the same numbers, whose finite elements are taken: the sources are smooth functions of them
     """
     if floater.is_sphere:
         return FloaterSources.dipole(floater.dipole)
     if floater.recoil_permeability == 1:
         return remanent_sources(floater, degree)
-    table, _ = cached_rotor_table(floater.magnets, "fem", RTOL, report, floater.radius)
+    known = near or floater
+    table, _ = cached_rotor_table(known.magnets, "fem", RTOL, report, known.radius)
+    if near is not None:
+        table = changed_table(table, floater.magnets)
     # Charges farther in would be large and cancel
     least = max(floater.inner_radius, SHARE * floater.radius)
     return _joined(table.uniform, [_charges(e, least) for e in table.expansions], degree)

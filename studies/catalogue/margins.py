@@ -150,24 +150,27 @@ class Slopes:
 
     base: Nominal
     derivatives: Array  # (parameter, quantity)
+    errors: Array  # (parameter, quantity) estimates
     ways: tuple[Any, ...]  # `Gradient.ways` at each of the frequencies
 
     @classmethod
     def of(cls, base: Nominal) -> Self:
         levitation = article.levitation_of(_written(base.configuration, base.values, float(base.grid[1])), base.model)
-        keys, found, ways = _keyed(base.configuration), np.zeros((len(PARAMETERS), len(QUANTITIES))), []
+        keys, found, ways = _keyed(base.configuration), np.zeros((2, len(PARAMETERS), len(QUANTITIES))), []
         for k, end in enumerate((base.stable.low, base.stable.high)):
             gradient = Gradient(levitation.elsewhere(frequency=end.parameter))
-            for row, (key, unit) in zip(found, keys.values(), strict=True):
-                row[k] = 0.0 if end.kind == BORDER else unit * gradient.end_by(end, key)
+            for number, (key, unit) in enumerate(keys.values()):
+                found[:, number, k] = 0.0 if end.kind == BORDER else unit * np.array(gradient.end_by(end, key))
         for k, frequency in enumerate(base.grid, 2):
             there = levitation.elsewhere(frequency=float(frequency))
             middle = base.stable.near(frequency)
             known = equilibrium_at(there, at_frequency(there.scene, there.rates, middle, float(frequency), LONG_STEPS))
-            ways.append((known, *Gradient(there).ways(known, [key for key, _ in keys.values()])))
-            for row, (key, unit) in zip(found, keys.values(), strict=True):
-                row[k] = unit * float(ways[-1][1][key].of(lambda equilibrium: equilibrium.distance))
-        return cls(base, found, tuple(ways))
+            gradient = Gradient(there)
+            ways.append((known, *gradient.ways(known, [key for key, _ in keys.values()])))
+            for number, (key, unit) in enumerate(keys.values()):
+                value, error = gradient.with_errors(known, ways[-1][1][key], ["distance"], key)
+                found[:, number, k] = unit * np.array([value[0], error[0]])
+        return cls(base, found[0], np.abs(found[1]), tuple(ways))
 
     def off(self, draw: Array) -> Array:
         """Quantities with parameters off by a `draw`: ends to first order, distances of whole equilibria."""
@@ -204,9 +207,6 @@ class Slopes:
         return np.array(found).T
 
 
-DERIVATIVE_ERROR = 1e-6  # relative, to which derivatives agree with differences of whole branches
-
-
 def sensitivity_points(quick: bool) -> list[Point]:
     """The rotors that levitated, and how many samples of the tolerances are drawn."""
     more = {"field": "cuboid", "samples": 4 if quick else 32}
@@ -227,8 +227,7 @@ def sensitivity(point: Point) -> xr.Dataset:
     axes = {"parameter": list(PARAMETERS), "quantity": list(QUANTITIES), "fraction": list(FRACTIONS), "lean": lean}
     distances = [known.distance for known, *_ in slopes.ways]
     row = np.array([base.stable.low.parameter, base.stable.high.parameter, *distances])
-    error = DERIVATIVE_ERROR * np.abs(slopes.derivatives)
-    found = (row, slopes.derivatives, error, sample, draws, base.grid, *slopes.leaning())
+    found = (row, slopes.derivatives, slopes.errors, sample, draws, base.grid, *slopes.leaning())
     return recorded(point, COLUMNS, found, axes)
 
 

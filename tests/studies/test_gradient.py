@@ -6,16 +6,21 @@ the search's round-off, are below 1e-7 of a derivative; 1e-6 is asked.
 
 import json
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
 from article import BALL
-from places import HORIZONTAL, OVER_PLATE
+from places import HORIZONTAL
 
 import spinlev as sl
 from spinlev.dynamics.continuation.frequencies import stable_ranges
 from spinlev.dynamics.equilibria import derivatives
+from spinlev.dynamics.equilibria.balance import Balance, solve
+from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.state import Scales
+from spinlev.geometry.scene.contents import Drag
 from spinlev.geometry.scene.files import changed
 from spinlev.studies.cli.main import run
 from spinlev.studies.gradient import Gradient, range_ends
@@ -64,9 +69,9 @@ CASES = {
         *("dipole", "rigid"),
     ),
 }
-QUICK = ("displaced", "tilted, finite")
-SLOW = ("real air and currents in the floater", "stacked", "sphere as rotor", "two magnets", "by charges", "elements",
-        "mutual", "currents in the rotor", "cylinder as floater")  # fmt: skip
+QUICK = ("displaced",)
+SLOW = ("tilted, finite", "real air and currents in the floater", "stacked", "sphere as rotor", "two magnets",
+        "by charges", "elements", "mutual", "currents in the rotor", "cylinder as floater")  # fmt: skip
 # Numbers whose tables are made anew: there differences of whole equilibria are of tables that err by themselves, as
 # finite elements from 6.35 mm off on and from a little less, which differ by 3e-6, losses, by 1e-2, and multipoles
 # of a shape, which make 4e-4 of a derivative by its sizes and permeability
@@ -98,7 +103,7 @@ def test_derivatives_are_those_of_whole_equilibria(name):
     levitation = Levitation(scene, sl.Models(model, "none", interaction=interaction))
     gradient, known = Gradient(levitation), levitation.equilibria[0]
     keys = [key for key in gradient.numbers if not key.startswith(("gravity_m_s2.0", "gravity_m_s2.1", "drag"))]
-    keys = [key for key in keys if key not in BY_A_FIT.get(name, ())][:: 1 if name in QUICK else 2]
+    keys = [key for key in keys if key not in BY_A_FIT.get(name, ())][:: 5 if name in QUICK else 2]
     found = gradient.dataset([known], ["distance", "polar_angle", "mode_growth", "mode_frequency"], keys)
     for key in keys:
         one = found.isel(equilibrium=0).sel(key=key)
@@ -122,52 +127,6 @@ def test_a_spun_body_moves_as_its_spin_says():
     assert float(found.distance[0, 0]) == pytest.approx((ends[0] - ends[1]) / 0.2, rel=1e-5)  # of second order
 
 
-def over_slab(levitation, key, step, models):
-    """The same after a step of a number, in the table of the plate that is there."""
-    scene = Gradient(levitation).scene
-    there = Levitation(changed(scene, {key: Gradient(levitation).numbers[key] + step}), models)
-    there.plate = levitation.plate  # which another place might not ask for
-    return there
-
-
-def test_derivatives_over_a_plate_are_those_of_whole_motions():
-    """Over a slab, whose table is made in a second, by what leaves rotor and plate where they are; of second order."""
-    models = sl.Models("dipole", "slab", plate_rtol=5e-2)
-    levitation = Levitation(OVER_PLATE, models)
-    gradient, known = Gradient(levitation), levitation.equilibria[0]
-    keys = ["floater.density_kg_m3", "gravity_m_s2.2", "plate.size_mm.0"]
-    asked = ["distance", "polar_angle", "mode_growth", "mode_frequency"]
-    found = gradient.dataset([known], asked, keys).isel(equilibrium=0)
-    assert "sizes of a plate" in found.not_known
-    assert np.isnan(found.distance.sel(key="plate.size_mm.0"))
-    for key in keys[:2]:
-        one, step = found.sel(key=key), 1e-3 * gradient.numbers[key]
-        got = np.array([one.distance, one.polar_angle, *one.mode_growth, *one.mode_frequency], float)
-        ends = [answers(over_slab(levitation, key, sign * step, models), known) for sign in (1, -1)]
-        assert got == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=2e-5, abs=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("key", "step", "least"),
-    [("rotor.edge_mm", 0.02, 1e-3), ("rotor.remanence_T", 2e-3, 1e-3), ("plate.center_mm.2", 0.25, 0.03),
-     ("plate.conductivity_S_m", 2e5, 0.02)],
-)  # fmt: skip
-def test_derivatives_by_what_moves_rotor_and_plate(key, step, least):
-    """Against motions in tables that are made anew, which err by 3e-3 of what the plate does.
-
-    Of the modes' frequencies, which the plate hardly moves, nothing is asked.
-    """
-    models = sl.Models("dipole", "slab", plate_rtol=3e-3)
-    levitation = Levitation(OVER_PLATE, models)
-    gradient, known = Gradient(levitation), levitation.equilibria[0]
-    one = gradient.dataset([known], ["distance", "polar_angle", "mode_growth"], [key]).isel(equilibrium=0, key=0)
-    got = np.array([one.distance, one.polar_angle, *one.mode_growth], float)
-    scenes = [changed(gradient.scene, {key: gradient.numbers[key] + sign * step}) for sign in (1, -1)]
-    ends = [answers(Levitation(scene, models), known)[:7] for scene in scenes]
-    assert got == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=least)
-
-
 @pytest.mark.parametrize("name", ["displaced", pytest.param("tilted, finite", marks=pytest.mark.slow)])
 def test_ends_of_stable_frequencies_move_as_branches_say(name):
     """A fold below and a change of stability above, against whole branches at both sides (of second order)."""
@@ -176,7 +135,7 @@ def test_ends_of_stable_frequencies_move_as_branches_say(name):
     levitation = Levitation(scene, sl.Models(model, "none"))
     gradient = Gradient(levitation)
     keys = ["rotor.edge_mm", "gravity_m_s2.2", "floater.density_kg_m3", "frequency_hz"]
-    (low, high), slopes = range_ends(gradient, keys)
+    (low, high), slopes, errors = range_ends(gradient, keys)
     assert low < scene.frequency < high
     for key, got in zip(keys[:3], slopes.T, strict=False):
         step = 5e-4 * gradient.numbers[key]
@@ -189,6 +148,46 @@ def test_ends_of_stable_frequencies_move_as_branches_say(name):
     assert slopes[:, 3].tolist() == [0.0, 0.0]
     found = sl.gradient(scene, ["lowest_frequency"], keys[:1], model=model)
     assert float(found.lowest_frequency[0]) == pytest.approx(slopes[0, 0])
+    assert float(found.lowest_frequency_value) == pytest.approx(low)
+    assert np.all(errors[:, :3] < 2e-6 * np.abs(slopes[:, :3]))
+
+
+@pytest.mark.parametrize("name", ["displaced", pytest.param("mutual", marks=pytest.mark.slow)])
+def test_the_energy_of_escape_is_the_work_along_the_axis(name):
+    """Of the force that is left where all else is balanced, to the unstable equilibrium; and its derivatives."""
+    case, model, interaction = CASES[name]
+    scene = replace(changed(case, {}), drag=Drag(0.0, 0.0))  # which would do work along the way
+    levitation = Levitation(scene, sl.Models(model, "none", interaction=interaction))
+    gradient, known = Gradient(levitation), levitation.equilibria[0]
+    found = gradient.dataset([known], ["escape_energy"], ["rotor.edge_mm"]).isel(equilibrium=0)
+    scales = Scales.of(scene)
+    balance = Balance(levitation.rates, parameters(scene, scales, frozen_spin=True), 0.0)
+    beyond = next(e for e in levitation.equilibria[1:] if -0.035 < e.position[2] < known.position[2])
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    depth = (known.position[2] + beyond.position[2] + nodes * (beyond.position[2] - known.position[2])) / 2
+    place, moment, work = known.position[None] / scales.length, known.state.moment[None], 0.0
+    for z, weight in zip(depth, weights * (known.position[2] - beyond.position[2]) / 2, strict=True):
+        place[0, 2] = z / scales.length
+        place, moment, _ = solve(balance, place, moment, np.array([0, 1, 3, 4]))
+        work += weight * balance(place, moment)[0][0, 2] * scene.floater.mass * scales.length / scales.time**2
+    assert float(found.escape_energy_value) == pytest.approx(work, rel=1e-8)
+    for key in found.key.values:
+        step = 1e-3 * abs(gradient.numbers[key])
+        ends = []
+        for sign in (1, -1):
+            there = changed(gradient.scene, {key: gradient.numbers[key] + sign * step})
+            one = Gradient(Levitation(there, levitation.models))
+            first = one.levitation.equilibria[:1]
+            ends.append(float(one.dataset(first, ["escape_energy"], ["frequency_hz"]).escape_energy_value[0]))
+        assert float(found.escape_energy.sel(key=key)) == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=3e-5)
+
+
+def test_an_unstable_equilibrium_or_one_without_another_beyond_has_no_energy_of_escape():
+    scene, _, _ = CASES["displaced"]
+    found = sl.gradient(scene, ["escape_energy", "plate_damping"], ["frequency_hz"], model="dipole")
+    assert np.isfinite(found.escape_energy).values[:, 0].tolist() == [True] + [False] * (found.sizes["equilibrium"] - 1)
+    assert "energy of escape" in found.not_known
+    assert np.all(found.plate_damping_value == 0.0)
 
 
 def test_gradient_is_labelled_and_lazy_users_get_all():
@@ -212,6 +211,11 @@ def test_gradient_is_labelled_and_lazy_users_get_all():
         ({"by": ["frequency_hz", "frequency_hz"]}, "each once"),
         ({"of": ["distanse"]}, "did you mean `distance`"),
         ({"of": "distance"}, "must be a list of answers"),
+        ({"of": ["escape energy"]}, "did you mean `escape_energy`"),
+        ({"of": ["plate_dampng"]}, "did you mean `plate_damping`"),
+        ({"of": ["escape_energy", "escape_energy"]}, "each once"),
+        ({"of": ["distance_error"]}, "did you mean `distance`"),
+        ({"of": [1]}, "must be a list of answers"),
         ({"model": "circle"}, "Input model must be one of"),
     ],
 )

@@ -1,0 +1,261 @@
+"""The equations of scenes that differ from one in a number, in tables of one mesh, so that differences are smooth.
+
+The rotor's field and the effects at a few values of a number: a lone magnet's table is moved, turned and magnified;
+others, which no such law gives, are made anew beside it, with as many points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..dynamics.equilibria.derivatives import Nearby, Setting
+from ..dynamics.motion.effect import Interaction, interaction_of
+from ..dynamics.motion.effects import mean_over_turns, with_effects
+from ..dynamics.motion.equations import parameters
+from ..dynamics.motion.floater_effects import FloaterShape
+from ..dynamics.motion.plate import PlateForce, PlateMemory
+from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
+from ..dynamics.motion.state import Scales
+from ..fem.mutual.making import moved_mutual, mutual_table_beside
+from ..fem.mutual.table import MutualTable, StrongerMutual
+from ..fem.rotor.floater import floater_sources
+from ..fem.rotor.models import changed_table, magnified
+from ..fem.rotor.table import FieldTable, RotorTable
+from ..fem.rotor_metal import MovedLosses, RotorLosses, cached_rotor_losses
+from ..geometry.common import Array, InputError
+from ..geometry.scene.contents import Plate, Scene
+from ..geometry.scene.files import changed, scene_numbers
+from ..geometry.scene.messages import SceneError
+from .cli.console import note
+from .levitation import Levitation
+
+# Step of differences by a number, by its size or by one that such a number usually has, by the end of its key
+STEP, USUAL = 2e-3, {"mm": 10.0, "deg": 20.0, "T": 1.0, "m_s2": 9.81}
+# The same where a table is made anew, by a difference of second order: of losses what its points leave is smooth over
+# this, and of mutual magnetisation it leaves 4e-7 of a derivative
+WIDE = {"mutual": 1e-3, "losses": 0.02}
+SHARED = 0.1  # Part of a step to both sides at which the rotor's share of a plate's signals is differenced
+# Steps, weights of fourth order, and of second order
+CENTRAL = ((1, 2 / 3, 1 / 2), (-1, -2 / 3, -1 / 2), (2, -1 / 12, 0.0), (-2, 1 / 12, 0.0))
+# Where a number has an end
+FORWARD = ((0, -25 / 12, -3 / 2), (1, 4.0, 2.0), (2, -3.0, -1 / 2), (3, 4 / 3, 0.0), (4, -1 / 4, 0.0))
+
+
+def unknown_over_plate(key: str) -> str:
+    """Why derivatives by a key are not known where a plate's currents act; empty where they are."""
+    if key.startswith("plate.") and not key.startswith(("plate.center_mm", "plate.rotation_deg", "plate.conductivity")):
+        return "derivatives by sizes of a plate whose currents act are not known"
+    return ""
+
+
+def _moves_rotor(key: str) -> bool:
+    """Whether a number changes the rotor's field in the plate in more than its strength."""
+    still = ("rotor.remanence_T", "rotor.conductivity_S_m")
+    return key.startswith(("rotor.", "plate.center_mm", "plate.rotation_deg")) and not key.startswith(still)
+
+
+def shape_beside(near: Scene, scene: Scene, field: FieldTable) -> FloaterShape | None:
+    """What the shape of a scene's floater adds in a field, by the finite elements of one nearby; None of a sphere."""
+    floater = scene.floater
+    if floater.is_sphere or floater.mean or not floater.round:
+        return None
+    return FloaterShape.of(floater, floater_sources(floater, near=near.floater), interaction_of(field).field)
+
+
+@dataclass(frozen=True, eq=False)
+class NearbyScenes:
+    """A scene's equations, and those of scenes that differ from it in one number."""
+
+    levitation: Levitation
+    scene: Scene
+    averaged: bool  # the motion of the floater's mean over turns about its moment
+    with_plate: bool
+
+    def step(self, key: str, value: float) -> float:
+        """Of the differences by a key's number."""
+        usual = next((size for end, size in USUAL.items() if key.rstrip(".0123456789").endswith(f"_{end}")), 0.0)
+        return STEP * (max(abs(value), usual) or 1.0)
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        return scene_numbers(self.scene)[1]
+
+    def around(self, key: str) -> list[Nearby]:
+        """Equations about a number; on one side of it where it may not grow or shrink."""
+        value = self.numbers[key]
+        step = self.step(key, value)
+        for steps, sign in ((CENTRAL, 1), (FORWARD, 1), (FORWARD, -1)):
+            try:
+                scenes = {k: changed(self.scene, {key: value + sign * k * step}) for k, _, _ in steps}
+            except SceneError:
+                continue
+            return [
+                Nearby(
+                    sign * k * step, sign * weight / step, sign * lower / step,
+                    self.at(scenes[k], {key: sign * k * step}),
+                )
+                for k, weight, lower in steps
+            ]  # fmt: skip
+        raise InputError(f"Input {key} must have room to change for a derivative; instead it has none.")
+
+    @cached_property
+    def setting(self) -> Setting:
+        return self._setting(
+            self.scene, self.levitation.interaction, self.levitation.plate if self.with_plate else None
+        )
+
+    def _setting(self, scene: Scene, interaction: Interaction, plate: PlateMemory | None) -> Setting:
+        if self.averaged:
+            scene, interaction, _ = mean_over_turns(scene, interaction)
+        scales = Scales.of(scene)
+        values = parameters(scene, scales, frozen_spin=True)
+        rates = self.levitation.rates
+        if interaction is not self.levitation.interaction or self.averaged:
+            rates = (self.setting.rates if "setting" in self.__dict__ else rates).elsewhere(interaction)
+        return Setting(scales, rates, values, PlateForce(plate, values) if plate else None)
+
+    def at(self, scene: Scene, offsets: Mapping[str, float]) -> Setting:
+        """The equations of a scene in which numbers are larger by `offsets`, by key."""
+        table, of_rotor = self.levitation.table, any(key.startswith("rotor.") for key in offsets)
+        field = changed_table(table, scene.rotor) if of_rotor and isinstance(table, RotorTable) else table
+        effects = interaction_of(field)
+        if (mutual := self.levitation.answers[0]) is not None:
+            effects = effects.joined(Mutual(self._mutual(mutual, scene, offsets), scene.floater.moment))
+        if (losses := self.levitation.losses) is not None:
+            effects = effects.joined(RotorCurrents(self._losses(losses, scene, offsets)))
+        if any(key.startswith("floater.") for key in offsets) and (shape := shape_beside(self.scene, scene, field)):
+            effects = effects.joined(shape)
+        plate = self._plate(scene, offsets) if self.with_plate else None
+        return self._setting(scene, with_effects(scene, effects), plate)
+
+    @cached_property
+    def _strength(self) -> float:
+        return float(np.linalg.norm(self.scene.rotor[0].polarization)) or 1.0
+
+    def _mutual(self, table: MutualTable, scene: Scene, offsets: Mapping[str, float]) -> Any:
+        lone, strong = magnified(self.scene.rotor, scene.rotor), 1.0
+        found: Any = moved_mutual(table, scene.rotor)
+        if "rotor.remanence_T" in offsets:
+            strong = float(np.linalg.norm(scene.rotor[0].polarization)) / self._strength
+        for key, offset in offsets.items():
+            moves = key.startswith("rotor.") and lone and lone[0] == 1.0
+            if moves or key.endswith("remanence_T") or not key.startswith(("rotor.", "floater.")):
+                continue
+            if key.startswith("floater.") and not key.endswith(("_mm", "permeability")):
+                continue
+            ends = self._ends_of(
+                "mutual", key, table, lambda there: mutual_table_beside(table, there.rotor, there.floater.ball, note)
+            )
+            found = _Line(found, *ends[:2], offset / ends[2])
+        return found if strong == 1.0 else StrongerMutual(found, strong)
+
+    def _losses(self, losses: RotorLosses, scene: Scene, offsets: Mapping[str, float]) -> Any:
+        before, after = self.scene.rotor, scene.rotor
+        found: Any = losses
+        alone = not self.scene.conductors and len({magnet.conductivity for magnet in after}) == 1
+        lone = alone and magnified(before, after)
+        if alone and "rotor.conductivity_S_m" in offsets:
+            ratio = float(after[0].conductivity / before[0].conductivity)  # type: ignore[operator]
+            found = replace(losses, weights=losses.weights * np.sqrt(ratio))
+        if lone:
+            return MovedLosses(found, before[0], after[0], lone[0])
+        for key, offset in offsets.items():
+            if key.startswith("rotor.") and not key.endswith(
+                ("remanence_T", "recoil_permeability", "rotor.conductivity_S_m")
+            ):
+                ends = self._ends_of("losses", key, losses, lambda there: cached_rotor_losses(there, note)[0])
+                found = _Line(found, *ends[:2], offset / ends[2])
+        return found
+
+    def _plate(self, scene: Scene, offsets: Mapping[str, float]) -> PlateMemory | None:
+        memory = self.levitation.plate
+        assert memory is not None
+        assert scene.plate is not None
+        if "plate.conductivity_S_m" in offsets:
+            rates = memory.table.rates * (memory.plate.conductivity / scene.plate.conductivity)
+            memory = replace(memory, table=replace(memory.table, rates=rates))
+        if "rotor.remanence_T" in offsets:
+            strong = float(np.linalg.norm(scene.rotor[0].polarization)) / self._strength
+            memory = replace(memory, share=replace(memory.share, series=strong * memory.share.series))
+        if any(key.startswith(("plate.center_mm", "plate.rotation_deg")) for key in offsets):
+            memory = replace(memory, plate=replace(memory.plate, body=scene.plate.body))
+        moves = {key: offset for key, offset in offsets.items() if _moves_rotor(key)}
+        if moves:  # about a plate that has not gone down
+            series = memory.share.series @ memory.share.by_depth(0.0)
+            series = series + sum(offset * self._shares[key] for key, offset in moves.items())
+            memory = replace(memory, share=replace(memory.share, distance=0.0, series=series[:, :, None]))
+        return memory
+
+    @cached_property
+    def _shares(self) -> dict[str, Array]:
+        return {}
+
+    def prepare(self, keys: Sequence[str]) -> None:
+        """Differentiate the rotor's share of the plate's signals by keys that move both against each other."""
+        wanted = [key for key in keys if _moves_rotor(key)] if self.with_plate else []
+        memory, requested = self.levitation.plate, self.levitation.requested_plate
+        table = self.levitation.table
+        if not wanted or memory is None or requested is None or not isinstance(table, RotorTable):
+            return
+        others, widths = list[tuple[Plate, RotorTable]](), list[float]()
+        for key in wanted:
+            step = SHARED * self.step(key, self.numbers[key])
+            try:
+                ends = [changed(self.scene, {key: self.numbers[key] + sign * step}) for sign in (1, -1)]
+            except SceneError:  # it has an end here
+                ends, step = [changed(self.scene, {key: self.numbers[key] + step}), self.scene], step / 2
+            widths.append(2 * step)
+            for scene in ends:
+                assert scene.plate is not None
+                others.append((replace(memory.plate, body=scene.plate.body), changed_table(table, scene.rotor)))
+        note("The rotor's share of the plate's currents by what moves both ...")
+        found = requested.changed_shares((memory.table, memory.share), others, note)
+        for key, width, above, below in zip(wanted, widths, found[::2], found[1::2], strict=True):
+            self._shares[key] = (above - below) / width
+
+    def _ends_of(self, name: str, key: str, base: Any, make: Callable[[Scene], Any]) -> tuple[Any, Any, float]:
+        """Tables that are made a `WIDE` step to both sides of a number, and the way between."""
+        if (name, key) not in self._ends:
+            value = self.numbers[key]
+            wide = WIDE[name] / STEP * self.step(key, value)
+            try:
+                first, last = (make(changed(self.scene, {key: value + s * wide})) for s in (-1, 1))
+                self._ends[name, key] = first, last, 2 * wide
+            except SceneError:  # it has an end here
+                self._ends[name, key] = base, make(changed(self.scene, {key: value + wide})), wide
+        return self._ends[name, key]
+
+    @cached_property
+    def _ends(self) -> dict[tuple[str, str], tuple[Any, Any, float]]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A table between others: the numbers of `base` and a share of what two others differ by."""
+
+    base: Any
+    first: Any
+    last: Any
+    share: float
+
+    @property
+    def polarizability(self) -> float:
+        tables = self.base, self.first, self.last
+        base, first, last = (float(table.polarizability) for table in tables)
+        return base + self.share * (last - first)
+
+    def derivatives(self, places: Array, moments: Array) -> tuple[Array, ...]:
+        """See `MutualTable`."""
+        parts = (table.derivatives(places, moments) for table in (self.base, self.first, self.last))
+        return tuple(a + self.share * (c - b) for a, b, c in zip(*parts, strict=True))
+
+    def products(self, places: Array) -> Array:
+        """See `RotorLosses`."""
+        base, first, last = (table.products(places) for table in (self.base, self.first, self.last))
+        return np.asarray(base + self.share * (last - first))
