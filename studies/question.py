@@ -170,10 +170,12 @@ class Question:
         """Functions that compute the points, which share what they can; one that cannot be raises when called."""
         jobs: list[Callable[[], xr.Dataset]] = [partial(self, point) for point in points]
         axes = {key: sorted({point[key] for point in points}) for key in points[0]}
-        made, first, families = list[Levitation](), dict[str, Levitation](), dict[str, list[Any]]()
+        made, families = list[Levitation](), dict[str, list[Any]]()
         for k, point in enumerate(points):
             with suppress(SpinlevError):  # what cannot be made or found here is left to each scene, which says why
                 one = self.levitation(point)
+                if made:
+                    one.share(made[0])
                 dipoles = self._dipoles(point, one)
                 jobs[k] = partial(self._answer, point, one, dipoles)
                 made.append(one)
@@ -182,7 +184,6 @@ class Question:
                     self.ask == "flight" and (one.scene.plate is not None or not one.absolute)
                 )
                 for each in (one, *dipoles):
-                    each.share(first.setdefault(each.equations_key, each))
                     if requested and each.scene.frequency and each.scene.floater.is_sphere:
                         key, *family = _family(each)
                         place = tuple(axis.index(point[name]) for name, axis in axes.items())

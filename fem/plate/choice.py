@@ -26,10 +26,11 @@ from .tables import CHANGED, DRIVEN, SLAB, changed_shares, deciding, plate_and_r
 
 NEGLIGIBLE = 1e-6  # Part of the floater's weight below which the largest conceivable force of the plate is left out
 REACH = 0.003  # The floater may move so far from where it begins, along each axis, m
-RASTER = 0.001  # Bounds of regions are multiples of this, m, so that scenes that differ little share a table
+# Centres of regions are multiples of the first and halves of their widths odd multiples of the second, m, so that
+# scenes that differ little share a table: with `REACH` to each side those whose places are nearest to one centre.
+CENTERS, HALVES = 0.004, 0.001
 # Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold.
 LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
-COARSE = 50.0  # The highest frequency is a multiple of this, Hz, for the same reason
 # How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
 # where terms grow with the square of the width.
 FACING, BESIDE = 2.0, 0.5
@@ -173,7 +174,7 @@ def plate_around(
         sideways = float(np.hypot(place[0], place[1])) + REACH
         region = reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius)
         region = _rastered(region, plate, radius)
-    highest = max(HIGHEST, COARSE * math.ceil(HARMONICS * frequency / COARSE - 1e-9))
+    highest = HIGHEST * 2.0 ** max(0, math.ceil(math.log2(HARMONICS * max(frequency, 1.0) / HIGHEST) - 1e-9))
     return PlateAround(plate, model, table, region, (LOWEST, highest), rtol)
 
 
@@ -259,15 +260,17 @@ def rotor_nearby(
 
 
 def _rastered(region: Region, plate: Plate, radius: float) -> Region:
-    """The region with bounds on the raster, but not nearer to the face that it lies over than `SKIN` radii (m).
+    """The region with bounds on a raster, but not nearer to the face that it lies over than `SKIN` radii (m).
 
     What is nearly symmetric becomes so, which halves the work.
     """
-    lower, upper = np.floor(region.lower / RASTER + 1e-6), np.ceil(region.upper / RASTER - 1e-6)
+    middle = CENTERS * np.round(region.center / CENTERS)
+    half = np.maximum(region.upper - middle, middle - region.lower) / HALVES
+    half = HALVES * (2 * np.ceil((half - 1) / 2 - 1e-6) + 1)
+    lower, upper = middle - half, middle + half
     for axis in np.flatnonzero((lower < 0) & (upper > 0)):
         upper[axis] = max(-lower[axis], upper[axis])
         lower[axis] = -upper[axis]
-    lower, upper = lower * RASTER, upper * RASTER
     for middle, half in plate.body.blocks:
         facing = int(np.argmax(np.maximum(lower - middle, middle - upper) - half))
         _cut(lower, upper, facing, middle[facing], half[facing] + SKIN * radius)
