@@ -37,8 +37,8 @@ from ..motion.events import (
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory
 from ..motion.state import DRIVEN, STEADY, Parameter, State, Vector
 from .balls import LARGE, SMALL
-from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight, IntegrationError, Recorder
-from .trajectory import DURATION, Trajectory
+from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight
+from .trajectory import DURATION, IntegrationError, Recorder, Trajectory
 
 BATCH = 8  # Measured: a trajectory in a batch of 8 takes a quarter of the time of one alone, of 4 a half, of 16 a third
 TOGETHER = 200  # Steps between two looks for trajectories that have ended; a hundred are about 16 turns

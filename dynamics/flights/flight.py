@@ -20,7 +20,7 @@ import numpy as np
 from ...fem.compiled_code import compiled
 from ...fem.harmonics.interior import BallField
 from ...fem.rotor.table import FieldTable
-from ...geometry.common import Array, ComputationError, InputError
+from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..continuation.frequencies import way_out
 from ..equilibria.equilibrium import AXIAL, Equilibrium, EquilibriumError
@@ -44,7 +44,15 @@ from ..motion.events import (
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory, plate_numbers
 from ..motion.state import DRIVEN, STEADY, Parameter, Scales, State
 from .balls import DEGREE, Balls, in_ball, is_long
-from .trajectory import DURATION, STOPPED, Checkpoint, FieldChanges, FlightStopped, Trajectory
+from .trajectory import (
+    DURATION,
+    STOPPED,
+    Checkpoint,
+    FieldChanges,
+    FlightStopped,
+    Recorder,
+    Trajectory,
+)
 
 LEFT = "left"
 INSIDE = 1 - 1e-9  # Square of the distance from a ball's centre, in radii, from which on the floater has left it
@@ -66,14 +74,7 @@ OPTIMISATION = 1
 SHORT_TURNS = 1000.0
 # Turns from which on straight code saves more time (in a ball 21 of 47 µs a step) than its compilation takes.
 STRAIGHT_TURNS = 2e5
-# The most turns and samples between two looks at the motion. A step ends where a piece does, so that pieces must not
-# depend on how fast the machine is.
-PIECE_TURNS, PIECE_SAMPLES = 256, 256
 MOST_SAMPLES, SAMPLES_PER_TURN = 20000, 32
-
-
-class IntegrationError(ComputationError):
-    """The motion could not be integrated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,47 +227,6 @@ class Flight:
         return float(min(turn / SAMPLES_PER_TURN, duration / 1000) / self.scales.time)
 
 
-class Recorder:
-    """Samples at multiples of an interval, which doubles, dropping every other sample, when there are too many.
-
-    Parameters
-    ----------
-    state : (n,) at the first time
-    interval : first spacing of the samples
-    capacity : most samples kept
-    now : the first time
-    """
-
-    def __init__(self, state: Array, interval: float, capacity: int, now: float = 0.0) -> None:
-        self.interval, self.capacity = interval, capacity
-        self.times, self.states = np.array([now]), state[None]  # (m,) and (m, n)
-
-    def grid(self, now: float, end: float, count: int) -> Array:
-        """Times to visit next: `now`, then at most `count` multiples of the interval, and `end` if they reach it."""
-        first = int(np.floor(now / self.interval + 1e-9)) + 1
-        times = self.interval * np.arange(first, first + count)
-        times = times[times < end - 1e-9 * self.interval]
-        return np.concatenate([[now], times, [end] if len(times) < count else []])
-
-    def due(self, seen: float, now: float, end: float) -> Array:
-        """Multiples of the interval after `seen`, up to `now` and before `end`."""
-        first, last = (int(np.floor(time / self.interval + 1e-9)) for time in (seen, now))
-        times = self.interval * np.arange(first + 1, last + 1)
-        return np.asarray(times[times < end - 1e-9 * self.interval])
-
-    def add(self, times: Array, states: Array, last: bool) -> None:
-        """Keep `states` (m, n) at those of `times` that are multiples of the interval; of the `last` ones all."""
-        on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
-        kept = on_grid | last
-        self.times, self.states = np.append(self.times, times[kept]), np.concatenate([self.states, states[kept]])
-        while len(self.times) > self.capacity:
-            self.interval *= 2
-            even = np.round(self.times / self.interval) * self.interval
-            kept = np.abs(self.times - even) < 1e-6 * self.interval
-            kept[-1] |= last
-            self.times, self.states = self.times[kept], self.states[kept]
-
-
 @dataclass(eq=False)
 class Course:
     """How far a trajectory is."""
@@ -347,24 +307,13 @@ class Course:
     def _piece(self, end: float, recorder: Recorder) -> tuple[Array, Array]:
         """Go on to the end of a piece or to an event: scaled times, and states with J - work."""
         part = self.flight.part(self.flight.degree(self.values))
-        integrator, scales = part.integrator, self.flight.scales
-        integrator.pars[:], integrator.state[:] = self.values[: len(integrator.pars)], self.state
-        integrator.dtime = self.time
-        integrator.reset_cooldowns()
-        count = int(np.clip(PIECE_TURNS * 2 * np.pi / recorder.interval, 1, PIECE_SAMPLES))
-        times = recorder.grid(self.time[0], end, count)
-        outcome, _, _, steps, _, states = integrator.propagate_grid(times)
-        if outcome == hy.taylor_outcome.err_nf_state:
-            raise IntegrationError(
-                f"The floater's state became infinite at t = {integrator.time * scales.time:.6g} s. "
-                "Look whether the start lies inside a magnet or the table's range is too small."
-            )
+        scales = self.flight.scales
+        piece = recorder.piece(part.integrator, self.values, self.time, self.state, end, scales.time)
         self.sound = False
-        self.time, self.state = integrator.dtime, integrator.state.copy()
-        self.steps, self.ended_by, times = self.steps + steps, DURATION, times[: len(states)]
-        if outcome != hy.taylor_outcome.time_limit:
-            times, states = np.append(times, integrator.time), np.vstack([states, integrator.state])
-            self.ended_by = part.meanings[-outcome.value - 1]
+        self.time, self.state, times, states = piece.time, piece.state, piece.times, piece.states
+        self.steps, self.ended_by = self.steps + piece.steps, DURATION
+        if piece.event is not None:
+            self.ended_by = part.meanings[piece.event]
         if LEFT not in part.meanings:  # there are no bodies in a ball
             there = scales.unpack(states)
             gap = clearance(self.flight.scene, times * scales.time, there.position, there.orientation)

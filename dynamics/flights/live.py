@@ -11,8 +11,8 @@ from ...geometry.scene.contents import Scene
 from ..equilibria.equilibrium import Equilibrium
 from ..motion.plate import PlateMemory
 from ..motion.state import State, turned_about_z
-from .flight import PLATE_TOLERANCE, TOLERANCE, Flight, Recorder, StartError, check_free, in_plate_range, initial_state
-from .trajectory import DURATION
+from .flight import PLATE_TOLERANCE, TOLERANCE, Flight, StartError, check_free, in_plate_range, initial_state
+from .trajectory import DURATION, Recorder
 
 FEWEST, MOST, A_SECOND = 8, 256, 400  # Samples of a piece at least and at most, and between that so many a second
 

@@ -39,18 +39,14 @@ from .flight import (
     LOOSER,
     MOST_SAMPLES,
     OPTIMISATION,
-    PIECE_SAMPLES,
-    PIECE_TURNS,
     SHORT_TURNS,
     TOLERANCE,
     Course,
     Flight,
-    IntegrationError,
-    Recorder,
     StartError,
     initial_state,
 )
-from .trajectory import DURATION, STOPPED, Checkpoint, FieldChanges, Trajectory
+from .trajectory import DURATION, STOPPED, Checkpoint, FieldChanges, Recorder, Trajectory
 
 FINE, COARSE = 5, 1  # degrees of the polynomials over a body that is not round that its dipoles integrate
 Pole = tuple[Array, Array]  # (3,) m and (3,) A m², along the axes of the body from its centre of mass
@@ -343,23 +339,11 @@ class JointFlight:
     def _piece(self, end: float, recorder: Recorder) -> tuple[Array, Array]:
         """Go on to the end of a piece or to an event: scaled times and states."""
         part, scales = self.part(self.degrees), self.flights[0].scales
-        integrator = part.integrator
-        integrator.pars[:], integrator.state[:] = self.values[: len(integrator.pars)], self.state
-        integrator.dtime = self.time
-        integrator.reset_cooldowns()
-        count = int(np.clip(PIECE_TURNS * 2 * np.pi / recorder.interval, 1, PIECE_SAMPLES))
-        times = recorder.grid(self.time[0], end, count)
-        outcome, _, _, steps, _, states = integrator.propagate_grid(times)
-        if outcome == hy.taylor_outcome.err_nf_state:
-            raise IntegrationError(
-                f"The floaters' state became infinite at t = {integrator.time * scales.time:.6g} s. "
-                "Look whether a start lies inside a magnet or the table's range is too small."
-            )
-        self.time, self.state = integrator.dtime, integrator.state.copy()
-        self.steps, self.ended, times = self.steps + steps, (DURATION, ()), times[: len(states)]
-        if outcome != hy.taylor_outcome.time_limit:
-            times, states = np.append(times, integrator.time), np.vstack([states, integrator.state])
-            self.ended = part.meanings[-outcome.value - 1]
+        piece = recorder.piece(part.integrator, self.values, self.time, self.state, end, scales.time)
+        self.time, self.state, times, states = piece.time, piece.state, piece.times, piece.states
+        self.steps, self.ended = self.steps + piece.steps, (DURATION, ())
+        if piece.event is not None:
+            self.ended = part.meanings[piece.event]
         touching = self._touching(times * scales.time, states)
         if touching is not None:
             at, which = touching

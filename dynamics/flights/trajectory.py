@@ -8,15 +8,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import heyoka as hy
 import numpy as np
 
 from ...fem.files import seal, unsealed, write_whole
-from ...geometry.common import Array, InputError, html_table, millimetres
+from ...geometry.common import Array, ComputationError, InputError, html_table, millimetres
 from ..equilibria.balance import Indices
 from ..motion.events import CONTACT, LOST
 from ..motion.state import State
 
 DURATION, STOPPED = "duration", "stopped"
+# The most turns and samples between two looks at the motion. A step ends where a piece does, so that pieces must not
+# depend on how fast the machine is.
+PIECE_TURNS, PIECE_SAMPLES = 256, 256
+
+
+class IntegrationError(ComputationError):
+    """The motion could not be integrated."""
 
 
 @dataclass(frozen=True)
@@ -214,3 +222,85 @@ def _drifts(means: Array) -> bool:
     line = np.polynomial.Polynomial.fit(steps, means, 1)
     change = abs(float(line(steps[-1]) - line(0)))
     return change > max(VISIBLE, 3 * float(np.std(means - line(steps))))
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A part of a motion between two looks at it, scaled."""
+
+    times: Array  # (m,) of the samples, the first where it began
+    states: Array  # (m, s)
+    time: tuple[float, float]  # where it ended, the sum of two numbers
+    state: Array  # (s,)
+    steps: int  # of Taylor's method
+    event: int | None  # number of the event that ended it
+
+
+class Recorder:
+    """Samples at multiples of an interval, which doubles, dropping every other sample, when there are too many.
+
+    Parameters
+    ----------
+    state : (n,) at the first time
+    interval : first spacing of the samples
+    capacity : most samples kept
+    now : the first time
+    """
+
+    def __init__(self, state: Array, interval: float, capacity: int, now: float = 0.0) -> None:
+        self.interval, self.capacity = interval, capacity
+        self.times, self.states = np.array([now]), state[None]  # (m,) and (m, n)
+
+    def grid(self, now: float, end: float, count: int) -> Array:
+        """Times to visit next: `now`, then at most `count` multiples of the interval, and `end` if they reach it."""
+        first = int(np.floor(now / self.interval + 1e-9)) + 1
+        times = self.interval * np.arange(first, first + count)
+        times = times[times < end - 1e-9 * self.interval]
+        return np.concatenate([[now], times, [end] if len(times) < count else []])
+
+    def piece(
+        self, integrator: Any, values: Array, time: tuple[float, float], state: Array, end: float, unit: float
+    ) -> Piece:
+        """Motion from a `time` and `state` to an event, or to `end` or so far as samples are looked at once.
+
+        Raises IntegrationError: the state became infinite.
+
+        Parameters
+        ----------
+        integrator, values : of the motion, and its runtime parameters
+        time, state : scaled, the first as the sum of two numbers
+        end, unit : scaled, and the seconds of scaled time 1
+        """
+        integrator.pars[:], integrator.state[:] = values[: len(integrator.pars)], state
+        integrator.dtime = time
+        integrator.reset_cooldowns()
+        times = self.grid(time[0], end, int(np.clip(PIECE_TURNS * 2 * np.pi / self.interval, 1, PIECE_SAMPLES)))
+        outcome, _, _, steps, _, states = integrator.propagate_grid(times)
+        if outcome == hy.taylor_outcome.err_nf_state:
+            raise IntegrationError(
+                f"A floater's state became infinite at t = {integrator.time * unit:.6g} s. "
+                "Look whether the start lies inside a magnet or the table's range is too small."
+            )
+        times, event = times[: len(states)], None
+        if outcome != hy.taylor_outcome.time_limit:
+            times, states = np.append(times, integrator.time), np.vstack([states, integrator.state])
+            event = -outcome.value - 1
+        return Piece(times, states, integrator.dtime, integrator.state.copy(), steps, event)
+
+    def due(self, seen: float, now: float, end: float) -> Array:
+        """Multiples of the interval after `seen`, up to `now` and before `end`."""
+        first, last = (int(np.floor(time / self.interval + 1e-9)) for time in (seen, now))
+        times = self.interval * np.arange(first + 1, last + 1)
+        return np.asarray(times[times < end - 1e-9 * self.interval])
+
+    def add(self, times: Array, states: Array, last: bool) -> None:
+        """Keep `states` (m, n) at those of `times` that are multiples of the interval; of the `last` ones all."""
+        on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
+        kept = on_grid | last
+        self.times, self.states = np.append(self.times, times[kept]), np.concatenate([self.states, states[kept]])
+        while len(self.times) > self.capacity:
+            self.interval *= 2
+            even = np.round(self.times / self.interval) * self.interval
+            kept = np.abs(self.times - even) < 1e-6 * self.interval
+            kept[-1] |= last
+            self.times, self.states = self.times[kept], self.states[kept]
