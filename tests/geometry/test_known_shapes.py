@@ -37,6 +37,7 @@ def test_a_solid_is_known_with_its_place_and_axes(body, turn, tmp_path):
         assert np.array_equal(known.rotation, np.eye(3))
 
 
+@pytest.mark.slow
 def test_what_is_only_nearly_a_shape_stays_a_part(tmp_path):
     cube = occ.Box(occ.Pnt(-5, -5, -5), occ.Pnt(5, 5, 5))
     rod = occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, r=5, h=8)

@@ -49,6 +49,7 @@ def test_workers_write_tables_and_one_that_is_killed_does_not_stop_the_sweep(tmp
     assert failed["reason"] == "ValueError: no root"
 
 
+@pytest.mark.slow
 def test_a_point_whose_process_dies_each_time_is_named_and_those_of_its_batch_go_on(tmp_path, monkeypatch):
     monkeypatch.setattr("spinlev.studies.sweep.TRIES", 2)
     asked = points(4.0, 9.0, 16.0, 25.0)
@@ -142,6 +143,7 @@ def test_workers_of_another_version_compute_nothing(cluster, tmp_path, caplog):
     assert len(log.read_text().split()) == 8
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_lost_costs_no_finished_point(tmp_path, monkeypatch, caplog):
     """In a sentence, and without dask's own words."""
     asked = points(*np.linspace(1.0, 8.0, 8).tolist(), pause=0.2)

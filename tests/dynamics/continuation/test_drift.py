@@ -166,6 +166,7 @@ def test_balance_as_in_the_full_motion(rates):
     assert distance[-200:].mean() == pytest.approx(averaged.distance[-1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_oscillatory_instability_ends_the_flight(rates):
     """At 85 Hz small motions grow by e in a third of a second, which the drift does not change so soon."""
     scene = replace(VERTICAL, frequency=85.0)
@@ -175,6 +176,7 @@ def test_oscillatory_instability_ends_the_flight(rates):
     assert found.levitated_s == pytest.approx(7.0 / start.growth_per_s, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_balance_where_small_motions_grow_is_not_endless():
     """At 210 Hz the floater's own currents drive the precession: after s* it waits until that has grown by e^7."""
     scene = replace(HORIZONTAL, frequency=210.0)

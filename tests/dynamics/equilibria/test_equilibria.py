@@ -181,6 +181,7 @@ PUBLISHED = [  # PHYSICS.md, "the family matters": scene, frequency, body spin, 
         for free in (LATERAL, EVERY)
     ],
 )
+@pytest.mark.slow
 def test_starts_thinned_on_the_way_find_what_all_find(name, free, monkeypatch):
     scene = SCENES[name]
     rates, values = Rates(table_of(scene, "cuboid")), parameters(scene, Scales.of(scene), frozen_spin=True)

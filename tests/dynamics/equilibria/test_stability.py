@@ -90,6 +90,7 @@ def test_without_drag_eigenvalues_come_in_pairs_of_both_signs():
             assert len(equilibrium.frequencies_hz) == 5
 
 
+@pytest.mark.slow
 def test_stokes_drag_is_resolved():
     """Rates of 1e-4 /s are far above round-off, and the sign of drag turns theirs."""
     damped = replace(SCENE, drag=Drag(2.2e-6, 1.2e-10))

@@ -216,6 +216,7 @@ def test_equilibria_are_told_apart_and_a_stable_one_stays():
     assert np.ptp(distance) < 0.6e-3
 
 
+@pytest.mark.slow
 def test_a_locked_equilibrium_is_at_rest_in_the_rotors_frame():
     locked = next(one for one in find_equilibria(LEVITATING, TABLE) if one.kind == LOCKED)
     scales, whole = Scales.of(LEVITATING), with_effects(LEVITATING, TABLE)

@@ -153,6 +153,7 @@ def test_a_ring_of_cubes_within_its_error():
     assert np.max(error / scale) <= 1e-3
 
 
+@pytest.mark.slow
 def test_faces_that_lie_across_each_other_say_so():
     shifted = (box(center=(0.5, 0, 0.3)), box(center=(-0.5, 0, 0)))
     assert not smooth(shifted)

@@ -67,6 +67,7 @@ def test_force_and_torque_are_those_of_both_bodies(table, fine, gap, seed):
         assert apart[1] < stated[1]
 
 
+@pytest.mark.slow
 def test_nearer_to_contact_the_stated_error_holds(table, fine):
     for place, direction in zip(*poses(0.05, 3, 25), strict=True):
         apart, stated = missed(table, fine, place, direction), table.relative_error(place)

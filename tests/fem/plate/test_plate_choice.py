@@ -61,6 +61,7 @@ def test_the_command_takes_the_slab_where_it_will_do(tmp_path):
     np.testing.assert_array_equal(auto["G_T_per_A_m2"]["imag"], slab["G_T_per_A_m2"]["imag"])
 
 
+@pytest.mark.slow
 def test_measured_edges_fade_as_the_plate_grows_and_are_below_the_bound():
     """A plate half as wide again has less beyond its edges; the bound is known to be 3.5 times and more too large."""
     plates = [Plate(Box((edge, edge, 0.01), (0.0, 0.0, -0.045)), 3.5e7) for edge in (0.2, 0.3)]

@@ -229,6 +229,7 @@ def models():
         return Models(experiment.surrogates_of({**SETTINGS[True], **smaller}, ("floater", "rotor", "air")))
 
 
+@pytest.mark.slow
 def test_flights_on_a_surrogate_are_the_averaged_ones(models):
     """δx = 1 mm with 2.3°: the fold, and 140 Hz for 250 s, within three times what the surrogate misses."""
     strengths, inputs = np.tile([1.0, 0.0, 0.0, 1.0], (2, 1)), np.tile(list(INPUTS.values()), (2, 1))

@@ -86,6 +86,7 @@ SHAPES = {
 """Rotor, floater, plate, sliders that there must be, and a part of what the page says."""
 
 
+@pytest.mark.slow
 def test_any_shape_of_rotor_and_floater_opens(reader):
     """One after the other in a page: its sliders are those that the scene has, and the last of them moves it."""
     page = reader()

@@ -199,6 +199,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 def test_a_stop_while_a_process_begins_is_no_traceback():
     """SIGTERM comes when the process is there and does not know its task yet; all of them have ended afterwards."""
     ended = subprocess.run([sys.executable, "-c", STRUCK], capture_output=True, text=True, timeout=60, check=False)
