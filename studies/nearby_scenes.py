@@ -7,6 +7,7 @@ others, which no such law gives, are made anew beside it, with as many points.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -39,7 +40,6 @@ STEP, USUAL = 2e-3, {"mm": 10.0, "deg": 20.0, "T": 1.0, "m_s2": 9.81}
 # The same where a table is made anew, by a difference of second order: of losses what its points leave is smooth over
 # this, and of mutual magnetisation it leaves 4e-7 of a derivative
 WIDE = {"mutual": 1e-3, "losses": 0.02}
-SHARED = 0.1  # Part of a step to both sides at which the rotor's share of a plate's signals is differenced
 # Steps, weights of fourth order, and of second order
 CENTRAL = ((1, 2 / 3, 1 / 2), (-1, -2 / 3, -1 / 2), (2, -1 / 12, 0.0), (-2, 1 / 12, 0.0))
 # Where a number has an end
@@ -87,20 +87,21 @@ class NearbyScenes:
 
     def around(self, key: str) -> list[Nearby]:
         """Equations about a number; on one side of it where it may not grow or shrink."""
+        return [
+            Nearby(offset, weight, lower, self.at(scene, {key: offset}))
+            for offset, weight, lower, scene in self._scenes(key)
+        ]
+
+    def _scenes(self, key: str) -> list[tuple[float, float, float, Scene]]:
+        """Offsets of a number, weights of their differences of fourth and of second order, and the scenes."""
         value = self.numbers[key]
         step = self.step(key, value)
-        for steps, sign in ((CENTRAL, 1), (FORWARD, 1), (FORWARD, -1)):
-            try:
-                scenes = {k: changed(self.scene, {key: value + sign * k * step}) for k, _, _ in steps}
-            except SceneError:
-                continue
-            return [
-                Nearby(
-                    sign * k * step, sign * weight / step, sign * lower / step,
-                    self.at(scenes[k], {key: sign * k * step}),
-                )
-                for k, weight, lower in steps
-            ]  # fmt: skip
+        for steps, sign in ((CENTRAL, step), (FORWARD, step), (FORWARD, -step)):
+            with suppress(SceneError):
+                return [
+                    (k * sign, weight / sign, lower / sign, changed(self.scene, {key: value + k * sign}))
+                    for k, weight, lower in steps
+                ]
         raise InputError(f"Input {key} must have room to change for a derivative; instead it has none.")
 
     @cached_property
@@ -202,21 +203,18 @@ class NearbyScenes:
         table = self.levitation.table
         if not wanted or memory is None or requested is None or not isinstance(table, RotorTable):
             return
-        others, widths = list[tuple[Plate, RotorTable]](), list[float]()
+        others, weights = list[tuple[Plate, RotorTable]](), list[list[float]]()
         for key in wanted:
-            step = SHARED * self.step(key, self.numbers[key])
-            try:
-                ends = [changed(self.scene, {key: self.numbers[key] + sign * step}) for sign in (1, -1)]
-            except SceneError:  # it has an end here
-                ends, step = [changed(self.scene, {key: self.numbers[key] + step}), self.scene], step / 2
-            widths.append(2 * step)
-            for scene in ends:
+            scenes = self._scenes(key)
+            weights.append([weight for _, weight, _, _ in scenes])
+            for *_, scene in scenes:
                 assert scene.plate is not None
                 others.append((replace(memory.plate, body=scene.plate.body), changed_table(table, scene.rotor)))
         note("The rotor's share of the plate's currents by what moves both ...")
         found = requested.changed_shares((memory.table, memory.share), others, note)
-        for key, width, above, below in zip(wanted, widths, found[::2], found[1::2], strict=True):
-            self._shares[key] = (above - below) / width
+        ends = np.cumsum([len(row) for row in weights])
+        for key, row, some in zip(wanted, weights, np.split(found, ends[:-1]), strict=True):
+            self._shares[key] = np.asarray(np.tensordot(row, some, 1))
 
     def _ends_of(self, name: str, key: str, base: Any, make: Callable[[Scene], Any]) -> tuple[Any, Any, float]:
         """Tables that are made a `WIDE` step to both sides of a number, and the way between."""
