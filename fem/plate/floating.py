@@ -95,9 +95,15 @@ class AxialPotential:
         """A (n, 3), T m, at points (n, 3), m."""
         x, y, square, place = self._scaled(points)
         rows, columns = self.coefficients.shape
-        across = np.polynomial.chebyshev.chebvander(square, rows - 1) @ self.coefficients
+        if not np.array_equal(square, self._last[0]):  # most often the same points as before, at another height
+            self._last[:] = square, np.polynomial.chebyshev.chebvander(square, rows - 1) @ self.coefficients
+        across = self._last[1]
         along = np.einsum("nl,nl->n", across, np.polynomial.chebyshev.chebvander(place, columns - 1))
         return np.stack([-y * along, x * along, 0 * along], axis=1)
+
+    @cached_property
+    def _last(self) -> list[Array]:
+        return [np.zeros(0), np.zeros(0)]
 
     @cached_property
     def _derivatives(self) -> Array:
@@ -189,6 +195,28 @@ class FloatingModes:
         """G I, (dG/dz) I and G dI/dt (states,) at a height (m), of currents (sources,) A and their rates, A/s."""
         flux, slope = self.flux(height)
         return flux @ now, slope @ now, flux @ change
+
+    def passing(self, way: Array, speed: float) -> tuple[Array, Array]:
+        """Currents that a steady way past the sources leaves, and the fluxes there.
+
+        Exact for fluxes that change steadily from place to place.
+
+        Parameters
+        ----------
+        way : (n,) m, places as of `heights`, at equal distances; there are no currents at the first
+        speed : m/s; the first source has 1 A
+
+        Returns
+        -------
+        x (n, states), √J, and G and its derivative along the way (n, 2, states, sources), √J/A: x G' is the drag, x by
+        the difference of two sources' G the force along what parts them.
+        """
+        fluxes = np.array([self.flux(place) for place in way])
+        lasts = self.rates * (way[1] - way[0]) / speed
+        own = [np.zeros(len(lasts))]
+        for change in np.diff(fluxes[:, 0, :, 0], axis=0):
+            own.append(np.exp(-lasts) * own[-1] + np.expm1(-lasts) / lasts * change)
+        return np.array(own), fluxes
 
     def mean_force(self, height: float, amplitudes: Array, frequencies: Array) -> float:
         """Force (N) upwards at rest, in the mean of a period.

@@ -13,7 +13,6 @@ Reitz, J. Appl. Phys. 41, 2067 (1970)), whose drag is (μ0² σ m²/128π) (h⁻
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -46,7 +45,9 @@ from . import showing
 from .plates import FREQUENCIES, compute_line, measured_line, team7_mesh
 
 DURATION, GRAVITY = 1.72, 9.81
+GAUSS = 5e-7  # Half of the last digit of problem 7's table, T
 SETTLED = 1.5  # Time (s) from which the measured disc rests, to the tenth of a millimetre of its table
+READING, TABLES = (5e-5, 5e-5), 100  # Half of the last digit of its times (s) and heights (m); tables that are drawn
 PHASES = 12  # Start phases of the current that are tried, in half a turn: the force has twice its frequency
 COPPER, ALUMINIUM = 5.96e7, 3.4e7  # S/m
 WARMING = 4e-3  # Part of its resistivity that aluminium gains in a kelvin at room temperature
@@ -157,7 +158,20 @@ def swing(time: Array, height: Array) -> tuple[float, float]:
     return float(np.diff(fine[tops]).mean()), float(-slope)
 
 
-Row = tuple[str, str, float, float, float, str]  # name, kind, measured, computed, our error, unit
+# Name, kind, measured, computed, our error, unit, the error of what was measured and where that is from
+Row = tuple[str, str, float, float, float, str, float, str]
+EXACT = (0.0, "exact")
+TABLE = "half of the last digit of the published table, which has no error"
+
+
+def swing_errors(time: Array, height: Array) -> Array:
+    """Standard deviations of what `swing` makes of readings (n,) that are off by up to half of their last digits."""
+    draw, (late, high) = np.random.default_rng(0), READING
+    swings = [
+        swing(time + draw.uniform(-late, late, len(time)), height + draw.uniform(-high, high, len(time)))
+        for _ in range(TABLES)
+    ]
+    return np.std(swings, axis=0)
 
 
 def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
@@ -176,10 +190,12 @@ def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     our_period, our_decay = swings[best].tolist()
     # they depend on where the motion begins, and the phase at which it does is not recorded
     of_period, of_decay = (np.ptp(swings, axis=0) / 2).tolist()
+    read_period, read_decay = swing_errors(time, measured).tolist()
+    drawn = f"{TABLE}: standard deviation of {TABLES} tables with readings so far off"
     rows: list[Row] = [
-        ("TEAM 28: height at rest", "measurement", rest, computed, abs(computed * modes.error), "m"),
-        ("TEAM 28: period", "measurement", period, our_period, of_period, "s"),
-        ("TEAM 28: decay rate", "measurement", decay, our_decay, of_decay, "1/s"),
+        ("TEAM 28: height at rest", "measurement", rest, computed, abs(computed * modes.error), "m", READING[1], TABLE),
+        ("TEAM 28: period", "measurement", period, our_period, of_period, "s", read_period, drawn),
+        ("TEAM 28: decay rate", "measurement", decay, our_decay, of_decay, "1/s", read_decay, drawn),
     ]
     changes, shifts = zip(*_sensitivities(scene, modes, quick), strict=True)
     data = {
@@ -198,7 +214,7 @@ def spinning_sphere(quick: bool) -> list[Row]:
     upright = [HomogeneousField(np.array([0.0, 0.0, 1.0]))]
     rough, found = (complex(solve_eddy(mesh, order, frequency, upright).couplings[0, 0]) for order in (3, 4))
     exact, name = complex(polarizability(radius, ALUMINIUM, frequency)), "sphere that spins in a uniform field: torque"
-    return [(name, "closed form", -exact.imag, -found.imag, abs(found - rough), "N m/T²")]
+    return [(name, "closed form", -exact.imag, -found.imag, abs(found - rough), "N m/T²", *EXACT)]
 
 
 def losses(quick: bool) -> list[Row]:
@@ -214,7 +230,7 @@ def losses(quick: bool) -> list[Row]:
     ):  # fmt: skip
         made = plate_reaction(Plate(body, metal), [[0.0, 0.0, at]], frequency, 1e-3)
         size, found = float(made.error_estimate[0] * abs(exact)), complex(made.tensors[0, 2, 2])
-        rows.append((f"dipole {name}, 50 Hz: loss", kind, -exact.imag, -found.imag, size, "T/(A m²)"))
+        rows.append((f"dipole {name}, 50 Hz: loss", kind, -exact.imag, -found.imag, size, "T/(A m²)", *EXACT))
     return rows
 
 
@@ -260,7 +276,7 @@ def falling_magnet() -> tuple[Row, ConductorMotion]:
     exact = brentq(lambda v: moment**2 * tube_drag(inner, outer, COPPER, v) - weight, 1e-3, 1.0)
     name = "magnet that falls in a copper tube: terminal speed"
     uneven = float(np.ptp(motion.velocity[middle, 2])) / 2  # along an endless tube the speed is the same
-    return (name, "series", float(exact), speeds[1], abs(speeds[1] - speeds[0]) + uneven, "m/s"), motion
+    return (name, "series", float(exact), speeds[1], abs(speeds[1] - speeds[0]) + uneven, "m/s", *EXACT), motion
 
 
 SMCO = (0.85, 1.05)  # Remanence of SmCo₅, T, by the makers' data; the one that fell was not measured
@@ -269,7 +285,7 @@ SMCO = (0.85, 1.05)  # Remanence of SmCo₅, T, by the makers' data; the one tha
 def measured_fall(quick: bool) -> list[Row]:
     """A SmCo magnet of 9.3 g, 12 mm wide and 10 mm high, took 12.3 s for a metre of copper tube of 13 and 15 mm.
 
-    J. Íñiguez et al., Eur. J. Phys. 25, 593 (2004). The error is what the remanence's range makes.
+    J. Íñiguez et al., Eur. J. Phys. 25, 593 (2004). Our error is what the remanence's range makes.
     """
     radius, height, mass, inner, outer = 6e-3, 10e-3, 9.3e-3, 6.5e-3, 7.5e-3
 
@@ -283,7 +299,8 @@ def measured_fall(quick: bool) -> list[Row]:
 
     slow, fast = speed(SMCO[1]), speed(SMCO[0])
     name = "SmCo magnet that falls in a copper tube: speed"
-    return [(name, "measurement", 1.0 / 12.3, speed(sum(SMCO) / 2), (fast - slow) / 2, "m/s")]
+    read = 0.05 / 12.3**2, "half of the last digit of the published time, which has no error"
+    return [(name, "measurement", 1.0 / 12.3, speed(sum(SMCO) / 2), (fast - slow) / 2, "m/s", *read)]
 
 
 @dataclass(frozen=True)
@@ -304,10 +321,10 @@ def plate_drag(quick: bool) -> list[Row]:
     body, height, frequency = Box(np.array([0.4, 0.4, 0.03])), 0.01, 1e-3
     place = np.array([0.0, 0.0, body.half_edges[2] + height])
     mesh = plate_mesh(body, ALUMINIUM, place, frequency, MeshRule(skin_share=1.0))
-    found = solve_eddy(mesh, 3, frequency, [_Moving(place)]).couplings[0, 0]
+    found = solve_eddy(mesh, 2 if quick else 3, frequency, [_Moving(place)]).couplings[0, 0]
     exact = MU_0**2 * ALUMINIUM / (128 * np.pi) * (height**-3 - (height + body.size[2]) ** -3)
     drag, name = float(-found.imag / (2 * np.pi * frequency)), "dipole that slides over a thick plate: slow drag"
-    return [(name, "closed form", float(exact), drag, 1e-3 * float(exact), "N s/m/(A m²)²")]
+    return [(name, "closed form", float(exact), drag, 1e-3 * float(exact), "N s/m/(A m²)²", *EXACT)]
 
 
 def lift_and_drag(quick: bool) -> list[Row]:
@@ -322,22 +339,17 @@ def lift_and_drag(quick: bool) -> list[Row]:
     for rule in (MeshRule(), MeshRule(distance_share=0.8)):
         mesh = plate_mesh(body, ALUMINIUM, np.stack([way, 0 * way, 0 * way + above], axis=1)[::500], 50.0, rule)
         modes = modes_along(mesh, passing, (-travel, travel), 50.0, 1e-4, 2, 40)
-        fluxes = np.array([modes.flux(x) for x in way])  # (ways, G and dG/dx, states, heights)
-        lasts = modes.rates * (way[1] - way[0]) / speed
-        own, forces = np.zeros(len(lasts)), []
-        for before, after in pairwise(fluxes[:, 0, :, 0]):
-            own = np.exp(-lasts) * own + np.expm1(-lasts) / lasts * (after - before)
-            forces.append(own)
-        own = np.array(forces[-1000:-300])  # from where its beginning is forgotten to where the edge is near
-        drag = -np.einsum("ns,ns->n", own, fluxes[-1000:-300, 1, :, 0])
-        lift = np.einsum("ns,ns->n", own, np.diff(fluxes[-1000:-300, 0], axis=2)[..., 0] / step)
+        own, fluxes = (part[-1000:-300] for part in modes.passing(way, speed))
+        # from where its beginning is forgotten to where the edge is near
+        drag = -np.einsum("ns,ns->n", own, fluxes[:, 1, :, 0])
+        lift = np.einsum("ns,ns->n", own, np.diff(fluxes[:, 0], axis=2)[..., 0] / step)
         found.append([drag.mean(), lift.mean()])
         ranges.append([np.ptp(drag), np.ptp(lift)])
     names = (f"dipole that passes over a plate at 5 m/s: {force}" for force in ("drag", "lift"))
     errors = abs(np.diff(found, axis=0)[0]) + ranges[1]
     known = drag_and_lift(Slab(ALUMINIUM, thickness), height, speed)
     return [
-        (name, "closed form", *numbers, "N/(A m²)²")
+        (name, "closed form", *numbers, "N/(A m²)²", *EXACT)
         for name, *numbers in zip(names, known, found[1], errors, strict=True)
     ]
 
@@ -350,7 +362,7 @@ def team7(quick: bool) -> list[Row]:
     mesh = team7_mesh(frequency)
     rough, found = (float(compute_line(frequency, x, mesh, n)[k, column % 2]) for n in (order - 1, order))
     name = "TEAM 7: largest B_z on the line"
-    return [(name, "measurement", float(measured[k, column]), found, abs(found - rough), "T")]
+    return [(name, "measurement", float(measured[k, column]), found, abs(found - rough), "T", GAUSS, TABLE)]
 
 
 COLUMNS: Columns = {
@@ -360,6 +372,8 @@ COLUMNS: Columns = {
     "computed": (("experiment",), "SI", "computed"),
     "error": (("experiment",), "SI", "estimated error of the computation"),
     "unit": (("experiment",), "", "unit"),
+    "measured_error": (("experiment",), "SI", "error of what was measured"),
+    "measured_error_from": (("experiment",), "", "where that is from"),
 }
 TRAJECTORY: Columns = {
     "measured_height": (("time",), "m", "measured height"),
@@ -404,7 +418,7 @@ def gather(parts: Sequence[xr.Dataset]) -> xr.Dataset:
 
 def measured_numbers(result: xr.Dataset) -> dict[str, Any]:
     """For JSON."""
-    keys = ("name", "kind", "unit", "measured", "computed", "error")
+    keys = "name", "kind", "unit", "measured", "measured_error", "measured_error_from", "computed", "error"
     rows = zip(*(result[key].values.tolist() for key in keys), strict=True)
     found: dict[str, Any] = {"experiments": [dict(zip(keys, row, strict=True)) for row in rows]}
     if "rms" not in result:  # problem 28 failed
@@ -431,9 +445,11 @@ def _measured_lines(result: xr.Dataset) -> list[str]:
     for row in found["experiments"]:
         off = 100 * (row["computed"] / row["measured"] - 1)
         lines.append(
-            f"  {row['name']:46} {row['kind']:12} {row['measured']:11.5g} computed {row['computed']:11.5g} "
-            f"± {row['error']:.1g} {row['unit']} ({off:+.3g} %)"
+            f"  {row['name']:46} {row['kind']:12} {row['measured']:11.5g} ± {row['measured_error']:<7.1g} computed "
+            f"{row['computed']:11.5g} ± {row['error']:.1g} {row['unit']} ({off:+.3g} %)"
         )
+    told = dict.fromkeys(row["measured_error_from"] for row in found["experiments"] if row["measured_error"])
+    lines += [f"Errors of measurements: {said}." for said in told]
     if "team28" not in found:
         return lines
     own = found["team28"]
@@ -454,7 +470,7 @@ def _measured_lines(result: xr.Dataset) -> list[str]:
 
 @showing.drawn
 def measured_figure(result: xr.Dataset) -> Figure:
-    """Problem 28's height, and every experiment's deviation with the estimated error of the computation."""
+    """Problem 28's height, and every experiment's deviation with the errors of computation and measurement."""
     figure, ((left, right),) = panels(1, 2, 3.0)
     for name, look in (("measured", {"marker": "o", "ls": "", "ms": 2}), ("computed", {"lw": 0.9})):
         if "rms" in result:
@@ -462,8 +478,11 @@ def measured_figure(result: xr.Dataset) -> Figure:
             left.plot(result["time"], 1e3 * result[f"{name}_height"], color=color, label=name, **look)
     left.set(xlabel="time (s)", ylabel="height over the windings (mm)")
     off = 100 * (result["computed"] / result["measured"] - 1).values
-    errors = 100 * np.abs((result["error"] / result["measured"]).values)
-    right.barh(range(len(off)), off, xerr=errors, color=PALETTE[0], ecolor="0.3")
+    ours, theirs = (100 * np.abs((result[name] / result["measured"]).values) for name in ("error", "measured_error"))
+    right.barh(range(len(off)), off, color=PALETTE[0])
+    for where, size, color, name in ((off, ours, "0.3", "computation"), (0 * off, theirs, PALETTE[1], "measurement")):
+        label = {"label": f"error of the {name}"}
+        right.errorbar(where, range(len(off)), xerr=size, fmt="none", ecolor=color, capsize=2, lw=1.0, **label)
     right.set_yticks(range(len(off)), [str(name) for name in result["name"].values], fontsize=6)
     right.invert_yaxis()
     right.set_xlim(np.array([-1.4, 1.4]) * np.abs(off).max())  # an unknown remanence is a longer error than all others
@@ -476,7 +495,7 @@ MEASURED = Study(
     summary="what is computed beside what was measured or is known in closed form, one row an experiment",
     points=lambda quick: [{"experiment": name, "quick": quick} for name in (TEAM28_NAME, *EXPERIMENTS)],
     quick="ten of twelve phases of the current, changes that need other modes; TEAM 28 by order 3 instead of 4, "
-    "TEAM 7 by order 2 instead of 3; drag and lift at speed",
+    "TEAM 7 and the slow drag by order 2 instead of 3; drag and lift at speed",
     compute=compute,
     gather=gather,
     figures={"measured": measured_figure},
