@@ -30,7 +30,7 @@ from ..motion.state import matrices_of, quaternions_of, rotation_of
 
 FAST = 40.0  # Rate over the highest angular frequency of a current from which a mode follows at once
 LOWEST = 50.0  # Frequency (Hz) of which coils count at least: of steady ones the motion alone drives currents
-TOLERANCE = 2e-6  # Of the integration: heights are then right to 1e-10 m, and energies balance to 1e-8
+TOLERANCE = 2e-7  # Of the integration: heights are then right to 1e-12 m, and energies balance to 1e-8
 SMALL = 1e-3  # Height and its rate that absolute errors are relative to, in the height over the coils
 LEAST, FARTHEST = 0.5, 8.0  # Range of heights over the coils that is precomputed, in the one where a motion begins
 RASTER = 1e-4  # Ends of that range are multiples of this, m, so that motions that begin alike share it

@@ -171,7 +171,7 @@ def swing_errors(time: Array, height: Array) -> Array:
         swing(time + draw.uniform(-late, late, len(time)), height + draw.uniform(-high, high, len(time)))
         for _ in range(TABLES)
     ]
-    return np.std(swings, axis=0)
+    return np.asarray(np.std(swings, axis=0))
 
 
 def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:

@@ -23,9 +23,8 @@ from spinlev.fem.closed_forms.eddy_bodies import thin_field_torque
 from spinlev.fem.plate.eddy import solve_eddy
 from spinlev.fem.plate.floating import AxialPotential, _Seen, floating_modes, free_modes, sampled_poses
 from spinlev.geometry.common import InputError
-from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
-from spinlev.geometry.scene.contents import AbsoluteStart
+from spinlev.geometry.scene.contents import AbsoluteStart, Plate
 from spinlev.geometry.scene.files import parse_scene
 from spinlev.geometry.scene.making import assemble
 from spinlev.geometry.shapes import Box
@@ -99,7 +98,7 @@ def test_without_current_it_falls_onto_the_coils(modes):
     ("changes", "said"),
     [
         ({"floater": replace(SCENE.floater, conductivity=None)}, "conductivity_S_m"),
-        ({"rotor": (Magnet(Box([0.01, 0.01, 0.01]), np.zeros(3)),)}, "no rotor and no plate"),
+        ({"plate": Plate(Box([0.01, 0.01, 0.01]), 3e7)}, "plate must be left out"),
         ({"start": AbsoluteStart(np.array([0, 0, -5e-3]), np.zeros(3), np.eye(3)[2], np.zeros(3))}, "above all coils"),
     ],
 )

@@ -39,17 +39,17 @@ def test_swing_of_a_damped_oscillation():
 
 
 def test_readings_that_are_off_move_period_and_decay_as_far_as_is_told():
-    """One more draw, of a table twice as rough, deviates by twice as much in the root mean square, to a half."""
+    """The decay rate of tables twice as rough by nearly twice as much; the period by a tenth of the table's spacing."""
     time, height = measured_heights()
     told, draw, (late, high) = swing_errors(time, height), np.random.default_rng(9), READING
     rough = [
         swing(
             time + draw.uniform(-2 * late, 2 * late, len(time)), height + draw.uniform(-2 * high, 2 * high, len(time))
         )
-        for _ in range(30)
+        for _ in range(60)
     ]
-    assert np.std(rough, axis=0) == pytest.approx(2 * told, rel=0.5)
-    assert 3e-4 < told[0] < 3e-3
+    assert np.std(rough, axis=0)[1] == pytest.approx(2 * told[1], rel=0.3)
+    assert told[0] == pytest.approx(0.1 * np.diff(time).mean(), rel=0.2)
 
 
 def test_team28_is_the_published_table():
