@@ -281,7 +281,7 @@ def place_figure(result: xr.Dataset) -> Figure:
         mean = 100 * scipy.stats.binned_statistic_2d(*at, hits.astype(float), bins=(side, height)).statistic
         shades = top.pcolormesh(1e3 * side, 1e3 * height, mean.T, vmin=0, vmax=100, cmap="viridis")
         top.grid(False)
-        titled(top, f"{label}, {float(one['rotor_frequency']):.0f} Hz")
+        titled(top, f"{label}\n{float(one['rotor_frequency']):.0f} Hz")
         ends = 1e3 * height[[-1, 0]]
         top.set(xlabel="lateral offset (mm)", ylim=ends)
         lean = np.digitize(np.degrees(one["lean"].values), edges) - 1

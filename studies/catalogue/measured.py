@@ -448,8 +448,8 @@ def _measured_lines(result: xr.Dataset) -> list[str]:
             f"  {row['name']:46} {row['kind']:12} {row['measured']:11.5g} ± {row['measured_error']:<7.1g} computed "
             f"{row['computed']:11.5g} ± {row['error']:.1g} {row['unit']} ({off:+.3g} %)"
         )
-    told = dict.fromkeys(row["measured_error_from"] for row in found["experiments"] if row["measured_error"])
-    lines += [f"Errors of measurements: {said}." for said in told]
+    sources = dict.fromkeys(row["measured_error_from"] for row in found["experiments"] if row["measured_error"])
+    lines += [f"Errors of measurements: {said}." for said in sources]
     if "team28" not in found:
         return lines
     own = found["team28"]
@@ -480,6 +480,7 @@ def measured_figure(result: xr.Dataset) -> Figure:
     off = 100 * (result["computed"] / result["measured"] - 1).values
     ours, theirs = (100 * np.abs((result[name] / result["measured"]).values) for name in ("error", "measured_error"))
     right.barh(range(len(off)), off, color=PALETTE[0])
+    theirs[theirs == 0] = np.nan  # closed forms and series have none
     for where, size, color, name in ((off, ours, "0.3", "computation"), (0 * off, theirs, PALETTE[1], "measurement")):
         label = {"label": f"error of the {name}"}
         right.errorbar(where, range(len(off)), xerr=size, fmt="none", ecolor=color, capsize=2, lw=1.0, **label)

@@ -173,9 +173,16 @@ def test_the_comparison_says_which_model_has_no_equilibrium():
     assert "same conditions without the plate" in line
 
 
+def beginning(start):
+    """A levitation whose trajectories begin at an equilibrium."""
+    found = SimpleNamespace(absolute=False, stability=start)
+    found.quiet = found
+    return found
+
+
 def test_a_flight_from_an_unstable_equilibrium_is_never_called_stable():
     start = equilibrium(stable=False, growth=0.09)
-    unstable = SimpleNamespace(absolute=False, stability=start)
+    unstable = beginning(start)
     time = np.linspace(0, 1.0, 400)
     resting = np.tile(start.position, (400, 1))
     places = SimpleNamespace(position=resting)
@@ -187,7 +194,7 @@ def test_a_flight_from_an_unstable_equilibrium_is_never_called_stable():
         flight_words(unstable, flight)
         == "Simulated 1 s: still levitating, with a growing oscillation (e-folding time 11.1 s)."
     )
-    at_rest = SimpleNamespace(absolute=False, stability=equilibrium())
+    at_rest = beginning(equilibrium())
     assert kind_of_flight(at_rest, flight) == "stable"
     assert "stable" not in headline(unstable, [start]).lower().replace("unstable", "")
 
