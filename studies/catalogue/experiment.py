@@ -185,6 +185,8 @@ SEED = 42
 
 def experiment_points(quick: bool) -> list[Point]:
     """The rotors of all designs, then the variants; `quick` has closed forms, four facts and two variants."""
+    import dynesty  # noqa: F401  # where it is missing, that is said before anything is computed
+
     rotors = [point for design in _designs(SETTINGS[quick], True).values() for point in design]
     rotors.sort(key=lambda point: point["number"])  # kinds in turn: processes compile the code of one each
     names = tuple(VARIANTS)[: 2 if quick else None]
