@@ -19,8 +19,7 @@ from ..dynamics.flights.conductor import (
     room_over,
     sources_of,
 )
-from ..fem.closed_forms.coil import CoilField, Filaments
-from ..fem.harmonics.solid import tensors
+from ..fem.closed_forms.coil import coils_field
 from ..fem.plate.floating import FloatingModes, FreeModes, cached_floating_modes
 from ..geometry.common import Array
 from ..geometry.scene.contents import Scene
@@ -39,27 +38,9 @@ COLUMNS: Columns = {
 }
 
 
-STEP = 1e-4  # m, of the differences for a coil's gradient, of fourth order: 1e-6 of it from a few mm off the winding on
-
-
 def coils_at_start(scene: Scene, points: Array) -> tuple[Array, Array]:
     """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m of a scene's coils at points (n, 3) m at t = 0, also in their windings."""
-    if not scene.coils:
-        return np.zeros_like(points), np.zeros((len(points), 3, 3))
-    currents = np.array([float(coil.amperes(0.0)) for coil in scene.coils])
-    near, size = np.zeros(len(points), bool), max(max(coil.width, coil.height) for coil in scene.coils)
-    for coil in scene.coils:
-        x, y, z = (points - coil.center).T
-        beyond = np.abs([np.hypot(x, y) - coil.radius, z]) - np.array([[coil.width], [coil.height]]) / 2
-        near |= np.hypot(*np.maximum(beyond, 0.0)) < size
-    found, slopes = np.zeros_like(points), np.zeros((len(points), 3, 3))
-    filaments = Filaments.of(scene.coils, size / 3)  # 1e-8 of the field from three times as far
-    found[~near], slopes[~near] = tensors(filaments.derivatives(points[~near], 2, currents))
-    field = CoilField(scene.coils, currents.tolist())
-    ends = [field.flux_density(points[near] + s * STEP * axis) for axis in np.eye(3) for s in (2, 1, -1, -2)]
-    steep = np.tensordot([-1, 8, -8, 1], np.reshape(ends, (3, 4, -1, 3)), (0, 1)) / (12 * STEP)
-    found[near], slopes[near] = field.flux_density(points[near]), np.moveaxis(steep, 0, -1)
-    return found, slopes
+    return coils_field(scene.coils, np.array([float(coil.amperes(0.0)) for coil in scene.coils]), points)
 
 
 def modes_of(scene: Scene, rtol: float = 1e-3) -> tuple[FloatingModes | FreeModes, bool]:

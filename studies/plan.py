@@ -88,7 +88,7 @@ def given_scene(scene: SceneLike) -> Scene:
 def levitating_scene(scene: SceneLike) -> Scene:
     """A scene of one floater below a rotor, as `given_scene` has it.
 
-    Raises InputError: it has coils, or several floaters, of which trajectories alone are computed.
+    Raises InputError: it has coils and no rotor, or several floaters, of which trajectories alone are computed.
     """
     found = given_scene(scene)
     if found.carried_by_coils:

@@ -36,13 +36,14 @@ from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Coil
 from ..compiled_code import compiled
 from ..harmonics.expressions import UPPER, FieldExpressions, differentiated, whole_gradient
-from ..harmonics.solid import entries, gauss_legendre
+from ..harmonics.solid import entries, gauss_legendre, tensors
 
 NODES, CROWD = 24, 3  # Gauss points on either side of a point's radius, and the power by which they crowd there
 NEAR_AXIS = 0.05  # h² below which the integral of the sheet is a sum over equidistant angles: 1/h² would cancel
 ANGLES = np.pi / 2 * (np.arange(16) + 0.5) / 16
 LEAST = 1e-30  # Parameter of R_J in place of zero, where its factor is zero
 BLOCK = 20_000  # Points at a time
+STEP = 1e-4  # m, of the differences for slopes near a winding, of fourth order
 MEANS = 4  # of the arithmetic-geometric mean: 1e-12 of a filament's field from a fifth of its radius on
 FILAMENT_ERROR = 1e-4  # By which the filaments' number is chosen where a floater touches the winding; it is 1e-5
 
@@ -197,6 +198,26 @@ class Filaments:
         return found
 
 
+def coils_field(coils: Sequence[Coil], currents: Array, points: Array) -> tuple[Array, Array]:
+    """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m anywhere, for currents (coils,) A in each turn.
+
+    By the closed forms nearer to a winding than it is wide or high, with slopes by differences, to 1e-6 from a few mm
+    off it on; by filaments farther off, to 1e-8 and a hundred times as fast.
+    """
+    found, slopes = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
+    if not coils:
+        return found, slopes
+    size = max(max(coil.width, coil.height) for coil in coils)
+    near = np.any([coil.body.distance(points) < size for coil in coils], axis=0)
+    filaments = Filaments.of(coils, size / 3)  # 1e-8 from three times as far on
+    found[~near], slopes[~near] = tensors(filaments.derivatives(points[~near], 2, currents))
+    field, here = CoilField(coils, currents.tolist()), points[near]
+    ends = [field.flux_density(here + s * STEP * axis) for axis in np.eye(3) for s in (2, 1, -1, -2)]
+    steep = np.tensordot([-1, 8, -8, 1], np.reshape(ends, (3, 4, len(here), 3)), (0, 1)) / (12 * STEP)
+    found[near], slopes[near] = field.flux_density(here), np.moveaxis(steep, 0, -1)
+    return found, slopes
+
+
 def _filament(square: hy.expression, height: hy.expression, radius: Any, current: Any) -> hy.expression:
     """A_φ/ρ of a filament (T) at ρ² and ζ (m)."""
     size = radius * radius
@@ -216,10 +237,10 @@ def _field_of(
     source: hy.expression, position: Sequence[hy.expression], square: hy.expression, height: hy.expression
 ) -> FieldExpressions:
     """B and its gradient of A_φ/ρ, a function of the variables `square` and `height`, at a position from its axis."""
-    tensors = hy.diff_tensors([source], diff_args=[square, height], diff_order=2)
+    series = hy.diff_tensors([source], diff_args=[square, height], diff_order=2)
     x, y, z = position
     here = {square: x * x + y * y, height: z}
-    a, s, z_, ss, sz = hy.subs([tensors[0, *k] for k in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1))], here)
+    a, s, z_, ss, sz = hy.subs([series[0, *k] for k in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1))], here)
     rho = here[square]
     field = [-x * z_, -y * z_, 2.0 * (a + rho * s)]
     up = 4.0 * (2.0 * s + rho * ss)

@@ -26,9 +26,10 @@ from .tables import CHANGED, DRIVEN, SLAB, changed_shares, deciding, plate_and_r
 
 NEGLIGIBLE = 1e-6  # Part of the floater's weight below which the largest conceivable force of the plate is left out
 REACH = 0.003  # The floater may move so far from where it begins, along each axis, m
-# Centres of regions are multiples of the first and halves of their widths odd multiples of the second, m, so that
-# scenes that differ little share a table: with `REACH` to each side those whose places are nearest to one centre.
-CENTERS, HALVES = 0.004, 0.001
+RASTER = 0.001  # Bounds of regions are multiples of this, m, so that scenes that differ little share a table
+# So are centres of those about an equilibrium of this, with odd halves: with `REACH` to each side all that are nearest
+# to one centre share a table.
+CENTERS = 0.004
 # Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold.
 LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
 # How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
@@ -173,7 +174,7 @@ def plate_around(
     if region is None:
         sideways = float(np.hypot(place[0], place[1])) + REACH
         region = reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius)
-        region = _rastered(region, plate, radius)
+        region = _rastered(region, plate, radius, shared=True)
     highest = HIGHEST * 2.0 ** max(0, math.ceil(math.log2(HARMONICS * max(frequency, 1.0) / HIGHEST) - 1e-9))
     return PlateAround(plate, model, table, region, (LOWEST, highest), rtol)
 
@@ -205,13 +206,13 @@ def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, rad
                 f"instead received {np.round(center * 1e3, 6).tolist()}, {max(beyond[axis], 0) * 1e3:.4g} mm from "
                 "them. Move the plate away."
             )
-        _cut(lower, upper, axis, middle[axis], half[axis] + radius)
+        _cut(lower, upper, axis, middle[axis], half[axis] + radius, bool(apart[0, axis] > 0))
     return Region(lower, upper)
 
 
-def _cut(lower: Array, upper: Array, axis: int, middle: float, clear: float) -> None:
-    """Move the bound (3,) m of a region that faces a plate's body away until it is `clear` (m) of its middle."""
-    if lower[axis] + upper[axis] > 2 * middle:
+def _cut(lower: Array, upper: Array, axis: int, middle: float, clear: float, above: bool) -> None:
+    """Move the bound (3,) m of a region `above` a plate's body, or below, until it is `clear` (m) of its middle."""
+    if above:
         lower[axis] = max(lower[axis], middle + clear)
     else:
         upper[axis] = min(upper[axis], middle - clear)
@@ -259,19 +260,23 @@ def rotor_nearby(
     return shortened_table(table, Accuracy(rtol, max(gap, radius)))
 
 
-def _rastered(region: Region, plate: Plate, radius: float) -> Region:
-    """The region with bounds on a raster, but not nearer to the face that it lies over than `SKIN` radii (m).
+def _rastered(region: Region, plate: Plate, radius: float, shared: bool = False) -> Region:
+    """The region with bounds on the raster, but not nearer to the face that it lies over than `SKIN` radii (m).
 
-    What is nearly symmetric becomes so, which halves the work.
+    What is nearly symmetric becomes so, which halves the work. To be `shared` it has its centre on a raster as well.
     """
-    middle = CENTERS * np.round(region.center / CENTERS)
-    half = np.maximum(region.upper - middle, middle - region.lower) / HALVES
-    half = HALVES * (2 * np.ceil((half - 1) / 2 - 1e-6) + 1)
-    lower, upper = middle - half, middle + half
+    lower, upper = np.floor(region.lower / RASTER + 1e-6), np.ceil(region.upper / RASTER - 1e-6)
+    if shared:
+        step = CENTERS / RASTER
+        middle = step * np.round(region.center / CENTERS)
+        half = 2 * np.ceil((np.maximum(upper - middle, middle - lower) - 1) / 2) + 1
+        lower, upper = middle - half, middle + half
     for axis in np.flatnonzero((lower < 0) & (upper > 0)):
         upper[axis] = max(-lower[axis], upper[axis])
         lower[axis] = -upper[axis]
-    for middle, half in plate.body.blocks:
-        facing = int(np.argmax(np.maximum(lower - middle, middle - upper) - half))
-        _cut(lower, upper, facing, middle[facing], half[facing] + SKIN * radius)
+    lower, upper = lower * RASTER, upper * RASTER
+    for center, size in plate.body.blocks:  # a thin one may be within the raster: the region itself says where it is
+        facing = int(np.argmax(np.maximum(region.lower - center, center - region.upper) - size))
+        above = bool(region.center[facing] > center[facing])
+        _cut(lower, upper, facing, center[facing], size[facing] + SKIN * radius, above)
     return Region(lower, upper)

@@ -1,18 +1,16 @@
 """Field of a round coil: against loops over its cross-section, its own curl, and the dipole that it is far off."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import heyoka as hy
 import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
 
-from spinlev.fem.closed_forms.coil import CoilField, Filaments
+from spinlev.fem.closed_forms.coil import CoilField, Filaments, coils_field
 from spinlev.fem.harmonics.solid import tensors
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.scene.contents import Coil
-from spinlev.studies.coils import coils_at_start
 
 COIL = Coil(np.array([0.01, -0.02, 0.005]), 0.041, 0.028, 0.052, 960.0, 1.0)
 FIELD = CoilField([COIL])
@@ -97,15 +95,14 @@ def test_expressions_of_filaments_are_what_is_evaluated():
     np.testing.assert_allclose(function(np.ascontiguousarray(points.T)).T, expected, rtol=1e-12, atol=1e-18)
 
 
-def test_the_field_of_a_scene_is_the_closed_forms_near_windings_and_that_of_filaments_far_off():
+def test_the_field_of_coils_is_the_closed_forms_near_windings_and_that_of_filaments_far_off():
     """At both sides of the distance from which filaments are taken, and with no point at all."""
-    size, coil = max(COIL.width, COIL.height), replace(COIL, current=2.0)
-    scene = SimpleNamespace(coils=[coil])
+    size = max(COIL.width, COIL.height)
     away = np.array([0.0, 0.3, 0.99, 1.01, 4.0]) * size
     points = COIL.center + np.stack([COIL.radius + COIL.width / 2 + away, 0 * away, 0 * away], axis=1)
-    b, slopes = coils_at_start(scene, points)
-    field = CoilField([coil], [2.0])
+    b, slopes = coils_field([COIL], np.array([2.0]), points)
+    field = CoilField([COIL], [2.0])
     np.testing.assert_allclose(b, field.flux_density(points), atol=1e-8 * np.abs(b).max())
     ends = [field.flux_density(points[1:] + s * np.array([0.0, 0.0, 1e-5])) for s in (1, -1)]
     np.testing.assert_allclose(slopes[1:, :, 2], (ends[0] - ends[1]) / 2e-5, atol=1e-5 * np.abs(slopes).max())
-    assert coils_at_start(scene, points[:0])[1].shape == (0, 3, 3)
+    assert coils_field([COIL], np.array([2.0]), points[:0])[1].shape == (0, 3, 3)

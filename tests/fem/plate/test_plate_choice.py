@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from places import HORIZONTAL
 
-from spinlev.fem.plate.choice import resolve_plate_model
+from spinlev.fem.plate.choice import plate_around, resolve_plate_model
 from spinlev.fem.plate.eddy import plate_reaction
 from spinlev.fem.plate.slab import EDGES, Slab, edge_error, measured_edge_error, reaction_tensor
 from spinlev.geometry.scene.contents import Plate
@@ -44,6 +44,19 @@ def test_more_is_asked_of_the_slab_where_the_tolerance_is_smaller():
     wide = ((0.6, 0.6, 0.01), (0.0, 0.0, -0.04))
     assert chosen(*wide, rtol=5e-2)[0] == "slab"
     assert chosen(*wide, rtol=1e-3)[0] == "reduced"
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("gap", [1e-4, 1e-3, 2e-3, 5e-3])
+def test_the_region_over_a_thin_plate_is_at_the_floaters_side(side, gap):
+    """A floater of 0.6 mm, whose places lie within the raster of the regions."""
+    radius, plate = 3e-4, Plate(Box((0.3, 0.3, 1e-3)), 3.5e7)
+    place = np.array([2e-3, 0.0, side * (5e-4 + radius + gap)])
+    found = plate_around(plate, "slab", None, place, radius, 100.0, 1e-2).region
+    assert found.lower[2] < place[2] < found.upper[2]
+    assert side * found.center[2] > 0
+    nearest = (found.lower if side > 0 else -found.upper)[2]
+    assert 5e-4 <= nearest <= 5e-4 + radius  # but not in the plate
 
 
 def test_as_asked_or_nothing_to_model():
