@@ -72,8 +72,11 @@ class BranchPoint:
         return float(abs(leading.imag)) / (2 * np.pi * self.time_unit)
 
     def excess(self, tolerated: float) -> float:
-        """Growth beyond its error and beyond what is tolerated, 1/s."""
-        return self.growth_per_s - max(tolerated, self.doubt_per_s)
+        """Growth beyond its error and beyond what is tolerated: of their squares, 1/s².
+
+        Where two modes meet growth begins as a root, whose square is smooth.
+        """
+        return self.growth_per_s * abs(self.growth_per_s) - max(tolerated, self.doubt_per_s) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,8 @@ class Family(BalanceCurve):
         return Balance(self.rates, *self.problem(parameter))
 
     def balances(self, parameter: Array, which: Indices) -> Balance:
-        return self.balance(float(parameter[0]))
+        values, spins = zip(*map(self.problem, parameter.tolist()), strict=True)
+        return Balance(self.rates, np.array(values), np.array(spins))
 
     def solution(self, guess: Array, parameter: float) -> Array | None:
         """Unknowns (7,) of the equilibrium near a place and moment (6,) at one value of the parameter."""

@@ -173,10 +173,17 @@ def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[Sta
 
     The branch is found without a search, see `levitating_branch`, whose `table`, `rates` and errors these are.
     """
-    bare = replace(scene, plate=None)
-    near = levitating_branch(bare, table, rates, HIGHEST).near
-    start = near[len(near) // 2]
-    return stable_ranges(branch_through(bare, rates, start.state, start.parameter))
+    bare, family = replace(scene, plate=None), by_frequency(scene, rates)
+    hanging = _hanging(replace(bare, frequency=HIGHEST), table, family)
+    for steps in (LONG_STEPS, STEPS):  # of the far side nothing but where it turns is asked for
+
+        def ended(point: BranchPoint) -> bool:
+            return point.tangent[6] > 0 or rotor_gap(bare, point.position, point.state[6:9]) < 0
+
+        last = follow_branch(family, hanging, HIGHEST, SLOWEST, steps, ended)[-1]
+        if last.tangent[6] > 0 and not is_over(bare, last):
+            return stable_ranges(branch_through(bare, rates, last.state, last.parameter))
+    raise EquilibriumError(f"The levitating branch has no fold between {SLOWEST:g} and {HIGHEST:g} Hz.")
 
 
 def branch_through(scene: Scene, rates: Rates, start: Array, frequency: float, spin: float = 0.0) -> list[BranchPoint]:
@@ -303,9 +310,7 @@ def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0
             return float(point.tangent[6])
         if end.kind == CONTACT:
             return rotor_gap(scene, point.position, point.state[6:9])
-        # where two modes meet growth begins as a root: its square is smooth
-        tolerated = max(MARGINAL, point.doubt_per_s)
-        return point.growth_per_s * abs(point.growth_per_s) - tolerated**2
+        return point.excess(MARGINAL)
 
     try:
         low, high, width = measure(0.0), np.nan, TRACKED / 20
@@ -329,7 +334,7 @@ def is_over(scene: Scene, point: BranchPoint) -> bool:
 
 def levitates(point: BranchPoint) -> bool:
     """Whether no mode grows faster than what is tolerated."""
-    return point.growth_per_s <= max(MARGINAL, point.doubt_per_s)
+    return point.excess(MARGINAL) <= 0
 
 
 def _side(

@@ -34,7 +34,8 @@ class Balance:
     """Five balances as functions of five unknowns, all in scaled units, at many points in one call."""
 
     rates: Rates  # compiled rates and their derivatives
-    # their parameters, with the drag along the moment left out: (p,), or (n, p) where every point has its own
+    # their parameters, with the drag along the moment left out: (p,), or (n, p) where every point has its own, or
+    # (k n, p) where it has several
     values: Array
     spin: float | Array  # body spin s = Ω·m̂/ω, of all points or (n,)
     top: float = 0.0  # beside a rotor at rest, where s means nothing, the spin about the moment itself

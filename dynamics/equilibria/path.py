@@ -82,11 +82,11 @@ class BalanceCurve(AtRest, ABC):
         That by the parameter is a central difference, good to 1e-9; a fold is found where the other columns are
         singular, which does not depend on it.
         """
-        position, moment, parameter = points[:, :3], points[:, 3:6], points[:, 6] * self.unit
-        value, slope = self.balances(parameter, which)(position, moment)
-        ends = [self.balances(parameter + s * DIFFERENCE * self.unit, which)(position, moment)[0] for s in (1, -1)]
-        along = (ends[0] - ends[1]) / (2 * DIFFERENCE)
-        return self.extended(value, np.concatenate([slope, along[:, :, None]], axis=2), moment)
+        position, moment, n = points[:, :3], points[:, 3:6], len(points)
+        around = [(points[:, 6] + s * DIFFERENCE) * self.unit for s in (0, 1, -1)]
+        values, slopes = self.balances(np.concatenate(around), np.tile(which, 3))(position, moment)
+        along = (values[n : 2 * n] - values[2 * n :]) / (2 * DIFFERENCE)
+        return self.extended(values[:n], np.concatenate([slopes[:n], along[:, :, None]], axis=2), moment)
 
 
 @dataclass(frozen=True)

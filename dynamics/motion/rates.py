@@ -117,14 +117,17 @@ class Rates:
         position, moment : (n, 3), scaled, and the direction of the moment
         tangents : (n, 2, 3) of the moment, along which it is turned
         spin : (n,) body spins
-        values : of the parameters, (p,) for all or (n, p)
+        values : of the parameters, (p,) for all or (n, p); (k n, p) for k answers at each pose, one after the other
         still : whether the body is at rest in the rotor's frame: its spin is then that given times cos θ
         """
+        times = len(values) // max(len(position), 1) if values.ndim > 1 else 1
+        if times > 1:
+            position, moment, tangents = (np.concatenate([part] * times) for part in (position, moment, tangents))
         given = np.empty((13, len(position)))
         given[:3], given[3:6], given[12] = position.T, moment.T, spin
         given[6:12] = tangents.reshape(-1, 6).T
         function = self._still if still else self._balances
-        found = _called(function, given, self._about(position, moment, values))
+        found = _called(function, given, self._about(position, moment, values, times))
         return found[:5].T, found[5:].T.reshape(-1, 5, 5)
 
     @property
@@ -142,10 +145,10 @@ class Rates:
         found._rough = True
         return found
 
-    def _about(self, position: Array, turn: Array, values: Array) -> Array:
+    def _about(self, position: Array, turn: Array, values: Array, times: int = 1) -> Array:
         """Parameters (p, n) with those of the field and of effects about scaled positions (n, 3).
 
-        `turn` is moments (n, 3), or quaternions (n, 4) of a turning body.
+        `turn` is moments (n, 3), or quaternions (n, 4) of a turning body. Positions repeat so many `times`.
         """
         count = len(position)
         rows = np.broadcast_to(values, (count, len(Parameter)))
@@ -156,10 +159,14 @@ class Rates:
             pointing = rows[:, Parameter.POINTING_X : Parameter.POINTING_Z + 1]
             moment, quaternion = (matrices_of(turn) @ pointing[..., None])[..., 0], turn
         last, slopes = self._last
-        if field is not self._field or not np.array_equal(places, last):
+        if field is not self._field:
             slopes = field.derivatives(places, LocalField.ORDER)
-            if field is self._field:
-                self._last = places, slopes
+        else:
+            once = places[: count // times]
+            if not np.array_equal(once, last):
+                slopes = field.derivatives(once, LocalField.ORDER)
+                self._last = once, slopes
+            slopes = np.concatenate([slopes] * times) if times > 1 else slopes
         parts = [rows, places, slopes]
         if self._rough:
             parts += [np.zeros((count, part.count)) for part in self._placed]

@@ -23,6 +23,7 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
+from scipy.linalg import block_diag
 
 from ...geometry.common import MU_0, Array, InputError
 from ...geometry.magnets import Magnet
@@ -160,17 +161,15 @@ def _box_kernel(order: int) -> Any:
     return hy.cfunc(outputs, variables, fast_math=True)
 
 
-def _cuboid_derivatives(points: Array, half_edges: Array, polarization: Array, order: int) -> Array:
-    """B and its derivatives up to `order` - 1, by their `entries` (n, k), at points (n, 3) m; see `cuboid_field`."""
-    given = np.empty((6, len(points)))
-    given[:3], given[3:] = points.T, half_edges[:, None]
-    values, strength = _box_kernel(order)(given), polarization / FOUR_PI
-    spread = np.array([[strength[j] if i == k else strength[i] * (j == k) for k in range(3)] for i, j in ALL])
-    found, start = [values[:6].T @ spread], 6
-    for degree in range(2, order + 1):
-        found.append(values[start : start + 2 * degree + 3].T @ contracted(degree + 1, strength))
-        start += 2 * degree + 3
-    return np.concatenate(found, axis=1)
+def _from_kernel(polarization: Array, rotation: Array, order: int) -> Array:
+    """Matrix (k, order (order + 2)) from outputs of `_box_kernel` to `entries` along the rotor's axes, order by order.
+
+    Those of B and its derivatives; see `cuboid_field` for the polarisation (3,) T, along the columns of `rotation`.
+    """
+    strength = polarization / FOUR_PI
+    field = np.array([[strength[j] if i == k else strength[i] * (j == k) for k in range(3)] for i, j in ALL])
+    parts = block_diag(field, *(contracted(degree + 1, strength) for degree in range(2, order + 1)))
+    return parts if np.array_equal(rotation, np.eye(3)) else turned_entries(parts, rotation)
 
 
 def _difference(a: tuple[Expression, Expression], b: tuple[Expression, Expression]) -> tuple[Expression, Expression]:
@@ -283,6 +282,11 @@ class UniformField:
         return found if along is shifted else turned_field(axes, found)
 
     @cached_property
+    def _weights(self) -> dict[int, Array]:
+        """See `_from_kernel`, by order."""
+        return {}
+
+    @cached_property
     def _far(self) -> MultipoleExpansion:
         return uniform_moments(self.magnet, FAR_DEGREE)
 
@@ -302,11 +306,15 @@ class UniformField:
             assert isinstance(body, Box | Cylinder)
             local = body.to_body(points[~far])
             if isinstance(body, Box):
-                near = _cuboid_derivatives(local, body.half_edges, polarization, order)
+                if order not in self._weights:
+                    self._weights[order] = _from_kernel(polarization, body.rotation, order)
+                given, weights = np.empty((6, len(local))), self._weights[order]
+                given[:3], given[3:] = local.T, body.half_edges[:, None]
+                found[~far] = _box_kernel(order)(given)[: len(weights)].T @ weights
             else:
                 near = segments_derivatives(local, body, polarization, order)
-            turned = not np.array_equal(body.rotation, np.eye(3))
-            found[~far] = turned_entries(near, body.rotation) if turned else near
+                turned = not np.array_equal(body.rotation, np.eye(3))
+                found[~far] = turned_entries(near, body.rotation) if turned else near
         return found
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:

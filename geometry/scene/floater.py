@@ -208,17 +208,17 @@ class Floater:
         enough = np.linalg.norm(total) > DIPOLE * np.linalg.norm(moments, axis=1).sum()
         return frozen_array(total if enough else np.zeros(3), (3,))
 
-    @property
+    @cached_property
     def moment(self) -> float:
         """Size of the magnetic moment of the free body, A m², see `dipole`."""
         return float(np.linalg.norm(self.dipole))
 
-    @property
+    @cached_property
     def pointing(self) -> Array:
         """(3,) direction of the magnetic moment in its frame; its z where it has none."""
-        return self.dipole / self.moment if self.moment else np.array([0.0, 0.0, 1.0])
+        return frozen_array(self.dipole / self.moment if self.moment else [0.0, 0.0, 1.0], (3,))
 
-    @property
+    @cached_property
     def polarizability(self) -> float:
         """Moment that a uniform field of 1 T induces in a sphere of its magnets' volume, A m²."""
         return polarizability(sum(magnet.body.volume for magnet in self.magnets), self.recoil_permeability)
