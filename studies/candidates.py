@@ -278,7 +278,7 @@ class Search:
     def _followed(self, near: Candidate, begun: Array, numbers: Array) -> Candidate | None:
         try:
             levitation = self._levitation(numbers)
-            levitation.share(near.levitation, magnified=True)
+            levitation.share(near.levitation, changed=True)
             bare, step = near.bare, numbers - begun
             place, moment = bare.position, bare.state.moment
             if "ways" in near.__dict__:  # where the tangent leads

@@ -35,7 +35,7 @@ from ..fem.plate.choice import PlateAround, plate_around, rotor_nearby, wider_re
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
 from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rotor_table
-from ..fem.rotor.models import AccuracyError, changed_table, magnified as alike
+from ..fem.rotor.models import AccuracyError, changed_table, follows
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
 from ..geometry.common import Array, SpinlevError, Watch, unwatched
@@ -110,15 +110,15 @@ class Levitation:
         other.share(self)
         return other
 
-    def share(self, other: Levitation, magnified: bool = False) -> None:
+    def share(self, other: Levitation, changed: bool = False) -> None:
         """Use the tables and the compiled equations of another scene where they fit, made or yet to make.
 
-        With `magnified` also its field of a lone permeable magnet that is moved, turned, magnified or polarised more.
+        With `changed` also its field of permeable magnets, which follows what differs in them.
         """
         self._tables = other._tables
-        table, name, rotor = other.table if magnified else None, self.models.model, self.scene.rotor
-        if isinstance(table, RotorTable) and name == table.model in PERMEABLE and alike(table.magnets, rotor):
-            self._tables.once(field_key(self.scene, name, self.models.rtol), lambda: changed_table(table, rotor))
+        table, name, rotor = other.table if changed else None, self.models.model, self.scene.rotor
+        if isinstance(table, RotorTable) and name == table.model in PERMEABLE and follows(table, rotor):
+            self._tables.once(field_key(self.scene, name, self.models.rtol), lambda: changed_table(table, rotor, True))
 
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""

@@ -74,9 +74,12 @@ class BranchPoint:
     def excess(self, tolerated: float) -> float:
         """Growth beyond its error and beyond what is tolerated: of their squares, 1/s².
 
-        Where two modes meet growth begins as a root, whose square is smooth.
+        Without losses growth begins where two frequencies ω meet, as a root: ((ω₁ - ω₂)/2)² goes on smoothly as -growth².
         """
-        return self.growth_per_s * abs(self.growth_per_s) - max(tolerated, self.doubt_per_s) ** 2
+        square = self.growth_per_s * abs(self.growth_per_s)
+        if abs(self.growth_per_s) <= self.doubt_per_s:
+            square = -float(np.diff(np.sort(self.motion.eigenvalues.imag)).min() / (2 * self.time_unit)) ** 2
+        return square - max(tolerated, self.doubt_per_s) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +203,7 @@ def _marked(
         begin, step = measure(before), length
         if begin * measure(at(step)) <= 0:  # else a landed end: the change is beyond it
             root = scipy.optimize.brentq
-            step = float(root(lambda way: measure(at(way)) if way else begin, 0.0, step, xtol=1e-13, rtol=1e-12))
+            step = float(root(lambda way: measure(at(way)) if way else begin, 0.0, step, xtol=1e-12, rtol=1e-12))
         return step, replace(at(step), kind=kind)
 
     found = []

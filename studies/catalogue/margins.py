@@ -25,7 +25,7 @@ from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import changed, scene as written_scene
 from ...geometry.scene.floater import Floater
 from ...geometry.scene.making import sphere
-from ..candidates import Search
+from ..candidates import Search, survey_near
 from ..cli.console import note
 from ..cli.options import FieldModel
 from ..design import ALWAYS, GOALS, optimised
@@ -372,7 +372,10 @@ def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
                 changed(best.levitation.scene, {"rotor.recoil_permeability": article.PERMEABILITY}), "fem", rtol
             )
             if elements is not None:
-                written.share(elements.near.levitation, magnified=True)
+                written.share(elements.near.levitation, changed=True)
+            near = best.bare
+            if survey := survey_near(written, near.position[None], near.state.moment[None]):
+                written.adopt(survey)
             elements = Search(written, {key: bounds})
             true, (found,) = optimised(elements, GOALS["lowest frequency"], there)  # it is kept: a root for the measure
             row[6:] = found, true.known.distance, true.known.position_error, true.known.growth_per_s
