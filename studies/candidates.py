@@ -42,7 +42,9 @@ from .levitation import Levitation
 from .result import IN_JSON
 
 MAGNET_DENSITY = 7500.0  # kg/m³, of a rotor's magnets, whose scene file has none: sintered neodymium
-HALVES = 3  # ways to a scene that Newton's method does not reach at once are halved so often
+# Ways to a scene that Newton's method does not reach at once are halved so often, but none that is so small a part of
+# the bounds: where it leads nowhere there is a fold
+HALVES, SHORT = 3, 0.02
 DRAWS, SEED = 32, 20250708  # of scenes to begin at where the given one has no equilibrium
 
 
@@ -269,7 +271,7 @@ class Search:
         if np.array_equal(begun, numbers):
             return near
         found = self._followed(near, begun, numbers)
-        if found is not None or not halves:
+        if found is not None or not halves or np.all(np.abs(numbers - begun) < SHORT * (self.high - self.low)):
             return found
         middle = (begun + numbers) / 2
         half = self._reached(near, begun, middle, halves - 1)

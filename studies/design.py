@@ -68,7 +68,10 @@ AGAIN = 3  # designs after which ends of stability are looked for anew
 FAILED = 1e3  # what a scene without equilibrium misses everything by, so that a line search comes back
 STEPS, TOLERANCE = 60, 1e-6  # of SLSQP
 SETTLED, PATIENCE = 1e-4, 40  # part of a goal, by its size, that so many scenes must gain together
+NEARER, MISSING = 0.1, 12  # part of what limits are missed by that so many scenes must take away before one meets them
 CURVE = 81  # points of a branch that is kept
+# Models that are searched at once; and by how much limits are missed, in their sizes, with which others need no search
+SIMPLE, ROUGH = (("dipole", "none"), ("cuboid", "none")), 0.1
 Limits = Mapping[str, tuple[float, float]]
 
 
@@ -118,7 +121,10 @@ class _Problem:
             if np.isfinite(end)
         ]
         self.best: list[tuple[float, Candidate, Array]] = []  # scenes that meet all limits, with how well
-        self.kept = search.looked_at  # how many scenes were looked at when one was better by more than `SETTLED`
+        self.kept = (
+            search.looked_at
+        )  # how many scenes were looked at when one was better by more than `SETTLED` or `NEARER`
+        self.missed = np.inf  # by how much limits were missed then, before one met them
         self.nearest = np.inf, ""  # by how much the limits are missed at least, and which
 
     def _size(self, name: str) -> float:
@@ -161,11 +167,12 @@ class _Problem:
         return np.column_stack([found, np.zeros(len(found))]) if self.raised else found
 
     def objective(self, z: Array) -> float:
-        if self.best and self.search.looked_at - self.kept > PATIENCE:
+        if self.search.looked_at - self.kept > (PATIENCE if self.best else MISSING):
             raise _SettledError
         value = self.values(z, self.name)
         if value is None:
             return FAILED
+        self.keep(z)
         return float(-z[-1] if self.raised else -self.sense * value[0])
 
     def objective_by(self, z: Array) -> Array:
@@ -203,6 +210,8 @@ class _Problem:
             if not self.best or reached > self.best[-1][0]:
                 self.best.append((reached, known, self.numbers(z)))
         elif worst[0] < self.nearest[0]:
+            if not self.best and worst[0] < (1 - NEARER) * self.missed:
+                self.kept, self.missed = self.search.looked_at, worst[0]
             self.nearest = worst[0], f": {worst[1]} is {known.values(worst[1]).min():.4g} where it is nearest to them"
 
     def solved(self) -> tuple[Candidate, Array]:
@@ -224,12 +233,11 @@ class _Problem:
             constraints.append({"type": "ineq", "fun": self.above, **by})
         self.keep(z)
         with suppress(_SettledError):
-            found = scipy.optimize.minimize(
-                self.objective, z, jac=self.objective_by, constraints=constraints, callback=self.keep, method="SLSQP",
+            scipy.optimize.minimize(
+                self.objective, z, jac=self.objective_by, constraints=constraints, method="SLSQP",
                 bounds=[(0.0, 1.0)] * len(self.width) + [(None, None)] * self.raised,
                 options={"maxiter": STEPS, "ftol": TOLERANCE},
             )  # fmt: skip
-            self.keep(found.x)
         if not self.best:
             raise ComputationError(
                 f"No scene that was looked at meets all limits{self.nearest[1]}. Give wider bounds, or other limits."
@@ -251,10 +259,10 @@ def optimised(search: Search, goal: tuple[str, int], limits: Limits) -> tuple[Ca
         found, numbers = _Problem(search, goal, limits).solved()
     except ComputationError:  # as there is no margin of what is not stable, or a long step led nowhere
         search.go_on_from(*begun)
-        others = {name: ends for name, ends in limits.items() if name != "margin"}
-        decay = others.get("decay_per_s", (0.0, np.inf))
-        others["decay_per_s"] = max(decay[0], -MARGINAL / 2), decay[1]
-        _Problem(search, NO_GOAL, others).solved()  # the nearest that meets the limits
+        low, high = limits.get("decay_per_s", (0.0, np.inf))
+        stable = {"decay_per_s": (max(low, -MARGINAL / 2), high)}
+        # the nearest that meets the limits
+        _Problem(search, NO_GOAL, {k: ends for k, ends in limits.items() if k != "margin"} | stable).solved()
         found, numbers = _Problem(search, goal, limits).solved()
     for _ in range(AGAIN if "margin" in (goal[0], *limits) else 0):
         whole = Candidate(found.levitation, found.known, found.keys)
@@ -384,10 +392,25 @@ def designed(
 ) -> xr.Dataset:
     """The Dataset of `design`, for goals and limits that were checked."""
     checked_free(bounds, levitation)
+    if (levitation.models.model, levitation.models.plate_model) not in SIMPLE:
+        _check_reach(levitation, bounds, limits)
     search = Search(levitation, bounds)
     kinds = [GOALS[goal] for goal in goals]
     found = [optimised(search, kinds[0], limits)] if len(kinds) == 1 else _front(search, kinds, limits, points)
     return _dataset(search, levitation, goals, bounds, limits, [numbers for _, numbers in found])
+
+
+def _check_reach(levitation: Levitation, bounds: Mapping[str, tuple[float, float]], limits: Limits) -> None:
+    """ComputationError where not even point dipoles, of which a search takes seconds, come near the limits."""
+    quick = Levitation(levitation.scene, Models("dipole", "none", interaction="rigid"), levitation.spin)
+    known = {name: ends for name, ends in limits.items() if name not in LEAST}
+    with suppress(EquilibriumError):
+        problem = _Problem(Search(quick, bounds), NO_GOAL, known | {"decay_per_s": (-MARGINAL / 2, np.inf)})
+        try:
+            problem.solved()
+        except ComputationError as error:
+            if problem.nearest[0] > ROUGH:
+                raise ComputationError(f"{error} So it is with point dipoles, without the plate.") from None
 
 
 def _dataset(

@@ -74,11 +74,11 @@ class BranchPoint:
     def excess(self, tolerated: float) -> float:
         """Growth beyond its error and beyond what is tolerated: of their squares, 1/s².
 
-        Without losses growth begins where two frequencies ω meet, as a root: ((ω₁ - ω₂)/2)² goes on smoothly as -growth².
+        Without losses growth begins where two frequencies ω meet, as a root: ((ω₁ - ω₂)/2)² goes on as -growth².
         """
         square = self.growth_per_s * abs(self.growth_per_s)
         if abs(self.growth_per_s) <= self.doubt_per_s:
-            square = -float(np.diff(np.sort(self.motion.eigenvalues.imag)).min() / (2 * self.time_unit)) ** 2
+            square = -(float(np.diff(np.sort(self.motion.eigenvalues.imag)).min() / (2 * self.time_unit)) ** 2)
         return square - max(tolerated, self.doubt_per_s) ** 2
 
 

@@ -441,7 +441,10 @@ def follows(table: RotorTable, rotor: Rotor) -> bool:
     """Whether a `changed_table` of permeable magnets is as good as one of their own."""
     before = getattr(table, "origin", table).magnets
     return bool(magnified(before, rotor)) or (
-        table.model in ("fem", "surface") and len(before) == len(rotor) and _bear_charges(before) and _bear_charges(rotor)
+        table.model in ("fem", "surface")
+        and len(before) == len(rotor)
+        and _bear_charges(before)
+        and _bear_charges(rotor)
     )
 
 

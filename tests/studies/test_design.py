@@ -91,6 +91,17 @@ def test_limits_that_nothing_meets_are_a_failure_that_says_which():
         sl.design(SCENE, "largest margin", {"rotor.angle_deg": (9.0, 11.0)}, {"distance_mm": 25.0}, **FEW)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("models", [FEW, {"model": "fem"}], ids=["dipole", "finite elements"])
+def test_what_nothing_meets_is_said_after_few_scenes(models, monkeypatch):
+    """Below this cube the farthest equilibrium ends in a fold at 29 mm, along which a search would creep for long."""
+    looked_at, followed = [], Search._followed
+    monkeypatch.setattr(Search, "_followed", lambda *given: looked_at.append(given) or followed(*given))
+    with pytest.raises(sl.ComputationError, match=r"distance_mm is 2[89]"):
+        sl.design(SCENE, "lightest rotor", FREE, {"distance_mm": 40.0}, **models)
+    assert len(looked_at) < 200  # each takes some 0.1 s
+
+
 def test_the_command_line_writes_a_scene(tmp_path):
     (tmp_path / "scene.toml").write_text(scene_text(SCENE))
     goals = tmp_path / "goals.toml"

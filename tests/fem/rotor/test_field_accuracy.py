@@ -10,7 +10,7 @@ from spinlev.fem.closed_forms.moments import added_by_closed_form, carrier
 from spinlev.fem.elements.ladder import Refinement, solve_rotor
 from spinlev.fem.harmonics.expansion import trimmed_expansions, uniform_moments
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.fem.rotor.models import Accuracy, AccuracyWarning, error_points, fem_table
+from spinlev.fem.rotor.models import Accuracy, AccuracyWarning, changed_table, error_points, fem_table
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.common import InputError
 from spinlev.geometry.cutting import CONVERGENCE, cut_magnets
@@ -259,3 +259,22 @@ def test_a_magnet_of_too_many_pieces_is_refused_before_the_work(size):
     needle = Magnet(Box(np.array(size), np.zeros(3)), np.array([1.3, 0.0, 0.0]), 1.05)
     with pytest.raises(InputError, match=r"300 compact pieces make one up; instead .* Give it as several bodies\."):
         rotor_table((needle,), "dipole", nearest=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("permeability", [1.05, 1.3])
+def test_a_table_that_follows_its_magnets_states_its_error(permeability):
+    """A stack whose cubes are made larger and moved apart, against finite elements of its own, as exact as these."""
+    begun, ended = (vertical(0.001 * d, 0.001 * e, 1.3, permeability) for d, e in ((14.0, 10.0), (18.0, 12.0)))
+    points = np.array([[0.0, 0.0, -0.020], [0.002, 0.0, -0.025], [0.0, 0.0, -0.013], [0.0, 0.0, -0.030]])
+    first, own = (fem_table(rotor, Accuracy(1e-6, 7e-3)) for rotor in (begun, ended))
+    got = changed_table(first, ended, doubts=True)
+    again = changed_table(changed_table(first, vertical(0.015, 0.008, 1.3, permeability)), ended)
+    for ours, other, same, stated in zip(
+        got.evaluate(points), own.evaluate(points), again.evaluate(points), got.relative_error(points), strict=True
+    ):
+        axes = tuple(range(1, ours.ndim))
+        size = np.linalg.norm(other, axis=axes)
+        assert np.all(np.linalg.norm(ours - other, axis=axes) < stated * size)
+        assert np.all(stated < 1e-4)
+        assert np.all(np.linalg.norm(ours - same, axis=axes) < 1e-13 * size)
