@@ -124,6 +124,7 @@ class _Problem:
         self.kept = (
             search.looked_at
         )  # how many scenes were looked at when one was better by more than `SETTLED` or `NEARER`
+        self.by = ""  # models, for a message
         self.missed = np.inf  # by how much limits were missed then, before one met them
         self.nearest = np.inf, ""  # by how much the limits are missed at least, and which
 
@@ -240,7 +241,8 @@ class _Problem:
             )  # fmt: skip
         if not self.best:
             raise ComputationError(
-                f"No scene that was looked at meets all limits{self.nearest[1]}. Give wider bounds, or other limits."
+                f"No scene that was looked at{self.by} meets all limits{self.nearest[1]}. Give wider bounds, or other "
+                "limits."
             )
         _, known, numbers = self.best[-1]
         search.go_on_from(known, numbers)
@@ -406,11 +408,12 @@ def _check_reach(levitation: Levitation, bounds: Mapping[str, tuple[float, float
     known = {name: ends for name, ends in limits.items() if name not in LEAST}
     with suppress(EquilibriumError):
         problem = _Problem(Search(quick, bounds), NO_GOAL, known | {"decay_per_s": (-MARGINAL / 2, np.inf)})
+        problem.by = " by point dipoles without the plate"
         try:
             problem.solved()
-        except ComputationError as error:
+        except ComputationError:
             if problem.nearest[0] > ROUGH:
-                raise ComputationError(f"{error} So it is with point dipoles, without the plate.") from None
+                raise
 
 
 def _dataset(

@@ -34,8 +34,9 @@ from ..fem.mutual.table import MutualTable
 from ..fem.plate.choice import PlateAround, plate_around, rotor_nearby, wider_region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
+from ..fem.rotor.changed import changed_table, follows
 from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rotor_table
-from ..fem.rotor.models import AccuracyError, changed_table, follows
+from ..fem.rotor.models import AccuracyError
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
 from ..geometry.common import Array, SpinlevError, Watch, unwatched

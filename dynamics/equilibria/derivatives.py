@@ -24,6 +24,7 @@ from ...geometry.common import Array
 from ..motion.plate import PlateForce
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
+from .balance import CONVERGED_STEP, EVERY, Balance, solve
 from .equilibrium import Equilibrium, Mode
 from .orbits import CONVERGED, ROUNDED, SHAKING, OrbitProblem, Pencil, conserved
 
@@ -231,17 +232,8 @@ class Implicit:
         """
         spin, scales = self.known.spin, setting.scales
         begun = self.start + sum((step * way.change for step, way in tangents), np.zeros_like(self.start))
-        states, size = scales.pack(self.setting.scales.unpack(begun)), np.inf
-        for _ in range(NEWTON_STEPS):
-            residual, pencil, rows, aims = setting.linear(scales.unpack(states), spin)
-            step = np.linalg.lstsq(np.vstack([pencil.matrix(0.0), rows]), -np.append(residual, aims))[0]
-            before, size = size, float(np.abs(step).max())
-            if not size < FARTHEST:
-                return None
-            states = states + step.reshape(states.shape)
-            if size < CONVERGED or before / 2 < size < ROUNDED:
-                break
-        else:
+        states = self._solved(setting, scales.pack(self.setting.scales.unpack(begun)))
+        if states is None:
             return None
         if not with_modes:
             return self._equilibrium(self.setting.scales.pack(scales.unpack(states)))
@@ -253,6 +245,27 @@ class Implicit:
         growth = max((mode.growth_per_s for mode in modes), default=np.nan)
         found = self._equilibrium(self.setting.scales.pack(scales.unpack(states)))
         return replace(found, modes=tuple(modes), growth_per_s=growth)
+
+    def _solved(self, setting: Setting, states: Array) -> Array | None:
+        """States (n, 12) near others that are in balance; a fixed point is sought in its five unknowns alone."""
+        spin, size = self.known.spin, np.inf
+        if self.known.turn is None and setting.plate is None:
+            values = setting.values.copy()
+            values[SHAKING] = 0.0
+            balance = Balance(setting.rates, values, spin * setting.scales.spin_ratio)
+            position, moment, left = solve(balance, states[:, :3], states[:, 6:9], EVERY, NEWTON_STEPS)
+            far = np.abs(position - states[:, :3]).max()
+            return balance.states(position, moment) if left[0] < CONVERGED_STEP and far < FARTHEST else None
+        for _ in range(NEWTON_STEPS):
+            residual, pencil, rows, aims = setting.linear(setting.scales.unpack(states), spin)
+            step = np.linalg.lstsq(np.vstack([pencil.matrix(0.0), rows]), -np.append(residual, aims))[0]
+            before, size = size, float(np.abs(step).max())
+            if not size < FARTHEST:
+                return None
+            states = states + step.reshape(states.shape)
+            if size < CONVERGED or before / 2 < size < ROUNDED:
+                return states
+        return None
 
     def _equilibrium(self, states: Array) -> Equilibrium:
         """The equilibrium of other states (n, 12), of which the motion alone is right."""

@@ -25,8 +25,8 @@ from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
 from ..harmonics.interior import sphere
 from ..harmonics.rigid import field_coefficients, harmonics, matrices, shells as multipole_degrees
 from ..harmonics.solid import factorials, regular_values, tensors
+from .changed import changed_table
 from .choice import cached_rotor_table
-from .models import changed_table
 from .table import DerivedField, FieldTable
 
 DEGREE = 20  # of polynomials over the body that the dipoles integrate exactly

@@ -9,8 +9,9 @@ import pytest
 from spinlev.fem.closed_forms.moments import added_by_closed_form, carrier
 from spinlev.fem.elements.ladder import Refinement, solve_rotor
 from spinlev.fem.harmonics.expansion import trimmed_expansions, uniform_moments
+from spinlev.fem.rotor.changed import changed_table
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.fem.rotor.models import Accuracy, AccuracyWarning, changed_table, error_points, fem_table
+from spinlev.fem.rotor.models import Accuracy, AccuracyWarning, error_points, fem_table
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.common import InputError
 from spinlev.geometry.cutting import CONVERGENCE, cut_magnets

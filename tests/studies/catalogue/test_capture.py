@@ -111,7 +111,7 @@ def test_a_small_point_is_computed_drawn_and_told():
 
 
 def test_a_rotor_without_a_stable_frequency_is_said_not_left_out():
-    row = CAPTURE.compute({**POINT, "configuration": "tilt", "measure": 45.0})
+    row = CAPTURE.compute({**POINT, "configuration": "tilt", "measure": 50.0})
     assert (row["outcome"] == NO_EQUILIBRIUM).all()
     assert "100 % no stable frequency" in CAPTURE.report(CAPTURE.gather([row]))[1]
     assert CAPTURE.numbers(CAPTURE.gather([row]))["shares"][0]["frequency_hz"] is None

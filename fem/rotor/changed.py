@@ -1,0 +1,165 @@
+"""Fields of magnets that differ from those of a table: smooth functions of the magnets' numbers, and as exact."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from ...geometry.magnets import Magnet
+from ...geometry.solids import Part
+from ..closed_forms.moments import carrier
+from ..elements.surface import SurfaceCharges
+from ..harmonics.expansion import MultipoleExpansion, uniform_moments
+from ..harmonics.solid import rotated_harmonics
+from .models import (
+    DEGREE,
+    Accuracy,
+    Rotor,
+    charged_expansions,
+    error_points,
+    extrapolated_tail,
+    nonzero,
+    without_charges,
+)
+from .table import RotorTable
+
+STEADY_NODES, STEADY_DEGREE = 16, 40  # of charges on surfaces whose fields are smooth functions of the magnets' numbers
+STEADY_ERROR = 5e-5  # of what they add: less than that of stacks whose magnets were made 0.8 to 1.3 times as large
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedTable(RotorTable):
+    """The field of magnets that differ from those of a table, `origin`."""
+
+    origin: RotorTable | None = None
+
+
+def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> ChangedTable:
+    """The field of magnets that differ from a table's: a smooth function of their numbers, for differences.
+
+    A lone magnet that is moved, turned, magnified or polarised more has the table's own field, transformed. What else
+    changes is added to the table by closed forms, or of permeable magnets by charges on their surfaces, as many in both
+    cases; permeable magnets that have none, as parts of STEP files, change as if they were of μr = 1. A table that was
+    itself changed is taken as it was made. With its `doubts` only where they are asked for.
+    """
+    table = getattr(table, "origin", table)
+    before = table.magnets
+    if sizes := magnified(before, rotor):
+        return _transformed(table, before[0], rotor[0], *sizes, doubts)
+    simple = {"dipole": lambda m: ((), tuple(uniform_moments(one, 1) for one in m))}.get(table.model, _closed)
+    charged = table.model in ("fem", "surface") and _bear_charges(before) and _bear_charges(rotor)
+    (minus, less), (plus, more) = ((_with_charges if charged else simple)(m) for m in (before, rotor))
+    uniform = plus
+    if not _alike(table.uniform, minus):
+        minus = tuple(replace(one, polarization=-one.polarization) for one in minus)
+        uniform = (*table.uniform, *minus, *plus)
+    added = *((part, -1) for part in less), *((part, 1) for part in more)
+    parts, known = _merged([*((part, 1) for part in table.expansions), *added]), dict(table.doubts) if doubts else {}
+    if doubts and charged:
+        known["charges"] = tuple(_scaled(part, STEADY_ERROR) for part in nonzero((*less, *more)))
+        known["charges' tail"] = nonzero(extrapolated_tail(more))
+    return ChangedTable(table.model, rotor, uniform, parts, known, table.provenance, table)
+
+
+def follows(table: RotorTable, rotor: Rotor) -> bool:
+    """Whether a `changed_table` of permeable magnets is as good as one of their own."""
+    before = getattr(table, "origin", table).magnets
+    return bool(magnified(before, rotor)) or (
+        table.model in ("fem", "surface")
+        and len(before) == len(rotor)
+        and _bear_charges(before)
+        and _bear_charges(rotor)
+    )
+
+
+@lru_cache(maxsize=8)
+def _bear_charges(rotor: Rotor) -> bool:
+    accuracy = Accuracy()
+    return not without_charges(rotor, accuracy, error_points(rotor, accuracy.clearance(rotor))[0])
+
+
+def _alike(some: Rotor, others: Rotor) -> bool:
+    """Whether magnets are the same in all that their closed forms have of them."""
+    return len(some) == len(others) and all(
+        type(one.body) is type(other.body)
+        and all(
+            np.array_equal(a, b)
+            for a, b in (
+                (one.polarization, other.polarization), (one.body.center, other.body.center),
+                (one.body.rotation, other.body.rotation), (one.body.shape_numbers, other.body.shape_numbers),
+            )
+        )
+        for one, other in zip(some, others, strict=True)
+    )  # fmt: skip
+
+
+def _scaled(part: MultipoleExpansion, factor: float) -> MultipoleExpansion:
+    return replace(part, coefficients=factor * part.coefficients)
+
+
+def _merged(parts: Sequence[tuple[MultipoleExpansion, float]]) -> tuple[MultipoleExpansion, ...]:
+    """The sum of expansions times factors; those about one centre are one."""
+    found = dict[tuple[float, ...], MultipoleExpansion]()
+    for part, factor in parts:
+        key = (*part.center.tolist(), part.radius)
+        sums = factor * part.coefficients
+        if key in found:
+            one, other = sorted((sums, found[key].coefficients), key=len)
+            sums = np.array(other)
+            sums[: len(one), : len(one)] += one
+        found[key] = replace(part, coefficients=sums)
+    return tuple(found.values())
+
+
+def _closed(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:
+    """Closed forms of the remanence, and dipoles of parts, which have none."""
+    known = tuple(magnet for magnet in rotor if not isinstance(magnet.body, Part))
+    return known, tuple(uniform_moments(magnet, DEGREE) for magnet in rotor if isinstance(magnet.body, Part))
+
+
+@lru_cache(maxsize=8)  # of the magnets that others differ from it is asked for again and again
+def _with_charges(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:
+    carriers = tuple(carrier(magnet) for magnet in rotor)
+    charges = (
+        charged_expansions(SurfaceCharges(rotor, STEADY_NODES), carriers, STEADY_DEGREE)
+        if any(m.contrast for m in rotor)
+        else []
+    )
+    return tuple(one for one in carriers if one.polarization.any()), tuple(charges)
+
+
+def magnified(rotor: Rotor, other: Rotor) -> tuple[float, float] | None:
+    """Sizes and remanence of a lone magnet by those of another, wherever they are; None where they differ in more."""
+    if not len(rotor) == len(other) == 1:
+        return None
+    (before,), (after,) = rotor, other
+    bodies = before.body, after.body
+    if type(bodies[0]) is not type(bodies[1]) or isinstance(bodies[0], Part):
+        return None
+    if (before.recoil_permeability, before.transverse_permeability) != (
+        after.recoil_permeability,
+        after.transverse_permeability,
+    ):
+        return None
+    numbers = [body.shape_numbers for body in bodies]
+    size = float(np.linalg.norm(numbers[1]) / np.linalg.norm(numbers[0]))
+    strong = float(np.linalg.norm(after.polarization) / (np.linalg.norm(before.polarization) or 1.0))
+    alike = [(numbers[0] * size, numbers[1]), (before.polarization * strong, after.polarization)]
+    return (size, strong) if all(np.allclose(a, b, rtol=1e-13, atol=1e-15) for a, b in alike) else None
+
+
+def _transformed(
+    table: RotorTable, before: Magnet, after: Magnet, size: float, strong: float, doubts: bool
+) -> ChangedTable:
+    turn = after.body.rotation @ before.body.rotation.T
+
+    def there(part: MultipoleExpansion) -> MultipoleExpansion:
+        center = after.body.center + size * turn @ (part.center - before.body.center)
+        coefficients = strong * rotated_harmonics(part.coefficients, turn)
+        return MultipoleExpansion(center, size * part.radius, coefficients, turn @ part.axes)
+
+    forms = tuple(replace(form, body=after.body, polarization=strong * form.polarization) for form in table.uniform)
+    known = {cause: tuple(map(there, parts)) for cause, parts in table.doubts.items()} if doubts else {}
+    parts = tuple(map(there, table.expansions))
+    return ChangedTable(table.model, (after,), forms, parts, known, table.provenance, table)
