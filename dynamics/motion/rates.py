@@ -120,7 +120,7 @@ class Rates:
         values : of the parameters, (p,) for all or (n, p); (k n, p) for k answers at each pose, one after the other
         still : whether the body is at rest in the rotor's frame: its spin is then that given times cos θ
         """
-        times = len(values) // max(len(position), 1) if values.ndim > 1 else 1
+        times = max(len(values) // max(len(position), 1), 1) if values.ndim > 1 else 1
         if times > 1:
             position, moment, tangents = (np.concatenate([part] * times) for part in (position, moment, tangents))
         given = np.empty((13, len(position)))
