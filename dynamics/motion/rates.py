@@ -132,17 +132,21 @@ class Rates:
 
     @property
     def has_rough(self) -> bool:
-        return bool(self._placed)
+        return bool(self._placed) or self._rough_field is not self._field
+
+    @property
+    def _rough_field(self) -> Any:
+        return getattr(self._field, "rough", self._field)
 
     @cached_property
     def rough(self) -> Rates:
-        """The same by the same code, but for the numbers of effects that have some: they are zero, which costs nothing.
+        """The same by the same code with a field of few moments, and without the numbers of effects that have some.
 
         Of mutual magnetisation the moment that the rotor's field induces in the floater stays.
         """
         self.compile()  # both share it
         found = copy(self)
-        found._rough = True
+        found._rough, found._field, found._last = True, self._rough_field, NOWHERE
         return found
 
     def _about(self, position: Array, turn: Array, values: Array, times: int = 1) -> Array:

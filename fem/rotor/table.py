@@ -65,6 +65,7 @@ class DerivedField(Protocol):
         """See `RotorTable.derivatives`."""
 
 
+FEW, LOW = 1500, 6  # Moments up to which a search takes them all, and the highest degree of those that it begins with
 # Doubts that are what a model leaves out, with its sign, and no mere size of an error
 LEFT_OUT = ("shape", "permeability")
 
@@ -131,6 +132,14 @@ class RotorTable:
     def _repr_html_(self) -> str:
         first, *rest = repr(self).split("\n")
         return html_table(first, {str(k): line.strip() for k, line in enumerate(rest, 1)})
+
+    @cached_property
+    def rough(self) -> "RotorTable":
+        """The field for a search's first steps: of many moments those of low degree alone, whose time a search takes."""
+        if sum(np.count_nonzero(part.coefficients) for part in self.expansions) <= FEW:
+            return self
+        lowest = [replace(part, coefficients=part.coefficients[: LOW + 1, : LOW + 1]) for part in self.expansions]
+        return replace(self, expansions=tuple(lowest), doubts={})
 
     @cached_property
     def _closed_forms(self) -> tuple[UniformField, ...]:
