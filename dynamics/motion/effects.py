@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...fem.mutual.making import most_points, without_response
+from ...fem.mutual.making import all_points, without_response
 from ...fem.rotor.choice import PERMEABLE
 from ...fem.rotor.floater import floater_sources
 from ...fem.rotor.table import FieldFormula, FieldTable
@@ -54,7 +54,7 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
             )
     if floater.recoil_permeability == 1 and all(magnet.contrast == 0 for magnet in magnets):
         return False, NOTHING_PERMEABLE
-    points = 0 if reasons else most_points(magnets, floater.radius)
+    points = 0 if reasons else all_points(magnets, floater.radius)
     if requested == "mutual":
         if points > LARGEST:
             raise InputError(

@@ -23,6 +23,7 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from ...geometry.common import MU_0, Array, InputError
@@ -322,18 +323,30 @@ class UniformField:
 
         Of cylinders and rings 1e-10, but for places in or beside them.
         """
-        body, polarization = self.magnet.body, self.magnet.polarization_in_rotor
-        if isinstance(body, Box | Part):
-            field, gradient = tensors(self.derivatives(points, 2))
-            return field, gradient
-        # in a round magnet, or so near that its segments do not do
-        close = body.distance(points) < (0.0 if isinstance(body, Sphere) else resolved_distance(body))
-        field, gradient = np.empty((len(points), 3)), np.empty((len(points), 3, 3))
-        field[~close], gradient[~close] = tensors(self.derivatives(points[~close], 2))
+        entries, close = self._off_the_body(points, 2)
+        field, gradient = tensors(entries)
         if close.any():
+            body, polarization = self.magnet.body, self.magnet.polarization_in_rotor
             field[close] = round_tensor(body, points[close]) @ polarization
             gradient[close] = round_slope(body, points[close]) @ polarization
         return field, gradient
+
+    def field(self, points: Array) -> Array:
+        """`evaluate`, without the gradient."""
+        field, close = self._off_the_body(points, 1)
+        if close.any():
+            field[close] = round_tensor(self.magnet.body, points[close]) @ self.magnet.polarization_in_rotor
+        return field
+
+    def _off_the_body(self, points: Array, order: int) -> tuple[Array, NDArray[np.bool_]]:
+        """`derivatives`, 0 at points in a round magnet or so near that its segments do not do, and which are (n,)."""
+        body = self.magnet.body
+        if isinstance(body, Box | Part):
+            return self.derivatives(points, order), np.zeros(len(points), bool)
+        close = np.asarray(body.distance(points) < (0.0 if isinstance(body, Sphere) else resolved_distance(body)))
+        found = np.zeros((len(points), order * (order + 2)))
+        found[~close] = self.derivatives(points[~close], order)
+        return found, close
 
 
 def squared_distance(columns: Array, center: Array) -> Array:

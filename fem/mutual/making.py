@@ -13,6 +13,7 @@ from ...geometry.common import Array, InputError, Watch, unwatched, watched
 from ...geometry.cutting import united
 from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
+from ...geometry.shapes import Box
 from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..closed_forms.potentials import unit_dipole_fields
@@ -31,6 +32,9 @@ from .samples import (
     sphere_samples,
 )
 from .table import (
+    DIGITS,
+    FEW_DIGITS,
+    MANY,
     OF_RETURN,
     OF_SPHERE,
     PARALLEL,
@@ -39,6 +43,7 @@ from .table import (
     EnergySum,
     MutualTable,
     ResponseGrid,
+    charges_along,
     image_weights,
     mixed_sum,
     pair_sum,
@@ -47,13 +52,14 @@ from .table import (
 )
 
 SMALL = 1e-9  # relative size of a singular value that is none
-# From so many magnets on, points of a class have one weight and magnets respond to each other by their centres
-MANY = 4
 # What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
 PENALTY, FREE = 1e-3, 1e-6
+# Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
+SINGLE = 250
 # Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole
 GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
-DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end
+DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end, and how much sooner of `MANY`
+SOONER = 10.0
 SAFETY = 4.0  # for the poses that were not looked at
 MEANS = 0.2  # of what is added, by the difference of two permeabilities whose mean the charges have: 0.09 measured
 CHARGED = 1.0  # error of the finer charges by what the coarser ones differ from them
@@ -75,14 +81,15 @@ def mutual_errors(
     errors = []
     for gap in watched(GAPS, watch, "error estimate"):
         worst = np.zeros(2)
-        anywhere = places_around(rotor.magnets, floater.radius, (gap,), PLACES_EACH, 3)
+        each, sooner = (PLACES_EACH, 1.0) if len(rotor.magnets) < MANY else (1, SOONER)
+        anywhere = places_around(rotor.magnets, floater.radius, (gap,), each, 3)
         for place in (*anywhere, *_at_poles(rotor.magnets, (1 + gap) * floater.radius)):
             direction = generator.normal(size=3)
             direction /= np.linalg.norm(direction)
-            degree = enough_degree(rotor.magnets, Ball(place, floater.radius), DEGREES)
-            both = two_body(rotor, floater, place, direction, degree, SERIES)
+            degree = enough_degree(rotor.magnets, Ball(place, floater.radius), sooner * DEGREES)
+            both = two_body(rotor, floater, place, direction, degree, sooner * SERIES)
             added = both.total - both.rigid
-            rough = two_body(coarse, floater, place, direction, degree, SERIES)
+            rough = two_body(coarse, floater, place, direction, degree, sooner * SERIES)
             unsure = added - (rough.total - rough.rigid)
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
             _, force, torque = table.added(place[None], floater.moment * direction[None], field[None], gradient[None])
@@ -122,7 +129,8 @@ EACH, EACH_OF_MANY = 16, 6  # places of dipoles for each gap and magnet; of roto
 # Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
 # many places the rotor's response to the sphere's is
 EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
-# Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, two, and more
+# Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, of two whose
+# points have weights of their own, and of others
 SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
 INNER = 2  # points along each axis at which magnets beside each other respond beyond their direct response
 
@@ -154,7 +162,7 @@ def mutual_table(
                 f"instead one is {reason}"
             )
         box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
-        counts = points[k] if points else _counts(magnet, floater.radius)
+        counts = points[k] if points else _counts(magnet, floater.radius, len(magnets))
         n = int(np.prod(counts))
         zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
         axis = magnet.polarization / size if size else np.zeros(3)
@@ -170,29 +178,33 @@ def mutual_table(
         grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, places), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
-        around, beside = SAMPLES[min(len(magnets), len(SAMPLES)) - 1] // len(magnets)
+        cuboids = 1 < len(magnets) < MANY and all(isinstance(magnet.body, Box) for magnet in magnets)
+        single = cuboids and sum(len(grid.points) for grid in grids) <= SINGLE
+        kind = 0 if len(magnets) == 1 else 1 if single and len(magnets) == 2 else 2
+        around, beside = SAMPLES[kind] // len(magnets)
         places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, around, 2)])
         near = places_around(magnets, floater.radius, NEAR_GAPS, beside, 3)
         both = np.concatenate([places, near])
-        grids, pairs = sphere_fit(grids, images, both, sphere_samples(rotor, floater, both, watch))
+        grids, pairs = sphere_fit(grids, single, images, both, sphere_samples(rotor, floater, both, watch))
         if rotor.permeable:
             before = facing[:: FACING if len(magnets) > 1 else 1]
             fewer = np.concatenate([before, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
             returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
-            grids, mixed = returned_fit(grids, inner, images, fewer, returned)
+            grids, mixed = returned_fit(grids, single, inner, images, fewer, returned)
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, floater.polarizability)
     gaps, errors = mutual_errors(table, coarse, rotor, floater, watch)
     return replace(table, gaps=gaps, errors=errors, provenance={"seconds": time.perf_counter() - started})
 
 
-def _counts(magnet: Magnet, radius: float) -> tuple[int, int, int]:
-    """Points along the edges of a `magnet` at which it responds to a floater of this `radius`, m."""
-    return point_counts(response_box(magnet.body), (1 + NEAREST) * radius)
+def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
+    """Points along the edges of one of a `number` of magnets, where it responds to a floater of this `radius`, m."""
+    return point_counts(response_box(magnet.body), (1 + NEAREST) * radius, DIGITS if number < MANY else FEW_DIGITS)
 
 
-def most_points(magnets: Sequence[Magnet], radius: float) -> int:
-    """Largest number of points in one of the `magnets` of a table for a floater of this `radius`, m."""
-    return max(int(np.prod(_counts(magnet, radius))) for magnet in united(magnets))
+def all_points(magnets: Sequence[Magnet], radius: float) -> int:
+    """Points in all `magnets` of a table for a floater of this `radius`, m."""
+    magnets = united(magnets)
+    return sum(int(np.prod(_counts(magnet, radius, len(magnets)))) for magnet in magnets)
 
 
 def without_response(magnet: Magnet) -> str:
@@ -303,13 +315,14 @@ def mutual_table_beside(
 
 
 def sphere_fit(
-    grids: Sequence[ResponseGrid], images: Array, places: Array, samples: Sequence[Array]
+    grids: Sequence[ResponseGrid], single: bool, images: Array, places: Array, samples: Sequence[Array]
 ) -> tuple[list[ResponseGrid], Array]:
     """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
 
     Parameters
     ----------
     grids : whose `degrees` are sought
+    single : whether each point has a weight of its own, and not its class alone
     images : weights of the sphere's images
     places, samples : (n, 3) m, and what `sphere_samples` gives there
     """
@@ -317,12 +330,12 @@ def sphere_fit(
 
     def scaled(value: Array, slope: Array, _: Array) -> Array:
         by_place = np.moveaxis(slope[..., :3], -1, 0)
-        return np.concatenate([value / energy_size, *(by_place / force_size)], axis=1)
+        return np.concatenate([value / energy_size, *(by_place / force_size)], axis=-1)
 
     pairs = list(combinations(range(len(grids)), 2))
-    sums = [pair_sum(grids[a], grids[b], images) for a, b in pairs]
-    right = scaled(energy[None], -force[None], force)[0]
-    found, weights = _fitted(grids, OF_SPHERE, sums, places, scaled, right, PENALTY)
+    sums = [pair_sum(grids[a], grids[b], images, charges_along(len(grids))) for a, b in pairs]
+    right = scaled(energy, -force, force)
+    found, weights = _fitted(grids, single, OF_SPHERE, sums, places, 1, scaled, right, PENALTY)
     coupled = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         coupled[a, b] = coupled[b, a] = weight
@@ -330,13 +343,18 @@ def sphere_fit(
 
 
 def returned_fit(
-    grids: Sequence[ResponseGrid], inner: Sequence[Array], images: Array, places: Array, samples: tuple[Array, Array]
+    grids: Sequence[ResponseGrid],
+    single: bool,
+    inner: Sequence[Array],
+    images: Array,
+    places: Array,
+    samples: tuple[Array, Array],
 ) -> tuple[list[ResponseGrid], Array]:
     """Weights of the points' powers, and of pairs, that give V and its slopes.
 
     Parameters
     ----------
-    grids : whose `returned` are sought
+    grids, single : whose `returned` are sought, and as for `sphere_fit`
     inner : (k, 3) m of each magnet, points that respond for the whole of it
     images : weights of the sphere's images
     places, samples : (n, 3) m, and what `returned_samples` gives there
@@ -345,14 +363,15 @@ def returned_fit(
     sizes = np.linalg.norm(field, axis=1)[:, None], np.linalg.norm(change, axis=(1, 2))[:, None, None]
 
     def scaled(_: Array, slope: Array, second: Array) -> Array:
-        parts = slope[..., 3:] / sizes[0], second[..., 3:, :3] / sizes[1]
-        return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
+        first, second = slope[..., 3:] / sizes[0], second[..., 3:, :3] / sizes[1]
+        rows = first.shape[:-2]
+        return np.concatenate([first.reshape(*rows, -1), second.reshape(*rows, -1)], axis=-1)
 
     pairs = list(permutations(range(len(grids)), 2))
     sums = [mixed_sum(grids[a], inner[b], images) for a, b in pairs]
     # the energy is -M·V
     right = -np.concatenate([(field / sizes[0]).ravel(), (change / sizes[1]).ravel()])
-    found, weights = _fitted(grids, OF_RETURN, sums, places, scaled, right, 10 * PENALTY)
+    found, weights = _fitted(grids, single, OF_RETURN, sums, places, 2, scaled, right, 10 * PENALTY)
     mixed = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         mixed[a, b] = weight
@@ -361,28 +380,32 @@ def returned_fit(
 
 def _fitted(
     grids: Sequence[ResponseGrid],
+    single: bool,
     numbers: range,
     sums: Sequence[EnergySum],
     places: Array,
+    order: int,
     scaled: Callable[[Array, Array, Array], Array],
     right: Array,
     cost: float,
 ) -> tuple[list[Array], Array]:
     """Some `numbers` of the points (n, powers, 2) of each grid, and weights (k,) of sums.
 
-    `scaled` makes the equations' columns (g, rows) of the energies' derivatives, and `right` is what they shall give.
+    `scaled` makes the equations' columns (..., rows) of the energies' derivatives up to an `order`; it is linear in
+    them. `right` is what they shall give.
     """
     columns, small, kinds, still = list[Array](), list[Array](), list[Array](), np.zeros_like(places)
-    single = 1 < len(grids) < MANY  # beside other magnets each point has a weight of its own, too
     for grid in grids:
         kind = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
-        alone = np.eye(len(kind)) if single else kind[:, :0]
-        kinds.append(np.concatenate([kind, alone], axis=1)[:, : None if grid.axis.any() else 0])
+        kind = kind[:, : None if grid.axis.any() else 0]
+        alone = np.eye(len(kind))[:, : None if single and kind.size else 0]
+        kinds.append(np.concatenate([kind, alone], axis=1))
         for k in numbers:
-            columns.append(scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, kinds[-1])))
+            each = scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, order, apart=True))
+            columns.append(np.concatenate([kind.T @ each, each[: alone.shape[1]]]))
             small.append(np.arange(kinds[-1].shape[1]) >= kind.shape[1])
     for one in sums:
-        columns.append(scaled(*one.derivatives(places, still, np.ones((len(one.rows), 1)))))
+        columns.append(scaled(*one.derivatives(places, still, order))[None])
         small.append(np.zeros(1, bool))
     found = least_squares(np.concatenate(columns).T, right, np.concatenate(small), cost)
     parts = iter(np.split(found, np.cumsum([len(column) for column in columns])[:-1]))
@@ -413,7 +436,10 @@ def least_squares(columns: Array, values: Array, small: Array, cost: float = PEN
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
     if not small.any():
-        return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
+        scaled = columns / size
+        return np.asarray(
+            scipy.linalg.lstsq(scaled, values, cond=SMALL, lapack_driver="gelsy", overwrite_a=True)[0] / size
+        )
     square = columns.T @ columns / np.outer(size, size)  # a copy of the columns would take hundreds of megabytes
     square[np.diag_indices_from(square)] += np.where(small, cost, FREE) ** 2
     return np.asarray(scipy.linalg.solve(square, columns.T @ values / size, assume_a="pos") / size)

@@ -13,10 +13,9 @@ from ...geometry.common import Array, ComputationError
 from ...geometry.magnets import Magnet
 from ...geometry.overlap import TOUCHING, sphere_overlap
 from ...geometry.scene.floater import Floater
-from ...geometry.shapes import Box, Cylinder, Sphere
+from ...geometry.shapes import Box, Sphere
 from ..closed_forms.moments import carrier, volume_rule
-from ..closed_forms.round import resolved_distance
-from ..closed_forms.uniform import remanent_field
+from ..closed_forms.uniform import UniformField, remanent_field
 from ..elements.surface import SurfaceCharges
 from ..harmonics.expansion import box_rule, gauss
 from ..harmonics.interior import (
@@ -29,7 +28,6 @@ from ..harmonics.interior import (
     multipole_torque,
 )
 from ..harmonics.solid import Coefficients, derivative, outer_sums
-from ..rotor.table import RotorTable
 from .table import induced_sources, point_counts
 
 DEGREES = range(6, 41)
@@ -55,8 +53,17 @@ def singular_ratio(magnets: Sequence[Magnet], ball: Ball) -> float:
 
 def enough_degree(magnets: Sequence[Magnet], ball: Ball, rtol: float = 1e-9) -> int:
     """Degree l about a `ball` beside `magnets` at which ρ^2l, its share in the force, is below `rtol`; 6 to 40."""
-    ratio = min(singular_ratio(magnets, ball), 0.99)
-    return int(np.clip(np.ceil(np.log(rtol) / (2 * np.log(ratio))), DEGREES[0], DEGREES[-1]))
+    return _degrees(np.log(rtol), _decay(magnets, ball), DEGREES[-1])
+
+
+def _decay(magnets: Sequence[Magnet], ball: Ball) -> float:
+    """-ln of the factor by which a degree's share in the force falls to the next."""
+    return -2 * float(np.log(min(singular_ratio(magnets, ball), 0.99)))
+
+
+def _degrees(share: float, decay: float, most: int) -> int:
+    """Degree at which a share in the force has fallen to one with the logarithm `share`; 6 to `most`."""
+    return int(np.clip(np.ceil(-share / decay - 1e-9), min(DEGREES[0], most), most))
 
 
 # Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off
@@ -90,27 +97,6 @@ class RotorResponse(Protocol):
         """
 
 
-def closed_form(magnets: Sequence[Magnet]) -> RotorTable:
-    """The field of the remanence alone, as if every μ were 1."""
-    return RotorTable("cuboid", tuple(magnets), tuple(magnet for magnet in magnets if magnet.polarization.any()))
-
-
-def coefficients_of(table: RotorTable, ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) of a table's field about the ball's centre.
-
-    Parameters
-    ----------
-    table : of a rotor, which knows its field in the ball
-    ball : free of the sources
-    degree : highest of the coefficients
-    """
-    gaps = [(m.body, float(m.body.distance(ball.center)) - ball.radius) for m in table.uniform]
-    if any(isinstance(body, Cylinder) and gap < resolved_distance(body) for body, gap in gaps):
-        return interior_coefficients(lambda points: table.evaluate(points)[0], ball, degree)
-    # without the gradient, in half the time
-    return interior_coefficients(lambda points: table.derivatives(points, 1), ball, degree)
-
-
 def isotropic(magnet: Magnet, permeability: float) -> Magnet:
     """The magnet with one recoil permeability."""
     return replace(magnet, recoil_permeability=permeability, transverse_permeability=None)
@@ -133,14 +119,13 @@ class ChargeResponse:
         means = [
             m.recoil_permeability if m.isotropic else float(np.trace(m.permeability_in_rotor)) / 3 for m in magnets
         ]
-        self.magnets, self._closed = magnets, closed_form(magnets)
+        self.magnets, carriers = magnets, magnets
         self.permeable = any(magnet.contrast for magnet in magnets)
         self._shares = np.array([1 / (1 + (mean - 1) / 2) for mean in means])  # c/χ
         if self.permeable:
             self.charges = SurfaceCharges([isotropic(*each) for each in zip(magnets, means, strict=True)], count)
             along = [isotropic(magnet, magnet.recoil_permeability) for magnet in magnets]
             carriers = tuple(carrier(magnet) for magnet in along)
-            self._closed = closed_form(carriers)
             alone = SurfaceCharges(along, own or count)
             self._own = alone.places, alone.areas * alone.beyond(carriers)
             faces = sum(float(np.linalg.norm(m.polarization)) * m.body.area for m in carriers)
@@ -148,14 +133,17 @@ class ChargeResponse:
             # what two permeabilities add to that along the easy axis, to first order
             rest = [m.permeability_in_rotor - m.recoil_permeability * np.eye(3) for m in magnets]
             self._across = closed_dipoles(carriers, rest, ACROSS)
+        self._closed = [UniformField(magnet) for magnet in carriers if magnet.polarization.any()]
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
-        """See `RotorResponse`."""
-        found = coefficients_of(self._closed, ball, degree)
+        """See `RotorResponse`; of each magnet the degrees that its own distance asks for."""
+        found, share = np.zeros((degree + 1, degree + 1), complex), -degree * _decay(self.magnets, ball)
+        for form in self._closed:
+            few = _degrees(share, _decay([form.magnet], ball), degree)
+            found[: few + 1, : few + 1] += interior_coefficients(form.field, ball, few)
         if self.permeable:
             # so small a part needs fewer degrees for the same error
-            spared = -np.log(self._part) / (-2 * np.log(min(singular_ratio(self.magnets, ball), 0.99)))
-            few = max(int(np.ceil(degree - spared)), min(DEGREES[0], degree))
+            few = _degrees(share - np.log(self._part), _decay(self.magnets, ball), degree)
             found[: few + 1, : few + 1] += from_charges(*self._own, ball, few)
             found += from_magnetization(*self._across, ball, degree)
         return found

@@ -35,12 +35,14 @@ PARALLEL = 1e-9  # entry of a unit vector, or of μ along the body's axes, that 
 UNIT = MU_0 / FOUR_PI
 # Edges of the boxes that stand for a sphere and for the section of a cylinder, in diameters
 IN_SPHERE, IN_CIRCLE = 0.64, 0.8
-# Along an edge of a face; the first meet what two magnets' fields do in the sphere to 1e-3 of all that is added
-CHARGES, FEW_CHARGES = 4, 2
+# Along an edge of a face. The first meet what two magnets' fields do in the sphere to 1e-3 of all that is added; of
+# rotors of `MANY` magnets and of their responses the second do, with which the table errs by as much.
+CHARGES, FEW_CHARGES, MANY = 3, 2, 4
 # p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2; and q, about that of three dipoles
 POWERS, RETURNED = (4, 5, 6), (5, 6)
 OF_SPHERE, OF_RETURN = range(3, 9), range(9, 13)  # among a point's `numbers`: v and w of each p; s and t of each q
-DIGITS = 7.2  # -ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3
+# -ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3; and of `MANY`
+DIGITS, FEW_DIGITS = 7.2, 5.5
 # Second derivatives over place and moment that are computed; they are symmetric
 ENTRIES = [(a, b) for a in range(6) for b in range(a, 6)]
 WHERE = np.array([[ENTRIES.index((min(a, b), max(a, b))) for b in range(6)] for a in range(6)])
@@ -199,45 +201,49 @@ class EnergySum:
         exact = np.where(np.abs(self.axes.T) < 1e-15, 0.0, self.axes.T)
         return [hy.sum([float(r) * v for r, v in zip(row, vector, strict=True) if r]) for row in exact]
 
-    def derivatives(self, places: Array, moments: Array, groups: Array | None = None) -> tuple[Array, Array, Array]:
+    def derivatives(
+        self, places: Array, moments: Array, order: int = 2, apart: bool = False
+    ) -> tuple[Array, Array, Array]:
         """The energy and its first and second derivatives by place (m) and moment (A m²), in this order.
 
         Parameters
         ----------
         places, moments : (m, 3) m and A m², rotor's frame
-        groups : (n, g) weights of the rows in sums of their own; None: one sum of all
+        order : of the derivatives; with 1 the second ones are zero
+        apart : of every row by itself
 
         Returns
         -------
-        J and its derivatives (g, m), (g, m, 6) and (g, m, 6, 6); without `groups` also without their axis
+        J and its derivatives (m,), (m, 6) and (m, 6, 6); of rows `apart` (n, m), (n, m, 6) and (n, m, 6, 6)
         """
-        weights = np.ones((len(self.rows), 1)) if groups is None else groups
         free = np.concatenate([(places - self.origin) @ self.axes, moments @ self.axes], axis=1)
-        kernel, (count, width) = _kernel(self.formula, self.rows.shape[1]), self.rows.shape
-        sums = np.zeros((weights.shape[1], 7 + len(ENTRIES), len(places)))
+        kernel, (count, width) = _kernel(self.formula, self.rows.shape[1], order), self.rows.shape
+        sums = np.zeros((7 + len(ENTRIES) * (order > 1), len(places), count if apart else 1))
         step = max(1, EVALUATIONS // max(count, 1))
         for start in range(0, len(places) if count else 0, step):
             some = free[start : start + step]
             given = np.empty((6 + width, len(some), count))
             given[:6], given[6:] = some.T[:, :, None], self.rows.T[:, None]
             found = kernel(given.reshape(6 + width, -1)).reshape(-1, len(some), count)
-            sums[:, :, start : start + step] = np.moveaxis(found @ weights, 2, 0)
+            sums[:, start : start + step] = found if apart else found.sum(axis=2, keepdims=True)
         turn = np.kron(np.eye(2), self.axes)
-        slope = np.moveaxis(sums[:, 1:7], 1, 2) @ turn.T
-        second = turn @ np.moveaxis(sums[:, 7:], 1, 2)[..., WHERE] @ turn.T
-        found = sums[:, 0], slope, second
-        return found if groups is not None else (found[0][0], found[1][0], found[2][0])
+        energy, slope, second = sums[0].T, sums[1:7].T @ turn.T, np.zeros(1)
+        if order > 1:
+            second = turn @ sums[7:].T[..., WHERE] @ turn.T
+        return (energy, slope, second) if apart else (energy[0], slope[0], second[0])
 
 
 @cache
-def _kernel(formula: Formula, width: int) -> Any:
-    """Compiled formula with its derivatives: (28, n) for places, moments and rows (6 + width, n)."""
+def _kernel(formula: Formula, width: int, order: int) -> Any:
+    """Compiled formula with derivatives: (28, n), or (7, n) of order 1, for places, moments and rows (6 + width, n)."""
     free = hy.make_vars("x", "y", "z", "m_x", "m_y", "m_z")
     row = [hy.expression(f"n_{k}") for k in range(width)]
     energy = formula(free[:3], free[3:], row, 1.0)
     gradient = list(hy.diff_tensors([energy], diff_args=free, diff_order=1).gradient)
-    hessian = np.asarray(hy.diff_tensors(gradient, diff_args=free, diff_order=1).jacobian)
-    outputs = [energy, *gradient, *(hessian[a, b] for a, b in ENTRIES)]
+    outputs = [energy, *gradient]
+    if order > 1:
+        hessian = np.asarray(hy.diff_tensors(gradient, diff_args=free, diff_order=1).jacobian)
+        outputs += [hessian[a, b] for a, b in ENTRIES]
     return compiled(hy.cfunc, outputs, [*free, *row], fast_math=True)
 
 
@@ -365,14 +371,14 @@ class MutualTable:
         """Whose sum is the energy of the moment M."""
         sums = [grid.energy(grid.numbers) for grid in self.grids]
         number = round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
-        inner = [grid.inner(number) for grid in self.grids]
+        inner, along = [grid.inner(number) for grid in self.grids], charges_along(len(self.grids))
         if self.coupling.any():
             sums.append(coupled_sum(np.concatenate(inner), self.coupling))
         for a, b in permutations(range(len(self.grids)), 2):
             if self.mixed[a, b]:
                 sums.append(mixed_sum(self.grids[a], inner[b], self.images, self.mixed[a, b]))
             if a < b and self.pairs[a, b]:
-                sums.append(pair_sum(self.grids[a], self.grids[b], self.images, self.pairs[a, b]))
+                sums.append(pair_sum(self.grids[a], self.grids[b], self.images, along, self.pairs[a, b]))
         return sums
 
     def energy(
@@ -456,13 +462,18 @@ class StrongerMutual:
         return square * energy, square * slope * units, square * second * np.outer(units, units)
 
 
-def pair_sum(first: ResponseGrid, second: ResponseGrid, images: Array, weight: float = 1.0) -> EnergySum:
+def charges_along(magnets: int) -> int:
+    """Charges along an edge of a face, of a rotor of so many `magnets`."""
+    return CHARGES if magnets < MANY else FEW_CHARGES
+
+
+def pair_sum(first: ResponseGrid, second: ResponseGrid, images: Array, count: int, weight: float = 1.0) -> EnergySum:
     """Minus `weight` (J) times the energy of the sphere by what the charges of `first` and `second` do in it together.
 
-    `images` are the weights of `pair_energy`.
+    `images` are the weights of `pair_energy`, `count` is of the charges along an edge of a face.
     """
-    places, amounts = first.charges(CHARGES)
-    return charge_sum(pair_energy, (places, weight * amounts), second.charges(CHARGES), first.radius, images)
+    places, amounts = first.charges(count)
+    return charge_sum(pair_energy, (places, weight * amounts), second.charges(count), first.radius, images)
 
 
 def mixed_sum(source: ResponseGrid, points: Array, images: Array, weight: float = 1.0) -> EnergySum:

@@ -135,7 +135,7 @@ class RotorTable:
 
     @cached_property
     def rough(self) -> "RotorTable":
-        """The field for a search's first steps: of many moments those of low degree alone, whose time a search takes."""
+        """The field for a search's first steps: where it has very many moments, those of low degree alone."""
         if sum(np.count_nonzero(part.coefficients) for part in self.expansions) <= FEW:
             return self
         lowest = [replace(part, coefficients=part.coefficients[: LOW + 1, : LOW + 1]) for part in self.expansions]

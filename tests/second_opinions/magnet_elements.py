@@ -19,13 +19,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from spinlev.fem.closed_forms.uniform import remanent_field
+from spinlev.fem.closed_forms.uniform import UniformField, remanent_field
 from spinlev.fem.elements.condensed import OpenBoundary, solve_condensed
 from spinlev.fem.elements.magnetostatics import BOUNDARY_DEGREE, stiffness_of
 from spinlev.fem.elements.spaces import volume_points
-from spinlev.fem.harmonics.interior import Ball, from_magnetization
+from spinlev.fem.harmonics.interior import Ball, from_magnetization, interior_coefficients
 from spinlev.fem.harmonics.solid import Coefficients, derivative, outer_sums
-from spinlev.fem.mutual.response import closed_dipoles, closed_form, coefficients_of, direct_rule
+from spinlev.fem.mutual.response import closed_dipoles, direct_rule
 from spinlev.geometry.common import Array
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.magnets import MagnetMesh, mesh_magnets
@@ -127,7 +127,7 @@ class ElementResponse:
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""
-        own = coefficients_of(closed_form(self.magnets), ball, degree)
+        own = sum(interior_coefficients(UniformField(m).field, ball, degree) for m in self.magnets)
         return own + from_magnetization(*self.remanent_dipoles, ball, degree)
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
