@@ -269,6 +269,7 @@ def without_noise(coefficients: Coefficients, level: float) -> Coefficients:
 Part = tuple[int, int, int, complex]  # number of the expansion, l, m, and the real or imaginary part of the coefficient
 MOST = 300  # coefficients up to which a fit is worth its time
 ROUNDS = 6  # of reweighting in a fit
+MANY_PARTS = 2000
 
 
 def trimmed_expansions(
@@ -296,39 +297,29 @@ def trimmed_expansions(
     ]
     if not parts:
         return list(expansions), [_with(e, [], 0) for e in expansions]
-    degrees, own = (
-        np.array([l for _, l, _, _ in parts]),
-        [[p for p in parts if p[0] == k] for k in range(len(expansions))],
-    )
-    sizes, total, of_dipoles = np.empty(len(parts)), *np.zeros((2, len(points), 3))
-    start = 0
-    for expansion, mine in zip(expansions, own, strict=True):
-        fields, end = _fields(expansion, mine, points) / allowed[:, None], start + len(mine)
-        sizes[start:end] = np.linalg.norm(fields, axis=2).max(axis=1)
-        total += fields.sum(axis=0)
-        of_dipoles += fields[degrees[start:end] == 1].sum(axis=0)
-        start = end
-    dipoles = [part for part in parts if part[1] == 1]
-    if _largest(total) <= 1:
-        dipoles = []
-    else:
-        total -= of_dipoles
+    degrees, owner = np.array([part[1] for part in parts]), np.array([part[0] for part in parts])
+
+    def added(some: list[Part]) -> Array:
+        """Their field (n, 3), by what is allowed."""
+        chosen = [one for k, e in enumerate(expansions) if (one := _with(e, some, k)).degree]
+        return summed_derivatives(chosen, points, 1) / allowed[:, None] if chosen else np.zeros_like(points)
+
+    total, sizes = added(parts), np.empty(len(parts))
+    every = slice(None, None, 1 + len(parts) // MANY_PARTS)  # of thousands some places tell which ones are small
+    for k, expansion in enumerate(expansions):
+        fields = _fields(expansion, [part for part in parts if part[0] == k], points[every])
+        sizes[owner == k] = (np.linalg.norm(fields, axis=2) / allowed[every]).max(axis=1, initial=0.0)
+    dipoles = [part for part in parts if part[1] == 1] if _largest(total) > 1 else []
+    total -= added(dipoles)
     order = np.argsort(-sizes)
-    order = order[degrees[order] > 1] if dipoles else order
-    # Of parts that are less than allowed all together no field is kept: of ten thousands they take gigabytes.
-    order = order[np.cumsum(sizes[order][::-1])[::-1] > 1]
-    place = np.full(len(parts), -1)
-    place[order] = np.arange(len(order))
-    fields, start = np.empty((len(order), len(points), 3)), 0
-    for expansion, mine in zip(expansions, own, strict=True):
-        here = place[start : start + len(mine)]
-        chosen = [part for part, at in zip(mine, here, strict=True) if at >= 0]
-        fields[here[here >= 0]] = _fields(expansion, chosen, points) / allowed[:, None]
-        start += len(mine)
+    ordered = [parts[i] for i in order if not dipoles or degrees[i] > 1]
     # the fewest of the largest that will do: enough without a fit, and by halving with one
-    factors = _fewest(fields, total, most)
-    kept = [(k, l, m, c * f) for (k, l, m, c), f in zip((parts[i] for i in order), factors, strict=False)]
-    kept += dipoles
+    too_few, enough = -1, len(ordered)
+    while enough - too_few > 1:
+        count = (enough + too_few) // 2
+        too_few, enough = (too_few, count) if _largest(total - added(ordered[:count])) <= 1 else (count, enough)
+    factors = _fewest(expansions, ordered[:enough], points, allowed, total) if 0 < enough <= most else np.ones(enough)
+    kept = [(k, l, m, c * f) for (k, l, m, c), f in zip(ordered, factors, strict=False)] + dipoles
     missing = [(k, l, m, -c) for k, l, m, c in kept] + parts
     return (
         [_with(e, kept, k) for k, e in enumerate(expansions)],
@@ -336,17 +327,15 @@ def trimmed_expansions(
     )
 
 
-def _fewest(fields: Array, total: Array, most: int) -> Array:
-    """Factors of the first few of the fields (k, n, 3), with which they make the total (n, 3) to 1 at every point."""
-    too_few, enough, left_out = 0, 0, total.copy()
-    while enough < len(fields) and _largest(left_out) > 1:
-        left_out -= fields[enough]
-        enough += 1
-    if not enough:
-        return np.zeros(0)
-    factors = np.ones(enough)
-    if enough > most:
-        return factors
+def _fewest(
+    expansions: Sequence[MultipoleExpansion], parts: list[Part], points: Array, allowed: Array, total: Array
+) -> Array:
+    """Factors of the first few of the parts, with which they make the total (n, 3) to 1 at every point."""
+    fields = np.empty((len(parts), len(points), 3))
+    for k, expansion in enumerate(expansions):
+        here = [number for number, part in enumerate(parts) if part[0] == k]
+        fields[here] = _fields(expansion, [parts[number] for number in here], points) / allowed[:, None]
+    too_few, enough, factors = 0, len(parts), np.ones(len(parts))
     while enough - too_few > 1:
         count = (enough + too_few) // 2
         found = _fitted(fields[:count], total)
