@@ -35,8 +35,8 @@ from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_who
 # Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
-    "rotor": 9,
-    "mutual": 8,
+    "rotor": 10,
+    "mutual": 9,
     "map": 3,
     "plate": 2,
     "driven-plate": 3,

@@ -327,6 +327,7 @@ class UniformField:
         field, gradient = tensors(entries)
         if close.any():
             body, polarization = self.magnet.body, self.magnet.polarization_in_rotor
+            assert isinstance(body, Cylinder | Sphere)
             field[close] = round_tensor(body, points[close]) @ polarization
             gradient[close] = round_slope(body, points[close]) @ polarization
         return field, gradient
@@ -335,6 +336,7 @@ class UniformField:
         """`evaluate`, without the gradient."""
         field, close = self._off_the_body(points, 1)
         if close.any():
+            assert isinstance(self.magnet.body, Cylinder | Sphere)
             field[close] = round_tensor(self.magnet.body, points[close]) @ self.magnet.polarization_in_rotor
         return field
 

@@ -401,8 +401,8 @@ def _fitted(
         alone = np.eye(len(kind))[:, : None if single and kind.size else 0]
         kinds.append(np.concatenate([kind, alone], axis=1))
         for k in numbers:
-            each = scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, order, apart=True))
-            columns.append(np.concatenate([kind.T @ each, each[: alone.shape[1]]]))
+            rows = scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, order, apart=True))
+            columns.append(np.concatenate([kind.T @ rows, rows[: alone.shape[1]]]))
             small.append(np.arange(kinds[-1].shape[1]) >= kind.shape[1])
     for one in sums:
         columns.append(scaled(*one.derivatives(places, still, order))[None])
