@@ -32,6 +32,7 @@ SINGULAR = 1e-9  # Smallest singular value of F_x, by the largest, below which t
 SLOWEST = 1e-7  # λ of a mode, rad⁻¹, that is no eigenvalue but one of the kept |m̂| and body spin
 COLLIDED = 1e-7  # |uᴴ T_λ v| by ‖T_λ v‖ below which two eigenvalues have met, where they have no derivative
 STEP = 1e-5  # Of differences along the tangent of what is a plain function of the state, scaled
+ALONG = 1e-4  # Of a difference of F, which corrects a derivative by 1e-5 of it
 NEWTON_STEPS, FARTHEST = 20, 0.5  # Most steps to an equilibrium nearby, and the longest, in floater radii and rad
 POLISHED = 3  # Steps of Newton's method that make a known λ one of the pencil
 SOLVED = 10.0  # Relative error of a derivative, by the Newton step that is left at the equilibrium, in radii and rad
@@ -186,10 +187,26 @@ class Implicit:
         """Derivatives (2,) of the parameter of a fold, here, by a number, from what both have `missed`."""
         return np.asarray(-(missed @ self._lost) / (by_parameter @ self._lost))
 
+    def _along(self, change: Array) -> Array:
+        """Derivative (12 n + 2,) of F along a change of a periodic motion's states.
+
+        F_x has the brake of the rotor's metal at each instant's place as if it did not change with the place, which is
+        exact where the floater rests in the rotor's frame alone, and else leaves 5e-6 of a derivative.
+        """
+        size, ends = float(np.abs(change).max()) or 1.0, []
+        for sign in (1, -1):
+            states = self.start + (sign * ALONG / size) * change.reshape(self.start.shape)
+            residual, _, _, aims = self.setting.linear(self.setting.scales.unpack(states), self.known.spin)
+            ends.append(np.append(residual, aims))
+        return (ends[0] - ends[1]) * (size / (2 * ALONG))
+
     def by(self, nearby: Sequence[Nearby]) -> Tangent:
         """The way by a number, from the equations at some values of it."""
         scales, spin = self.setting.scales, self.known.spin
-        changes = (np.nan if self.at_fold else -1.0) * self.missed(nearby) @ self._inverse.T
+        missed = self.missed(nearby)
+        changes = (np.nan if self.at_fold else -1.0) * missed @ self._inverse.T
+        if self.known.turn is not None and not self.at_fold:
+            changes[0] -= self._inverse @ (missed[0] + self._along(changes[0]))
         change, lower = changes.reshape(2, *self.start.shape)
         lost = complex(np.nan, np.nan)
         by = {mode.name: np.full(2, 0j if not self.at_fold and mode.speed else lost) for mode in self.modes}

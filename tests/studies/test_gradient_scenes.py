@@ -161,8 +161,7 @@ def compare(levitation, keys):
         size = np.concatenate([np.abs(wanted[:2]), *(np.full(5, np.abs(part).max()) for part in parts)])
         least = np.array([1e-12, 1e-9, *[1e-8] * 15]) / max(abs(numbers[key]), 1e-3)
         assert np.all(np.abs(change) < 1e-3 * size + least)  # so that the fourth order is converged in the step
-        rtol = 1e-5 if "rotation" in key else 1e-6  # not known why: 4e-6 by the tilt of a slab that is tilted
-        assert np.all(np.abs(got - wanted) < rtol * size + least), (key, got, wanted)
+        assert np.all(np.abs(got - wanted) < 1e-6 * size + least), (key, got, wanted)
 
 
 @pytest.mark.slow
