@@ -13,7 +13,7 @@ import scipy
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics.equilibria.equilibrium import AXIAL, SIDE, TILT
+from ..dynamics.equilibria.equilibrium import AXIAL, SIDE, TILT, Equilibrium
 from ..geometry.common import Array, ComputationError, InputError, shown
 from ..geometry.scene.files import changed, scene_numbers
 from .candidates import Candidate, Search
@@ -24,17 +24,21 @@ from .levitation import Levitation
 from .plan import SceneLike
 from .result import label_of_key, variable
 
-# What may have been measured: unit and label; beside these the modes' frequencies, as `axial_hz`
+# What may have been measured: unit and label; beside these the modes' frequencies and decay rates, as `axial_hz`
 MEASURABLE: Mapping[str, tuple[str, str]] = {
     "distance_mm": ("mm", "levitation distance"),
+    "depth_mm": ("mm", "depth below the rotor's centre"),
     "lateral_offset_mm": ("mm", "distance from the axis of rotation"),
     "polar_angle_deg": ("deg", "polar angle of the moment"),
+    "lowest_hz": ("Hz", "lowest stable frequency"),
+    "highest_hz": ("Hz", "highest stable frequency"),
 }
-MODE_OF = {
-    "axial_hz": AXIAL,
-    **dict(zip(("backward_whirl_hz", "forward_whirl_hz"), SIDE, strict=True)),
-    **{f"{name}_hz": name for name in TILT},
-}
+ENDS = ("lowest_hz", "highest_hz")
+NAMES = {"axial": AXIAL, **dict(zip(("backward_whirl", "forward_whirl"), SIDE, strict=True)), **{n: n for n in TILT}}
+FREQUENCY, DECAY = "_hz", "_decay_per_s"
+MODE_OF = {f"{name}{end}": mode for end in (FREQUENCY, DECAY) for name, mode in NAMES.items()}
+TIME, HEIGHT = "time_s", "z_mm"  # columns of a track
+FEWEST, CLEAR = 16, 5.0  # points of a track at least; amplitude of an oscillation, by its error, that is one
 ERROR = "_error"  # what a column of standard deviations is called after that of its measure
 LOST = 1e3  # residual of each value of a scene that has no such equilibrium, so that the fit comes back
 Data = str | PathLike[str] | xr.Dataset | Mapping[str, Sequence[float]]
@@ -67,6 +71,55 @@ def table_of(data: Data) -> dict[str, Array]:
         except (TypeError, ValueError):
             raise InputError(f"Input data must have numbers; instead those of {name} are {shown(values)}.") from None
     return found
+
+
+def rows_of_tracks(table: Mapping[str, Array]) -> dict[str, Array]:
+    """A row for each track: its depth, and frequency and decay rate of its axial mode, with their standard deviations.
+
+    Tracks of one table differ in what was set. Each is c + e^{-γt} (a cos 2πft + b sin 2πft), by least squares, what
+    is left of it is white noise. Where nothing oscillates the depth alone is known. Raises InputError.
+    """
+    keys = [name for name in table if name not in (TIME, HEIGHT)]
+    settings = np.stack([table[name] for name in keys] or [0.0 * table[TIME]], axis=1)
+    names = [n for stem in ("depth_mm", f"axial{FREQUENCY}", f"axial{DECAY}") for n in (stem, f"{stem}{ERROR}")]
+    rows = []
+    for one in np.unique(settings, axis=0):
+        here = np.all(settings == one, axis=1)
+        times, heights = table[TIME][here], table[HEIGHT][here]
+        if here.sum() < FEWEST or not (np.isfinite([times, heights]).all() and np.all(np.diff(times) > 0)):
+            raise InputError(
+                f"Input data must have tracks of {FEWEST} points or more, with growing {TIME} and a {HEIGHT} at each; "
+                f"instead one of {here.sum()} points has not."
+            )
+        rows.append([*one[: len(keys)], *_ringing(times, -heights)])
+    return dict(zip([*keys, *names], np.array(rows).T, strict=True))
+
+
+def _ringing(times: Array, values: Array) -> list[float]:
+    """Centre of an oscillation that decays, its frequency (Hz) and its decay rate (1/s), each with its error."""
+    span, rest = float(np.ptp(times)), values - values.mean()
+    tried = 2 * np.pi * np.arange(1 / span, 0.5 / np.median(np.diff(times)), 0.1 / span)
+    power = scipy.signal.lombscargle(times, rest, tried)
+
+    def waves(z: Array) -> Array:
+        turn, fall = z[0] * (times - times[0]), np.exp(-z[1] * (times - times[0]))
+        return np.stack([np.ones_like(turn), fall * np.cos(turn), fall * np.sin(turn)], axis=1)
+
+    def left(z: Array) -> Array:
+        return np.asarray(waves(z) @ np.linalg.lstsq(waves(z), values)[0] - values)
+
+    starts = [np.array([tried[np.argmax(power)], rate / span]) for rate in (0.0, 1.0, 5.0)]
+    best = min((scipy.optimize.least_squares(left, z, x_scale=[1 / span] * 2) for z in starts), key=lambda f: f.cost)
+    basis, (turn, _) = waves(best.x), best.x
+    center, a, b = np.linalg.lstsq(basis, values)[0]
+    since, across = times - times[0], b * basis[:, 1] - a * basis[:, 2]
+    whole = np.column_stack([basis, since * across, -since * (basis[:, 1:] @ [a, b])])
+    noise = 2 * best.cost / (len(times) - whole.shape[1])
+    errors = np.sqrt(noise * np.diag(np.linalg.pinv(whole.T @ whole)))
+    if np.hypot(a, b) < CLEAR * np.hypot(*errors[1:3]):
+        return [float(values.mean()), float(np.sqrt(np.var(values) / len(times))), *[np.nan] * 4]
+    hertz = 2 * np.pi
+    return [float(x) for x in (center, errors[0], turn / hertz, errors[3] / hertz, best.x[1], errors[4])]
 
 
 class _Rows:
@@ -152,13 +205,25 @@ class _Rows:
 
 def _value(known: Candidate, name: str) -> float:
     if name in MODE_OF:
-        return next((mode.frequency_hz for mode in known.known.modes if mode.name == MODE_OF[name]), np.nan)
-    return float(known.values(name)[0])
+        modes = [mode for mode in known.known.modes if mode.name == MODE_OF[name]]
+        return next((-m.growth_per_s if name.endswith(DECAY) else m.frequency_hz for m in modes), np.nan)
+    if name in ENDS:
+        return known.ends[ENDS.index(name)].parameter
+    return _depth(known.known) if name == "depth_mm" else float(known.values(name)[0])
+
+
+def _depth(known: Equilibrium) -> float:
+    return -1e3 * float(known.position[2])
 
 
 def _slope(known: Candidate, name: str) -> Array:
     if name in MODE_OF:
-        return np.array([known.ways[key].modes[MODE_OF[name]].imag / (2 * np.pi) for key in known.keys])
+        rates = np.array([known.ways[key].modes[MODE_OF[name]] for key in known.keys])
+        return -rates.real if name.endswith(DECAY) else rates.imag / (2 * np.pi)
+    if name in ENDS:
+        return np.asarray(known.ends_by[ENDS.index(name)])
+    if name == "depth_mm":
+        return np.array([known.ways[key].of(_depth) for key in known.keys])
     return np.asarray(known.slopes(name)[0])
 
 
@@ -179,10 +244,13 @@ def fit(
     ----------
     data : path of a CSV or netCDF file, Dataset, or dict of columns
         A row for each experiment: what was set, by keys of the scene file ("frequency_hz"), and what was measured:
-        "distance_mm", "lateral_offset_mm", "polar_angle_deg" and frequencies of modes in the rotor's frame ("axial_hz",
-        "forward_whirl_hz", "backward_whirl_hz", "precession_hz", "nutation_hz"). Standard deviations are in columns of
-        the same names with "_error" (of all or of none: then all are the same, and what is left tells how large). Empty
-        cells were not measured.
+        "distance_mm", "depth_mm" (below the rotor's centre), "lateral_offset_mm", "polar_angle_deg", frequencies of
+        modes in the rotor's frame ("axial_hz", "forward_whirl_hz", "backward_whirl_hz", "precession_hz",
+        "nutation_hz"), their decay rates ("axial_decay_per_s") and the ends of stable frequencies ("lowest_hz",
+        "highest_hz"). Standard deviations are in columns of the same names with "_error" (of all or of none: then all
+        are the same, and what is left tells how large). Empty cells were not measured.
+        With a column "time_s" it is of tracks: "z_mm" at each time, and what was set, by which tracks are told apart.
+        Each gives the depth, and frequency and decay rate of the axial mode, with their errors.
     free : dict of str to (float, float)
         Bounds of the numbers that are looked for, by dotted key; the scene's own are within, where the fit begins.
 
@@ -212,7 +280,10 @@ def fit(
     """
     bounds = checked_free(free)
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
-    rows = _Rows(levitation, table_of(data), checked_free(free, levitation))
+    table = table_of(data)
+    if TIME in table and HEIGHT in table:
+        table = rows_of_tracks(table)
+    rows = _Rows(levitation, table, checked_free(free, levitation))
     low, high = np.array(list(bounds.values())).T
     found = scipy.optimize.least_squares(
         lambda z: rows.residuals(low + z * (high - low)),
@@ -263,7 +334,9 @@ def fit_figure(result: xr.Dataset) -> Figure:
         bars = here["deviation"].values if result.attrs["deviations_given"] else None
         panel.errorbar(along, here["measured"], bars, fmt="o", ms=3, color=PALETTE[1], label="measured")
         panel.plot(along[order], here["computed"].values[order], color=PALETTE[0], lw=0.9, label="computed")
-        unit, said = MEASURABLE.get(name, ("Hz", f"{name.removesuffix('_hz').replace('_', ' ')} mode"))
+        mode = name.removesuffix(FREQUENCY).removesuffix(DECAY).replace("_", " ")
+        other = ("s⁻¹", f"decay of the {mode} mode") if name.endswith(DECAY) else ("Hz", f"{mode} mode")
+        unit, said = MEASURABLE.get(name, other)
         panel.set(xlabel=label, ylabel=f"{said} ({unit})")
     legend_below(figure, axes[0][0])
     return figure
