@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import spinlev as sl
+from spinlev.studies.fit import rows_of_tracks
 
 FEW = {"model": "dipole", "plate_model": "none", "interaction": "rigid"}
 TRUE = {"rotor.displacement_mm": 1.9, "rotor.remanence_T": 1.29}
@@ -12,10 +13,10 @@ FREE = {"rotor.displacement_mm": (1.0, 3.0), "rotor.remanence_T": (1.2, 1.4)}
 FREQUENCIES = [110.0, 125.0, 140.0, 155.0]
 
 
-def scene(frequency, displacement=2.0, remanence=1.305):
+def scene(frequency, displacement=2.0, remanence=1.305, **more):
     rotor = sl.horizontal(displacement_mm=displacement, edge_mm=10.0, remanence_T=remanence)
     ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
-    return sl.scene(frequency_hz=frequency, rotor=rotor, floater=ball)
+    return sl.scene(frequency_hz=frequency, rotor=rotor, floater=ball, **more)
 
 
 def answers(displacement, remanence):
@@ -55,6 +56,47 @@ def test_files_that_are_no_table(tmp_path, data):
     kept = sl.fit(scene(130.0), xr.Dataset({name: ("row", values) for name, values in data.items()}).drop_vars(
         "axial_hz"), FREE, **FEW)  # fmt: skip
     assert kept.attrs["degrees_of_freedom"] == 6
+
+
+def test_a_track_tells_centre_frequency_and_decay_within_their_errors():
+    """Of 40 noisy tracks each number is off by its stated standard deviation in the root mean square, to a fifth."""
+    times, generator, off = np.linspace(0.0, 3.0, 90), np.random.default_rng(1), []
+    clean = -18.9 - 0.3 * np.exp(-1.2 * times) * np.cos(2 * np.pi * 6.3 * times + 0.4)
+    for _ in range(40):
+        table = {"time_s": times, "z_mm": clean + generator.normal(0.0, 0.02, 90)}
+        row = {name: float(value[0]) for name, value in rows_of_tracks(table).items()}
+        names = {"depth_mm": 18.9, "axial_hz": 6.3, "axial_decay_per_s": 1.2}
+        off.append([(row[name] - true) / row[f"{name}_error"] for name, true in names.items()])
+    assert np.sqrt(np.mean(np.square(off), axis=0)) == pytest.approx(np.ones(3), abs=0.25)
+    still = rows_of_tracks({"time_s": times, "z_mm": -18.9 + generator.normal(0.0, 0.02, 90)})
+    assert np.isnan(still["axial_hz"]).all()
+    with pytest.raises(sl.InputError, match="tracks of 16 points"):
+        rows_of_tracks({"time_s": times[:5], "z_mm": clean[:5]})
+
+
+@pytest.mark.slow
+def test_simulated_tracks_give_the_rotor_that_they_are_of():
+    """Two tracks at two frequencies, by 120 pictures a second with 5 µm of noise; small enough for modes."""
+    generator, columns = np.random.default_rng(2), []
+    for frequency in (120.0, 140.0):
+        there = scene(frequency, 1.9, start={"offset_mm": [0.0, 0.0, 0.1]})
+        track = sl.simulate(there, 1.0, **FEW)
+        times = np.arange(0.0, 1.0, 1 / 120)
+        height = 1e3 * np.interp(times, track.time, track.position.sel(axis="z")) + generator.normal(0, 0.005, 120)
+        columns.append(np.stack([times, height, np.full(120, frequency)]))
+    data = dict(zip(("time_s", "z_mm", "frequency_hz"), np.concatenate(columns, axis=1), strict=True))
+    found = sl.fit(scene(130.0), data, {"rotor.displacement_mm": (1.0, 3.0)}, **FEW)
+    assert abs(float(found.estimate[0]) - 1.9) < 4 * float(found.error[0]) < 0.01
+
+
+@pytest.mark.slow
+def test_ends_of_stable_frequencies_are_fitted():
+    there = scene(130.0, 1.9)
+    run = sl.gradient(there, ["lowest_frequency", "highest_frequency"], ["rotor.displacement_mm"], **FEW)
+    low, high = float(run.lowest_frequency_value), float(run.highest_frequency_value)
+    data = {"frequency_hz": [130.0], "lowest_hz": [low], "highest_hz": [high]}
+    found = sl.fit(scene(130.0), data, {"rotor.displacement_mm": (1.5, 3.0)}, **FEW)
+    assert float(found.estimate[0]) == pytest.approx(1.9, rel=1e-6)
 
 
 @pytest.mark.slow
