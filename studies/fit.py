@@ -249,7 +249,7 @@ def fit(
         "nutation_hz"), their decay rates ("axial_decay_per_s") and the ends of stable frequencies ("lowest_hz",
         "highest_hz"). Standard deviations are in columns of the same names with "_error" (of all or of none: then all
         are the same, and what is left tells how large). Empty cells were not measured.
-        With a column "time_s" it is of tracks: "z_mm" at each time, and what was set, by which tracks are told apart.
+        With a column "time_s" it is of tracks: "z_mm" at each time, and what was set, in which tracks differ.
         Each gives the depth, and frequency and decay rate of the axial mode, with their errors.
     free : dict of str to (float, float)
         Bounds of the numbers that are looked for, by dotted key; the scene's own are within, where the fit begins.

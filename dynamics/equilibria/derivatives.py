@@ -32,7 +32,7 @@ SINGULAR = 1e-9  # Smallest singular value of F_x, by the largest, below which t
 SLOWEST = 1e-7  # λ of a mode, rad⁻¹, that is no eigenvalue but one of the kept |m̂| and body spin
 COLLIDED = 1e-7  # |uᴴ T_λ v| by ‖T_λ v‖ below which two eigenvalues have met, where they have no derivative
 STEP = 1e-5  # Of differences along the tangent of what is a plain function of the state, scaled
-ALONG = 1e-4  # Of a difference of F, which corrects a derivative by 1e-5 of it
+ALONG = 5e-4  # Of differences of F of fourth order along it: where both their errors are 1e-12
 NEWTON_STEPS, FARTHEST = 20, 0.5  # Most steps to an equilibrium nearby, and the longest, in floater radii and rad
 POLISHED = 3  # Steps of Newton's method that make a known λ one of the pencil
 SOLVED = 10.0  # Relative error of a derivative, by the Newton step that is left at the equilibrium, in radii and rad
@@ -194,11 +194,11 @@ class Implicit:
         exact where the floater rests in the rotor's frame alone, and else leaves 5e-6 of a derivative.
         """
         size, ends = float(np.abs(change).max()) or 1.0, []
-        for sign in (1, -1):
-            states = self.start + (sign * ALONG / size) * change.reshape(self.start.shape)
+        for steps in (1, -1, 2, -2):
+            states = self.start + (steps * ALONG / size) * change.reshape(self.start.shape)
             residual, _, _, aims = self.setting.linear(self.setting.scales.unpack(states), self.known.spin)
             ends.append(np.append(residual, aims))
-        return (ends[0] - ends[1]) * (size / (2 * ALONG))
+        return (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) * (size / (12 * ALONG))
 
     def by(self, nearby: Sequence[Nearby]) -> Tangent:
         """The way by a number, from the equations at some values of it."""
