@@ -53,8 +53,8 @@ MORE = {
 # tenth it is 1e-4, and 3e-4 on one side
 TRUNCATED = 1e-3
 END_FOUND = 1e-6  # Relative error of derivatives of ends, by how exactly they are found
-# Relative error of a derivative, by that of the place, force or currents that a table misses: so it is more than 98 of
-# 100 are off by, in scenes by which it was chosen (two) and others (eight)
+# Relative error of a derivative, by that of the place, force or currents that a table misses: so it is more than 97 of
+# 100 are off by, in scenes by which it was chosen (two) and others (nine)
 TABLED = 10.0
 OF_MODES = ("growth", "mode_growth", "mode_frequency", "plate_damping")
 AT_FOLD = "at a fold an equilibrium has no derivatives"
