@@ -13,7 +13,7 @@ import threading
 import time
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -141,16 +141,26 @@ class Heartbeat(threading.Thread):
         super().__init__(name="heartbeat", daemon=True)
         self._say, self._pause, self._over = say, pause, threading.Event()
         self._began: float | None = None
+        self._around: float | None = None  # when the step began of which the present one is a part
         self._said, self._stage, self._fraction = time.monotonic(), "", 0.0
 
     def said(self, text: str = "") -> None:
-        """Something was shown; a text that ends in " ..." begins a step, any other ends it."""
+        """Something was shown. A text that ends in " ..." begins a step; any other ends it, and that around it goes on."""
         self._said = time.monotonic()
         if text:
-            self._began = self._said if text.endswith(" ...") else None
+            self._began = self._said if text.endswith(" ...") else self._around
             self.advanced(0.0)
         if self._began and self.ident is None:
             self.start()
+
+    @contextmanager
+    def around(self) -> Iterator[None]:
+        """Steps inside the block are parts of the present one."""
+        outer, self._around = self._around, self._began
+        try:
+            yield
+        finally:
+            self._around = outer
 
     def advanced(self, fraction: float, stage: str = "") -> None:
         """Finished share of the step, 0 to 1, or of one of its stages."""
@@ -235,8 +245,11 @@ def progress(label: str) -> Iterator[Callable[..., None]]:
     """A progress bar where messages are printed; gives a function that takes the finished fraction and a new label."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     shown = LOG.handlers and (ERRORS.is_interactive or ERRORS.is_jupyter)
-    with Progress(*columns, console=ERRORS, transient=True, disable=not shown) as bar:
+    with ExitStack() as parts, Progress(*columns, console=ERRORS, transient=True, disable=not shown) as bar:
         task = bar.add_task(label, total=1.0)
+        for handler in LOG.handlers:
+            if isinstance(handler, _Printed):
+                parts.enter_context(handler.heartbeat.around())
 
         def advance(fraction: float, text: str = label) -> None:
             if text != bar.tasks[task].description:

@@ -55,3 +55,16 @@ def test_a_step_that_knows_says_its_share_and_its_stage():
 def _first(said, line):
     while said.get(timeout=WAIT) != line:
         pass
+
+
+def test_a_step_goes_on_when_a_part_of_it_has_ended():
+    said: queue.Queue[str] = queue.Queue()
+    heartbeat = Heartbeat(said.put, 0.01)
+    heartbeat.said("study, 3 points ...")
+    with heartbeat.around():
+        heartbeat.said("Equilibria ...")
+        heartbeat.said("  done in 0.1 s.")
+        while not said.empty():  # of the part
+            said.get()
+        assert [said.get(timeout=WAIT) for _ in range(2)] == ["  0 s so far"] * 2
+    heartbeat.stop()
