@@ -145,7 +145,7 @@ class Heartbeat(threading.Thread):
         self._said, self._stage, self._fraction = time.monotonic(), "", 0.0
 
     def said(self, text: str = "") -> None:
-        """Something was shown. A text that ends in " ..." begins a step; any other ends it, and that around it goes on."""
+        """Something was shown. A text that ends in " ..." begins a step, any other ends it; that around it goes on."""
         self._said = time.monotonic()
         if text:
             self._began = self._said if text.endswith(" ...") else self._around
