@@ -269,7 +269,7 @@ def without_noise(coefficients: Coefficients, level: float) -> Coefficients:
 Part = tuple[int, int, int, complex]  # number of the expansion, l, m, and the real or imaginary part of the coefficient
 MOST = 300  # coefficients up to which a fit is worth its time
 ROUNDS = 6  # of reweighting in a fit
-MANY_PARTS = 2000
+MANY_PARTS = 2000  # of which each is looked at wherever the field is
 
 
 def trimmed_expansions(
@@ -305,7 +305,7 @@ def trimmed_expansions(
         return summed_derivatives(chosen, points, 1) / allowed[:, None] if chosen else np.zeros_like(points)
 
     total, sizes = added(parts), np.empty(len(parts))
-    every = slice(None, None, 1 + len(parts) // MANY_PARTS)  # of thousands some places tell which ones are small
+    every = slice(None, None, 1 + len(parts) // MANY_PARTS)  # of more some places tell which ones are small
     for k, expansion in enumerate(expansions):
         fields = _fields(expansion, [part for part in parts if part[0] == k], points[every])
         sizes[owner == k] = (np.linalg.norm(fields, axis=2) / allowed[every]).max(axis=1, initial=0.0)

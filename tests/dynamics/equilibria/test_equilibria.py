@@ -19,6 +19,7 @@ from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.harmonics.expansion import uniform_moments
+from spinlev.fem.rotor import table as tables
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry import rotor
@@ -193,6 +194,18 @@ def test_starts_thinned_on_the_way_find_what_all_find(name, free, monkeypatch):
     apart = np.abs(thinned[:, None] - every).max(axis=2)
     assert 3 <= len(thinned) <= len(every)
     assert apart.min(axis=0).max() < 1e-5
+
+
+def test_a_search_that_begins_with_few_moments_finds_the_same(monkeypatch):
+    scene, found = SCENES["tilt"], []
+    moments = tuple(uniform_moments(magnet, 14) for magnet in scene.rotor)
+    for few in (10_000, 0):
+        monkeypatch.setattr(tables, "FEW", few)
+        table = RotorTable("moments", scene.rotor, (), moments)
+        assert (table.rough is table) == (few > 0)
+        found.append(np.array([one.position for one in survey(scene, table).equilibria]))
+    assert len(found[0]) == 3
+    np.testing.assert_allclose(found[1], found[0], atol=1e-10)
 
 
 @pytest.mark.parametrize(("name", "frequency", "spin", "distance"), PUBLISHED)
