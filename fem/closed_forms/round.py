@@ -28,7 +28,7 @@ from ..harmonics.expressions import differentiated, whole_gradient
 from ..harmonics.solid import FOUR_PI, entries, gauss_legendre
 
 # Nodes of the rule for distances from the mantle of at least so many radii: round-off
-RULES = ((1e-2, 56), (1e-5, 100), (0.0, 220))
+RULES = ((0.8, 16), (0.1, 24), (1e-2, 32), (1e-5, 64), (0.0, 160))
 WIDEST, NARROWEST = 3.0, 1e-14
 CHUNK = 400_000  # points times nodes at once
 

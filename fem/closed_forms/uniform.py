@@ -259,6 +259,7 @@ def newton_potential(points: Array, half_edges: Array) -> Array:
 
 
 FAR = 5.0  # from this many circumradii on, moments are as exact as the closed form, whose terms cancel more and more
+TENSORS = 50_000  # points at once of `remanent_field`, whose tensors would take gigabytes
 FAR_DEGREE = 17  # the first moments left out are of degree 19 (the even ones of a box vanish): 5^-19 is 5e-14
 
 
@@ -372,9 +373,12 @@ def demagnetizing_tensor(body: Solid, points: Array) -> Array:
 
 def remanent_field(magnets: Sequence[Magnet], points: Array) -> Array:
     """μ0 H (n, 3) T of magnets with μr = 1 at points (n, 3) m, off their edges."""
-    known = [magnet for magnet in magnets if magnet.polarization.any()]
-    fields = [demagnetizing_tensor(m.body, points) @ m.polarization_in_rotor for m in known]
-    return np.asarray(np.sum([np.zeros_like(points), *fields], axis=0))
+    known, found = [magnet for magnet in magnets if magnet.polarization.any()], np.zeros_like(points)
+    for start in range(0, len(points), TENSORS):
+        here = slice(start, start + TENSORS)
+        for magnet in known:
+            found[here] += demagnetizing_tensor(magnet.body, points[here]) @ magnet.polarization_in_rotor
+    return found
 
 
 def remanent_potential(magnets: Sequence[Magnet], points: Array) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from ...geometry.common import Watch, unwatched
 from ...geometry.cutting import united
 from ...geometry.magnets import Magnet
+from ...geometry.shapes import Box
 from ..elements.surface import smooth
 from .models import (
     Accuracy,
@@ -45,7 +46,8 @@ def resolve_model(
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
 
     `auto` is the cheapest of dipole, moments and closed form that meets the accuracy; where permeability matters,
-    finite elements, or charges on the surfaces of `MANY` compact magnets or where no more than `ROUGH` is asked.
+    finite elements, or charges on the surfaces of `MANY` compact magnets, of two of which one is round, or where no
+    more than `ROUGH` is asked.
 
     Parameters
     ----------
@@ -69,7 +71,7 @@ def resolve_model(
     if permeability > rtol:
         reason = f"leaving out the recoil permeability is wrong by {permeability:.1e} {where}"
         if not without_charges(rotor, accuracy, points) and smooth(rotor):
-            if len(rotor) >= MANY:
+            if len(rotor) >= MANY or (len(rotor) > 1 and not all(isinstance(m.body, Box) for m in rotor)):
                 return "surface", f"{reason}, and elements of {len(rotor)} magnets take minutes and gigabytes"
             if rtol >= ROUGH:
                 return "surface", f"{reason}, and charges on the surfaces take a fraction of the elements' time"

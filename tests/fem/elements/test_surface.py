@@ -171,6 +171,9 @@ def test_auto_takes_it_for_many_magnets_and_for_rough_answers():
     name, why = resolve_model(halbach(8, 1.4), "auto")
     assert name == "surface"
     assert "elements of 8 magnets" in why
+    apart = box(center=(3.0, 0, 0))
+    assert resolve_model((box(), apart), "auto")[0] == "fem"
+    assert resolve_model((Magnet(Sphere(EDGE / 2), ALONG, 1.05), apart), "auto")[0] == "surface"
 
 
 @pytest.mark.parametrize(
