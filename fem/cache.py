@@ -36,7 +36,7 @@ from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_who
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
     "rotor": 10,
-    "mutual": 9,
+    "mutual": 10,
     "map": 3,
     "plate": 2,
     "driven-plate": 3,

@@ -121,9 +121,8 @@ class _Problem:
             if np.isfinite(end)
         ]
         self.best: list[tuple[float, Candidate, Array]] = []  # scenes that meet all limits, with how well
-        self.kept = (
-            search.looked_at
-        )  # how many scenes were looked at when one was better by more than `SETTLED` or `NEARER`
+        # how many scenes were looked at when one was better by more than `SETTLED` or `NEARER`
+        self.kept = search.looked_at
         self.by = ""  # models, for a message
         self.missed = np.inf  # by how much limits were missed then, before one met them
         self.nearest = np.inf, ""  # by how much the limits are missed at least, and which

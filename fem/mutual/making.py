@@ -19,7 +19,7 @@ from ..cache import TableKind
 from ..closed_forms.potentials import unit_dipole_fields
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
-from .response import COARSE, FINE, OF_MANY, OWN, ChargeResponse, enough_degree, two_body
+from .response import OWN, ChargeResponse, enough_degree, two_body
 from .samples import (
     CHUNK,
     NEAR_GAPS,
@@ -32,8 +32,6 @@ from .samples import (
     sphere_samples,
 )
 from .table import (
-    DIGITS,
-    FEW_DIGITS,
     MANY,
     OF_RETURN,
     OF_SPHERE,
@@ -43,7 +41,7 @@ from .table import (
     EnergySum,
     MutualTable,
     ResponseGrid,
-    charges_along,
+    effort,
     image_weights,
     mixed_sum,
     pair_sum,
@@ -51,15 +49,14 @@ from .table import (
     response_box,
 )
 
-SMALL = 1e-9  # relative size of a singular value that is none
+# Relative size of a singular value that is none; and up to how many weights they are found. No QR with pivots: their
+# order jumps from a scene to its neighbour, and derivatives would jump with it.
+SMALL, FEW_WEIGHTS = 1e-9, 500
 # What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
 PENALTY, FREE = 1e-3, 1e-6
 # Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
 SINGLE = 250
-# Gaps at which both are compared, in floater radii, and at how many poses for each magnet beside that at its pole
-GAPS, PLACES_EACH = (0.03, 0.08, 0.16, 0.5, 1.5), 2
-DEGREES, SERIES = 1e-4, 1e-5  # where the degrees and the series of both bodies end, and how much sooner of `MANY`
-SOONER = 10.0
+GAPS = (0.03, 0.08, 0.16, 0.5, 1.5)  # at which both are compared, in floater radii
 SAFETY = 4.0  # for the poses that were not looked at
 MEANS = 0.2  # of what is added, by the difference of two permeabilities whose mean the charges have: 0.09 measured
 CHARGED = 1.0  # error of the finer charges by what the coarser ones differ from them
@@ -78,18 +75,17 @@ def mutual_errors(
     """
     generator = np.random.default_rng(4)
     apart = max(float(np.ptp(np.linalg.eigvalsh(m.permeability_in_rotor))) for m in rotor.magnets)
-    errors = []
+    errors, taken = [], effort(len(rotor.magnets))
     for gap in watched(GAPS, watch, "error estimate"):
         worst = np.zeros(2)
-        each, sooner = (PLACES_EACH, 1.0) if len(rotor.magnets) < MANY else (1, SOONER)
-        anywhere = places_around(rotor.magnets, floater.radius, (gap,), each, 3)
+        anywhere = places_around(rotor.magnets, floater.radius, (gap,), taken.poses, 3)
         for place in (*anywhere, *_at_poles(rotor.magnets, (1 + gap) * floater.radius)):
             direction = generator.normal(size=3)
             direction /= np.linalg.norm(direction)
-            degree = enough_degree(rotor.magnets, Ball(place, floater.radius), sooner * DEGREES)
-            both = two_body(rotor, floater, place, direction, degree, sooner * SERIES)
+            degree = enough_degree(rotor.magnets, Ball(place, floater.radius), taken.degrees)
+            both = two_body(rotor, floater, place, direction, degree, taken.series)
             added = both.total - both.rigid
-            rough = two_body(coarse, floater, place, direction, degree, sooner * SERIES)
+            rough = two_body(coarse, floater, place, direction, degree, taken.series)
             unsure = added - (rough.total - rough.rigid)
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
             _, force, torque = table.added(place[None], floater.moment * direction[None], field[None], gradient[None])
@@ -125,14 +121,12 @@ OBLIQUE = (
     "one with two permeabilities and an easy axis along none of its edges, which its points cannot follow. Choose "
     "--interaction rigid, give it one recoil_permeability, or turn the body with its magnetisation."
 )
-EACH, EACH_OF_MANY = 16, 6  # places of dipoles for each gap and magnet; of rotors of `MANY` magnets
 # Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
 # many places the rotor's response to the sphere's is
 EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
 # Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, of two whose
 # points have weights of their own, and of others
 SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
-INNER = 2  # points along each axis at which magnets beside each other respond beyond their direct response
 
 
 def mutual_table(
@@ -167,14 +161,14 @@ def mutual_table(
         zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
         axis = magnet.polarization / size if size else np.zeros(3)
         grids.append(ResponseGrid(box, axis, floater.radius, counts, *zeros))
-    numbers = (COARSE, FINE) if len(magnets) < MANY else OF_MANY
-    coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, OWN)) for nodes in numbers)
+    taken = effort(len(magnets))
+    coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, OWN)) for nodes in taken.nodes)
     images = image_weights(floater.recoil_permeability)
-    inner = [grid.inner(INNER if 1 < len(grids) < MANY else 1) for grid in grids]
+    inner = [grid.inner(taken.inner if len(grids) > 1 else 1) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
     pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.permeable:
-        places = places_around(magnets, floater.radius, ROTOR_GAPS, EACH if len(grids) < MANY else EACH_OF_MANY, 1)
+        places = places_around(magnets, floater.radius, ROTOR_GAPS, taken.dipoles, 1)
         grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, places), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
@@ -198,7 +192,7 @@ def mutual_table(
 
 def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
     """Points along the edges of one of a `number` of magnets, where it responds to a floater of this `radius`, m."""
-    return point_counts(response_box(magnet.body), (1 + NEAREST) * radius, DIGITS if number < MANY else FEW_DIGITS)
+    return point_counts(response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
 
 
 def all_points(magnets: Sequence[Magnet], radius: float) -> int:
@@ -333,7 +327,7 @@ def sphere_fit(
         return np.concatenate([value / energy_size, *(by_place / force_size)], axis=-1)
 
     pairs = list(combinations(range(len(grids)), 2))
-    sums = [pair_sum(grids[a], grids[b], images, charges_along(len(grids))) for a, b in pairs]
+    sums = [pair_sum(grids[a], grids[b], images, effort(len(grids)).charges) for a, b in pairs]
     right = scaled(energy, -force, force)
     found, weights = _fitted(grids, single, OF_SPHERE, sums, places, 1, scaled, right, PENALTY)
     coupled = np.zeros((len(grids), len(grids)))
@@ -430,16 +424,13 @@ def least_squares(columns: Array, values: Array, small: Array, cost: float = PEN
 
     Parameters
     ----------
-    held : (k,) which weights are kept small: by themselves they are hardly determined
+    small : (k,) which weights are kept small: by themselves they are hardly determined
     cost : of a held one, by an error of the size of all values
     """
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
-    if not small.any():
-        scaled = columns / size
-        return np.asarray(
-            scipy.linalg.lstsq(scaled, values, cond=SMALL, lapack_driver="gelsy", overwrite_a=True)[0] / size
-        )
+    if not small.any() and len(size) <= FEW_WEIGHTS:
+        return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
     square = columns.T @ columns / np.outer(size, size)  # a copy of the columns would take hundreds of megabytes
     square[np.diag_indices_from(square)] += np.where(small, cost, FREE) ** 2
     return np.asarray(scipy.linalg.solve(square, columns.T @ values / size, assume_a="pos") / size)

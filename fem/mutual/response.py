@@ -68,10 +68,7 @@ def _degrees(share: float, decay: float, most: int) -> int:
 
 # Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off
 NODES = 24
-DIRECT_DIGITS = 12.0  # as `table.DIGITS`, for the direct part of the response
-# Nodes along an edge of a face for what is charged beyond the direct response, of few and of many magnets. With 10
-# the response of a cube with μr = 1.05 to a dipole errs by at most 7e-4 of it at any distance, with 14 by 6e-4.
-COARSE, FINE, OF_MANY = 10, 14, (4, 6)
+DIRECT_DIGITS = 12.0  # as `Effort.digits`, for the direct part of the response
 OWN = 8  # for the rotor's own field in a table, which then errs by 7e-5
 EDGES = 10.0  # by how much the part of these charges may be larger where they are densest
 ACROSS = 8  # of a rule in a magnet for what its second permeability adds to its own field

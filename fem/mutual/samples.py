@@ -13,7 +13,7 @@ from ..closed_forms.potentials import unit_dipole_fields, unit_dipole_potentials
 from ..harmonics.interior import Ball, dipole_sources, field_at_center, from_magnetization, multipole_force
 from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums
 from .response import ChargeResponse, enough_degree
-from .table import MANY, ResponseGrid, induced_sources, reflection
+from .table import ResponseGrid, effort, induced_sources, reflection
 
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
 # Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets
@@ -46,13 +46,13 @@ def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
 
     Parameters
     ----------
-    magnets : of a lone one, places on one side; of `MANY`, before the faces' middles alone
+    magnets : of a lone one, places on one side; of many, before the faces' middles alone
     radius, gaps : of the floater, m, and from a magnet, in radii
     """
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     if len(magnets) == 1:
         ways = ways[len(ways) // 2 :]
-    if len(magnets) >= MANY:
+    if not effort(len(magnets)).corners:
         ways = ways[np.count_nonzero(ways, axis=1) == 1]
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     found = [places_off(m.body, ways @ m.body.rotation.T, (1 + gap) * radius) for m in magnets for gap in gaps]

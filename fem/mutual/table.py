@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from itertools import permutations, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import heyoka as hy
 import numpy as np
@@ -35,18 +35,40 @@ PARALLEL = 1e-9  # entry of a unit vector, or of μ along the body's axes, that 
 UNIT = MU_0 / FOUR_PI
 # Edges of the boxes that stand for a sphere and for the section of a cylinder, in diameters
 IN_SPHERE, IN_CIRCLE = 0.64, 0.8
-# Along an edge of a face. The first meet what two magnets' fields do in the sphere to 1e-3 of all that is added; of
-# rotors of `MANY` magnets and of their responses the second do, with which the table errs by as much.
-CHARGES, FEW_CHARGES, MANY = 3, 2, 4
 # p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2; and q, about that of three dipoles
 POWERS, RETURNED = (4, 5, 6), (5, 6)
 OF_SPHERE, OF_RETURN = range(3, 9), range(9, 13)  # among a point's `numbers`: v and w of each p; s and t of each q
-# -ln of the error of Gauss's rule, about: with the weights fitted, force and torque are met to 1e-3; and of `MANY`
-DIGITS, FEW_DIGITS = 7.2, 5.5
 # Second derivatives over place and moment that are computed; they are symmetric
 ENTRIES = [(a, b) for a in range(6) for b in range(a, 6)]
 WHERE = np.array([[ENTRIES.index((min(a, b), max(a, b))) for b in range(6)] for a in range(6)])
 EVALUATIONS = 10_000  # of a formula at once, so that all numbers stay in the processor's cache
+
+
+class Effort(NamedTuple):
+    """How finely a rotor's responses are computed: what its table errs by is the points' and charges' alone."""
+
+    digits: float  # of the points: -ln of the error of Gauss's rule, about
+    charges: int  # along an edge of a face, that stand for the remanence where two magnets' fields are in the sphere
+    nodes: tuple[int, int]  # along an edge of a face, of two responses whose difference tells their error
+    dipoles: int  # places of them for each gap and magnet
+    inner: int  # points along each axis at which magnets beside each other respond beyond their direct response
+    corners: bool  # whether places before edges and corners are sampled, or before the faces' middles alone
+    poses: int  # at which errors are found, for each gap and magnet beside that at its pole
+    degrees: float  # where the degrees and the series of both bodies end there
+    series: float
+
+
+# With the weights fitted, few magnets' force and torque are met to 1e-3 of all that is added, many magnets' to 2e-2.
+# With 10 nodes the response of a cube with μr = 1.05 to a dipole errs by at most 7e-4 at any distance, with 14 by 6e-4.
+FEW_MAGNETS = Effort(7.2, 3, (10, 14), 16, 2, True, 2, 1e-4, 1e-5)
+MANY_MAGNETS, MANY = Effort(5.5, 2, (4, 6), 6, 1, False, 1, 1e-3, 1e-4), 4
+OF_RESPONSE = 2  # charges along an edge of a face, to whose response in the sphere magnets respond
+
+
+def effort(magnets: int) -> Effort:
+    """Of a rotor of so many magnets."""
+    return FEW_MAGNETS if magnets < MANY else MANY_MAGNETS
+
 
 # Energy (J times share²) of a place (3, m), a moment (3, A m² times share) and a row of numbers, and the share
 Formula = Callable[[Sequence[Any], Sequence[Any], Sequence[Any], Any], hy.expression]
@@ -336,7 +358,7 @@ def response_box(body: Solid) -> Box:
     return Box(body.size * share, body.center, body.rotation)
 
 
-def point_counts(box: Box, clearance: float, digits: float = DIGITS) -> tuple[int, int, int]:
+def point_counts(box: Box, clearance: float, digits: float) -> tuple[int, int, int]:
     """Gauss points along each edge of a `box` for fields with sources no nearer than a `clearance` (m) to the faces.
 
     `digits` is -ln of the error. It falls as ρ^-2n, ρ the sum of the half axes of the ellipse about the edge that
@@ -371,7 +393,7 @@ class MutualTable:
         """Whose sum is the energy of the moment M."""
         sums = [grid.energy(grid.numbers) for grid in self.grids]
         number = round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
-        inner, along = [grid.inner(number) for grid in self.grids], charges_along(len(self.grids))
+        inner, along = [grid.inner(number) for grid in self.grids], effort(len(self.grids)).charges
         if self.coupling.any():
             sums.append(coupled_sum(np.concatenate(inner), self.coupling))
         for a, b in permutations(range(len(self.grids)), 2):
@@ -462,11 +484,6 @@ class StrongerMutual:
         return square * energy, square * slope * units, square * second * np.outer(units, units)
 
 
-def charges_along(magnets: int) -> int:
-    """Charges along an edge of a face, of a rotor of so many `magnets`."""
-    return CHARGES if magnets < MANY else FEW_CHARGES
-
-
 def pair_sum(first: ResponseGrid, second: ResponseGrid, images: Array, count: int, weight: float = 1.0) -> EnergySum:
     """Minus `weight` (J) times the energy of the sphere by what the charges of `first` and `second` do in it together.
 
@@ -481,6 +498,6 @@ def mixed_sum(source: ResponseGrid, points: Array, images: Array, weight: float 
 
     That is to the `source`; `images` are the weights of `mixed_energy`.
     """
-    places, amounts = source.charges(FEW_CHARGES)
+    places, amounts = source.charges(OF_RESPONSE)
     mean = points, np.full(len(points), 1 / len(points))
     return charge_sum(mixed_energy, (places, weight * amounts), mean, source.radius, images)

@@ -74,6 +74,11 @@ SCENES = {
 }  # fmt: skip
 EVERYWHERE = ("frequency_hz", "floater.density_kg_m3", "rotor.remanence_T", "plate.center_mm.2",
               "plate.conductivity_S_m")  # fmt: skip
+# Scenes by which the factor in stated errors was chosen, where more is asked
+CHOSEN_BY = dict.fromkeys(
+    ("tilted cube, slab", "displaced cube, slab"),
+    ("rotor.edge_mm", "rotor.recoil_permeability", "floater.diameter_mm"),
+)
 ASKED = ["distance", "polar_angle", "mode_growth", "mode_frequency", "plate_damping"]
 
 
@@ -192,7 +197,7 @@ def test_derivatives_of_dipoles_over_a_slab_are_those_of_whole_equilibria():
 def test_stated_errors_are_those_of_coarse_tables(name):
     """Against tables of a hundredth of the error (a tenth of finite plates): what is stated is more in nine of ten."""
     scene, model = scene_of(name), SCENES[name][4]
-    keys = asked_in(name, scene)
+    keys = list(dict.fromkeys([*asked_in(name, scene), *CHOSEN_BY.get(name, ())]))
     one, other = (
         Gradient(each).dataset(each.equilibria[:1], ASKED, keys).isel(equilibrium=0)
         for rtol, plate in ((1e-4, 0.05), (1e-6, 5e-4 if model == "slab" else 5e-3))
@@ -203,3 +208,5 @@ def test_stated_errors_are_those_of_coarse_tables(name):
         true, stated = np.abs(one[answer] - other[answer]).values, one[f"{answer}_error"].values
         ratios += (stated / np.maximum(true, 1e-300))[np.abs(other[answer]) > 1e-9].tolist()
     assert np.mean(np.array(ratios) >= 1) > 0.9, np.mean(np.array(ratios) >= 1)
+    if name in CHOSEN_BY:
+        assert np.median(ratios) < 30
