@@ -5,8 +5,7 @@ import pytest
 from peers import SCENE, around, magpylib_rotor
 
 from spinlev.fem.elements.ladder import reaction_moments
-from spinlev.fem.elements.magnetostatics import assemble, solve
-from spinlev.fem.elements.second_opinion import magnet_dipoles
+from spinlev.fem.elements.magnetostatics import assemble, magnet_dipoles, solve
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import RotorTable

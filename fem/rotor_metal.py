@@ -26,10 +26,10 @@ from numpy.typing import ArrayLike
 
 from ..geometry.common import MU_0, Array, InputError, Watch, unwatched, watched
 from ..geometry.cutting import cut_magnets
-from ..geometry.magnets import Magnet
+from ..geometry.magnets import Conductor, Magnet
 from ..geometry.meshes.plate import skin_depth
 from ..geometry.meshes.solids import SolidMesh, mesh_metal
-from ..geometry.rotor import Conductor, separate_pieces
+from ..geometry.overlap import separate_pieces
 from ..geometry.scene.contents import Scene
 from ..geometry.shapes import Box, Cylinder
 from ..geometry.solids import Solid, places_off

@@ -1,6 +1,5 @@
 from .common import MU_0 as MU_0, InputError as InputError
-from .magnets import Magnet as Magnet
-from .rotor import horizontal as horizontal, tilt as tilt, vertical as vertical
+from .magnets import Magnet as Magnet, horizontal as horizontal, tilt as tilt, vertical as vertical
 from .scene.contents import (
     AbsoluteStart as AbsoluteStart,
     Drag as Drag,

@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from .common import Array
-from .magnets import Magnet
+from .magnets import Conductor, Magnet
 from .shapes import Box, Cylinder, Sphere, rotation_matrix
 from .solids import Part, Solid, Solids, moved
 
@@ -163,3 +163,20 @@ def closing_shifts(magnets: Sequence[Magnet]) -> Array:
 def largest_shift(magnets: Sequence[Magnet]) -> float:
     """Length of the longest of the `closing_shifts`, m."""
     return float(np.linalg.norm(closing_shifts(magnets), axis=1).max())
+
+
+def separate_pieces(conductors: Sequence[Conductor]) -> list[tuple[Conductor, ...]]:
+    """The conductors in groups among which no current can flow.
+
+    Conductors that touch and have the same conductivity are one piece of metal, as a shaft with its flange; all others
+    are taken as insulated from each other by their surfaces.
+    """
+    groups: list[list[Conductor]] = []
+    for new in conductors:
+        joined, others = [new], list[list[Conductor]]()
+        for group in groups:
+            metal = [known for known in group if known.conductivity == new.conductivity]
+            touch = any(body_overlap(new.body, known.body) > -TOUCHING for known in metal)
+            joined, others = (joined + group, others) if touch else (joined, [*others, group])
+        groups = [*others, joined]
+    return [tuple(group) for group in groups]

@@ -34,10 +34,9 @@ from .cli.options import COLUMNS, Answer, Models
 from .coils import coils_at_start, coils_job
 from .compare import compared_models
 from .demagnetising import write_working_point
-from .figures.drive import drive_figure
 from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
-from .figures.run import field_figure, force_figure, trajectory_figure
+from .figures.run import drive_figure, field_figure, force_figure, trajectory_figure
 from .figures.style import save_figures
 from .gradient import gradient_job
 from .levitation import Levitation

@@ -2,7 +2,7 @@
 
 from places import HORIZONTAL
 
-from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.scene.floater import Floater

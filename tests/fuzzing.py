@@ -44,8 +44,8 @@ from spinlev.fem.maps_of_B.columns import FieldMapError
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import ROTOR
 from spinlev.geometry import files as own_process, step_file
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.meshes import solids
-from spinlev.geometry.rotor import horizontal
 from spinlev.geometry.scene.files import load_scene
 from spinlev.studies.cli import main as cli
 from spinlev.studies.page.state import first_state

@@ -16,12 +16,21 @@ from numpy.typing import NDArray
 from ...geometry.common import Array, MeshError, Watch, unwatched
 from ...geometry.cutting import Cells, cells_of
 from ...geometry.magnets import Magnet
-from ...geometry.meshes.magnets import MagnetMesh, MeshSettings, mesh_magnets
+from ...geometry.meshes.magnets import (
+    SAME_PLACE,
+    MagnetMesh,
+    MeshSettings,
+    Symmetry,
+    find_symmetry,
+    mesh_magnets,
+    mirror,
+    mirror_images,
+    parity_parts,
+)
 from ...geometry.meshes.solids import OTHERWISE
 from ...geometry.overlap import closing_shifts, shifted_magnet
 from ...geometry.shapes import Box
 from ...geometry.solids import Solid
-from ...geometry.symmetry import SAME_PLACE, Symmetry, find_symmetry, mirror, mirror_images, parity_parts
 from ..closed_forms.moments import by_cells
 from ..harmonics.expansion import MultipoleExpansion, curvature_moments, moments_of_magnetization
 from ..harmonics.solid import Coefficients, mirrored_harmonics, rotated_harmonics

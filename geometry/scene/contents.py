@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from ..common import Array, frozen_array, html_table, listed, millimetres
-from ..magnets import Magnet
-from ..rotor import Conductor
+from ..magnets import Conductor, Magnet
 from ..shapes import Box, Cylinder
 from ..solids import Compound, Part, Solid, Solids
 from .floater import Floater

@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from ..magnets import Magnet
-from ..rotor import Conductor, Rotor, horizontal, tilt, vertical
+from ..magnets import Conductor, Magnet, Rotor, horizontal, tilt, vertical
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix
 from ..solids import Part, Solid, known_shape
 from .contents import AbsoluteStart, Coil, Companion, Drag, DriveStep, Lowering, MapReading, OffsetStart, Plate, Scene

@@ -19,7 +19,7 @@ from ..plan import sources
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, recorded
 from . import article, showing
-from .article_formulas import field, force, side_radius
+from .article import field, force, side_radius
 
 # On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
 DISTANCES = np.array([15e-3, 20e-3, 25e-3, 30e-3, 40e-3])

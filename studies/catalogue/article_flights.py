@@ -23,7 +23,7 @@ from ..levitation import Levitation
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
 from . import article
-from .article_formulas import analytic_distance, balanced
+from .article import analytic_distance, balanced
 from .showing import by_configuration, by_rotor, drawn, explain, rotor_panels, small_multiples, span, text_table
 
 # Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.

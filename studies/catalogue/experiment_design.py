@@ -29,8 +29,7 @@ from ...dynamics.motion.state import Parameter, Scales
 from ...fem.cache import TableKind
 from ...fem.rotor_metal import RotorLosses, cached_rotor_losses
 from ...geometry.common import MAGNET_CONDUCTIVITY, Array
-from ...geometry.magnets import Magnet
-from ...geometry.rotor import horizontal, tilt, vertical
+from ...geometry.magnets import Magnet, horizontal, tilt, vertical
 from ...geometry.scene.contents import Drag, Scene
 from ...geometry.solids import moved
 from ..cli.options import FieldModel

@@ -13,16 +13,15 @@ from matplotlib.figure import Figure
 
 from ...fem.closed_forms.moments import added_by_closed_form, carrier, oblique_contact
 from ...fem.elements.ladder import Refinement, solve_rotor
-from ...fem.elements.second_opinion import coulomb_field
+from ...fem.elements.magnetostatics import coulomb_field
 from ...fem.harmonics.expansion import uniform_moments
 from ...fem.rotor.choice import rotor_table
 from ...fem.rotor.models import Accuracy, AccuracyWarning, fem_table, points_around, typical_field
 from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
 from ...geometry.cutting import cells_of, cut_magnets
-from ...geometry.magnets import Magnet
+from ...geometry.magnets import Magnet, horizontal, tilt, vertical
 from ...geometry.meshes.magnets import MeshSettings
-from ...geometry.rotor import horizontal, tilt, vertical
 from ...geometry.shapes import Box, Cylinder, ring, rotation_matrix
 from ..cli.console import progress
 from ..figures.style import PALETTE

@@ -14,7 +14,7 @@ from ...dynamics.continuation.slow_drift import Lasting, drift, lasting_frequenc
 from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...dynamics.motion.state import Scales
 from ...geometry.common import Array
-from ...geometry.rotor import Conductor
+from ...geometry.magnets import Conductor
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box
 from ..cli.console import note

@@ -25,11 +25,11 @@ from ..coils import coils_figure
 from ..compare import compare_figure
 from ..design import design_figure
 from ..exchange import field_map_figure
-from ..figures.drive import drive_figure
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
 from ..figures.run import (
     drawable,
+    drive_figure,
     field_figure,
     force_figure,
     modes_figure,

@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from ...fem.closed_forms.moments import added_by_closed_form, carrier
 from ...fem.compiled_code import compiled
 from ...fem.elements.ladder import Refinement, refinement_of, solve_rotor
-from ...fem.elements.second_opinion import magnet_dipoles
+from ...fem.elements.magnetostatics import magnet_dipoles
 from ...fem.harmonics.expansion import uniform_moments, without_noise
 from ...fem.maps_of_B.columns import FieldMap
 from ...fem.maps_of_B.table import fit_field_map
@@ -29,9 +29,8 @@ from ...fem.rotor.choice import rotor_table
 from ...fem.rotor.models import AccuracyWarning
 from ...fem.rotor.table import FieldTable, RotorTable
 from ...geometry.common import Array
-from ...geometry.magnets import Magnet
+from ...geometry.magnets import Magnet, horizontal
 from ...geometry.meshes.magnets import MeshSettings, mesh_magnets
-from ...geometry.rotor import horizontal
 from ..cli.console import note
 from ..figures.style import PALETTE
 from ..processes import safe_path

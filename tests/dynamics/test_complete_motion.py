@@ -24,8 +24,8 @@ from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import plate_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.meshes.plate import MeshRule
-from spinlev.geometry.rotor import horizontal
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Lowering, Plate, Scene
 from spinlev.geometry.shapes import Box
 

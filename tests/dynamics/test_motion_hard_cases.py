@@ -19,12 +19,12 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
 from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box
 
-SCENE = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, NO_DRAG, start=OffsetStart(np.zeros(3)))
+SCENE = Scene(110.0, horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, NO_DRAG, start=OffsetStart(np.zeros(3)))
 TABLE = rotor_table(SCENE.rotor, "dipole")
 LEDGER = 1e-12
 """Round-off of the ledger over some hundred turns; measured 1e-15 to 3e-13."""
@@ -107,7 +107,7 @@ def test_without_weight_everything_scales(rates):
     large = replace(
         scene,
         frequency=scene.frequency / 3,
-        rotor=rotor.horizontal(6e-3, 30e-3, 1.305, 1.0),
+        rotor=horizontal(6e-3, 30e-3, 1.305, 1.0),
         floater=replace(FLOATER, radius=3 * RADIUS),
     )
     small = find_equilibria(scene, TABLE, rates=rates)
@@ -176,7 +176,7 @@ def test_one_kilohertz(rates):
     The terms of the Jacobi integral cancel to some thousandths there, and its relative error is as much larger.
     """
     assert not any(e.stable for e in find_equilibria(replace(SCENE, frequency=1000.0), TABLE, rates=rates))
-    magnets = rotor.horizontal(3e-5, 10e-3, 1.305, 1.0)
+    magnets = horizontal(3e-5, 10e-3, 1.305, 1.0)
     scene = replace(SCENE, frequency=1000.0, rotor=magnets, gravity=np.zeros(3))
     table = rotor_table(magnets, "dipole")
     found = find_equilibria(scene, table)
@@ -240,7 +240,7 @@ def test_a_rotor_that_does_not_turn():
 @pytest.mark.slow
 def test_a_million_turns():
     """3 h 28 min of the vertical rotor at 80 Hz without drag: Jacobi integral to 1e-11, |m| to 1e-12, a small file."""
-    magnets = rotor.vertical(14e-3, 10e-3, 1.305, 1.05)
+    magnets = vertical(14e-3, 10e-3, 1.305, 1.05)
     scene = Scene(80.0, magnets, Floater(RADIUS, 1.305, 1.05, 7500.0), NO_DRAG)
     flight = simulate(scene, rotor_table(magnets, "dipole"), 12500.0)
     length = float(np.abs(np.linalg.norm(flight.lab.moment, axis=1) - 1).max())

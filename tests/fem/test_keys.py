@@ -18,9 +18,8 @@ from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
 from spinlev.fem.plate.table import Region
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import ROTOR
-from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.magnets import Conductor, Magnet, horizontal
 from spinlev.geometry.meshes.plate import MeshRule
-from spinlev.geometry.rotor import Conductor, horizontal
 from spinlev.geometry.scene.contents import Drag, Lowering, MapReading, Plate, Scene
 from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring

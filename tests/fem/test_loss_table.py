@@ -10,7 +10,7 @@ from spinlev.fem import rotor_metal as tabulate
 from spinlev.fem.cache import TableFileError
 from spinlev.fem.rotor_metal import LOSSES, check_metal, metal_of, of_motion, pieces_of, rotor_losses
 from spinlev.geometry.common import InputError
-from spinlev.geometry.rotor import Conductor, horizontal
+from spinlev.geometry.magnets import Conductor, horizontal
 from spinlev.geometry.shapes import Box, Cylinder
 
 pytestmark = pytest.mark.slow

@@ -19,8 +19,8 @@ from spinlev.fem.rotor_metal import (
     rotor_losses,
 )
 from spinlev.geometry.common import InputError
+from spinlev.geometry.magnets import Conductor
 from spinlev.geometry.meshes.solids import SolidMesh
-from spinlev.geometry.rotor import Conductor
 from spinlev.geometry.shapes import Box, Cylinder, ring
 
 SIGMA = 6.7e5

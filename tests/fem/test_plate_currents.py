@@ -25,8 +25,8 @@ from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import plate_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import AccuracyError
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
-from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.shapes import Box
 

@@ -21,8 +21,8 @@ from spinlev.fem.plate.eddy import EddySpace
 from spinlev.fem.plate.network import from_elements
 from spinlev.fem.plate.tables import slab_and_rotor_table, tabulate
 from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
-from spinlev.geometry.rotor import horizontal
 from spinlev.geometry.scene.contents import Lowering, Plate
 from spinlev.geometry.shapes import Box
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from spinlev.geometry.overlap import body_overlap
-from spinlev.geometry.rotor import Conductor, separate_pieces
+from spinlev.geometry.magnets import Conductor
+from spinlev.geometry.overlap import body_overlap, separate_pieces
 from spinlev.geometry.shapes import Box, Cylinder, rotation_matrix
 
 TURN = rotation_matrix((20.0, -35.0, 50.0))

@@ -18,7 +18,7 @@ from spinlev.dynamics.equilibria.equilibrium import (
 )
 from spinlev.dynamics.equilibria.search import free_of_bodies
 from spinlev.dynamics.motion.state import State
-from spinlev.geometry.rotor import Conductor
+from spinlev.geometry.magnets import Conductor
 from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.shapes import Box
 from spinlev.studies.cli.options import Models

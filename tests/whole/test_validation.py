@@ -8,8 +8,8 @@ from spinlev.dynamics.flights.flight import simulate
 from spinlev.fem.elements.ladder import Refinement, solve_rotor
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.magnets import horizontal, tilt, vertical
 from spinlev.geometry.meshes.magnets import MeshSettings
-from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
 pytestmark = pytest.mark.slow

@@ -14,11 +14,11 @@ from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
-HORIZONTAL = Scene(118.0, rotor.horizontal(1.7e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
-VERTICAL = Scene(60.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
+HORIZONTAL = Scene(118.0, horizontal(1.7e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
+VERTICAL = Scene(60.0, vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 TABLES = {id(scene): rotor_table(scene.rotor, "dipole") for scene in (HORIZONTAL, VERTICAL)}
 
 

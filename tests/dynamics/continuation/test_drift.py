@@ -14,14 +14,14 @@ from spinlev.dynamics.motion.floater_effects import reynolds, spinning, swinging
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales, State
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.scene.contents import AIR_VISCOSITY, Drag, Scene
 from spinlev.geometry.scene.floater import Floater
 
 RADIUS, SIGMA = 6.35e-3, 6.7e5
 FLOATER = Floater(RADIUS, 1.305, 1.0, 7500.0, SIGMA)
-VERTICAL = Scene(66.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
-HORIZONTAL = Scene(165.0, rotor.horizontal(1e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
+VERTICAL = Scene(66.0, vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
+HORIZONTAL = Scene(165.0, horizontal(1e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
 VERTICAL_TABLE, HORIZONTAL_TABLE = (rotor_table(s.rotor, "dipole") for s in (VERTICAL, HORIZONTAL))
 
 

@@ -12,15 +12,15 @@ from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
 from spinlev.geometry.common import InputError
+from spinlev.geometry.magnets import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
 ROTORS = {
-    "horizontal": (rotor.horizontal(2e-3, *SHAPE), np.linspace(1e-3, 4e-3, 9)),
-    "vertical": (rotor.vertical(14e-3, *SHAPE), np.linspace(10e-3, 18e-3, 9)),
-    "tilt": (rotor.tilt(np.radians(10.0), *SHAPE), np.radians(np.linspace(5.0, 20.0, 9))),
+    "horizontal": (horizontal(2e-3, *SHAPE), np.linspace(1e-3, 4e-3, 9)),
+    "vertical": (vertical(14e-3, *SHAPE), np.linspace(10e-3, 18e-3, 9)),
+    "tilt": (tilt(np.radians(10.0), *SHAPE), np.radians(np.linspace(5.0, 20.0, 9))),
 }
 FREQUENCIES = np.linspace(60.0, 180.0, 13)
 

@@ -9,14 +9,14 @@ from spinlev.dynamics.continuation.map import equilibrium_map, family_grid
 from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.equilibria.balance import EVERY
 from spinlev.dynamics.equilibria.curves import newton_search
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)
 ROTORS = {
-    "horizontal": (rotor.horizontal(2e-3, *SHAPE), (0.6e-3, 5e-3)),
-    "vertical": (rotor.vertical(14e-3, *SHAPE), (10e-3, 20e-3)),
-    "tilt": (rotor.tilt(np.radians(10.0), *SHAPE), (np.radians(3.0), np.radians(25.0))),
+    "horizontal": (horizontal(2e-3, *SHAPE), (0.6e-3, 5e-3)),
+    "vertical": (vertical(14e-3, *SHAPE), (10e-3, 20e-3)),
+    "tilt": (tilt(np.radians(10.0), *SHAPE), (np.radians(3.0), np.radians(25.0))),
 }
 CASES = [(name, model) for model in ("dipole", "cuboid") for name in ROTORS]
 

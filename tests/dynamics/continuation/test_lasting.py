@@ -11,13 +11,13 @@ from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.floater import Floater
 
 SCENE = Scene(
     75.0,
-    rotor.vertical(14e-3, 10e-3, 1.305, 1.0),
+    vertical(14e-3, 10e-3, 1.305, 1.0),
     Floater(RADIUS, 1.305, 1.0, 7500.0, 6.7e5),
     replace(Drag.stokes(RADIUS), air=True),
 )

@@ -18,7 +18,7 @@ from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
 from spinlev.geometry.common import InputError
-from spinlev.geometry.rotor import Conductor, horizontal, tilt, vertical
+from spinlev.geometry.magnets import Conductor, horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
 SHAPE = (10e-3, 1.305, 1.05)

@@ -17,7 +17,7 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
-from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import Drag, Scene
 
 SCENE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))

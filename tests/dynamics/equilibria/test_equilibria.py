@@ -22,7 +22,7 @@ from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor import table as tables
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import RotorTable
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.files import parse_scene
 from spinlev.geometry.scene.floater import Floater
@@ -30,9 +30,9 @@ from spinlev.geometry.shapes import Box
 
 SHAPE = 10e-3, 1.305, 1.0
 SCENES = {
-    "horizontal": Scene(110.0, rotor.horizontal(2e-3, *SHAPE), FLOATER, Drag(0.0, 0.0)),
-    "vertical": Scene(80.0, rotor.vertical(14e-3, *SHAPE), FLOATER, Drag(0.0, 0.0)),
-    "tilt": Scene(130.0, rotor.tilt(np.radians(10.0), *SHAPE), FLOATER, Drag(0.0, 0.0)),
+    "horizontal": Scene(110.0, horizontal(2e-3, *SHAPE), FLOATER, Drag(0.0, 0.0)),
+    "vertical": Scene(80.0, vertical(14e-3, *SHAPE), FLOATER, Drag(0.0, 0.0)),
+    "tilt": Scene(130.0, tilt(np.radians(10.0), *SHAPE), FLOATER, Drag(0.0, 0.0)),
 }
 EIGHTH_ORDER = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
 
@@ -142,9 +142,9 @@ def test_no_equilibrium_lies_off_the_curves(monkeypatch):
         kind = generator.integers(3)
         shape = edge, generator.uniform(0.6, 1.4), 1.0
         magnets = (
-            rotor.horizontal(displacement, *shape),
-            rotor.vertical(edge + displacement, *shape),
-            rotor.tilt(angle, *shape),
+            horizontal(displacement, *shape),
+            vertical(edge + displacement, *shape),
+            tilt(angle, *shape),
         )[kind]
         frequency = float(np.exp(generator.uniform(np.log(20.0), np.log(400.0))))
         scene = Scene(frequency, magnets, replace(FLOATER, radius=generator.uniform(2e-3, 8e-3)), Drag(0.0, 0.0))
@@ -210,7 +210,7 @@ def test_a_search_that_begins_with_few_moments_finds_the_same(monkeypatch):
 
 @pytest.mark.parametrize(("name", "frequency", "spin", "distance"), PUBLISHED)
 def test_published_distances_of_the_family(name, frequency, spin, distance):
-    magnets = rotor.horizontal(1.7e-3, *SHAPE) if name == "horizontal" else rotor.vertical(14e-3, *SHAPE)
+    magnets = horizontal(1.7e-3, *SHAPE) if name == "horizontal" else vertical(14e-3, *SHAPE)
     scene = replace(SCENES[name], frequency=frequency, rotor=magnets)
     stable = [e for e in find_equilibria(scene, table_of(scene, "dipole"), spin) if e.stable]
     if distance is None:
@@ -316,9 +316,9 @@ def stated_by_true(rotor, frequency, floater, model, truth, clear=12.5e-3):
 
 
 ROTORS = {
-    **{f"horizontal {d}": rotor.horizontal(d * 1e-3, 10e-3, 1.305, 1.05) for d in (0.5, 1, 2, 3, 4)},
-    **{f"vertical {d}": rotor.vertical(d * 1e-3, 10e-3, 1.305, 1.05) for d in (11, 13, 16)},
-    **{f"tilt {a}": rotor.tilt(np.radians(a), 10e-3, 1.305, 1.05) for a in (3, 5, 10, 15)},
+    **{f"horizontal {d}": horizontal(d * 1e-3, 10e-3, 1.305, 1.05) for d in (0.5, 1, 2, 3, 4)},
+    **{f"vertical {d}": vertical(d * 1e-3, 10e-3, 1.305, 1.05) for d in (11, 13, 16)},
+    **{f"tilt {a}": tilt(np.radians(a), 10e-3, 1.305, 1.05) for a in (3, 5, 10, 15)},
 }
 
 
@@ -354,7 +354,7 @@ def test_the_same_of_random_rotors(number):
     """Cubes of any edge, remanence and permeability, displaced, in pairs and tilted, within the same factor of ten."""
     random = np.random.default_rng(number)
     edge, remanence, permeability, frequency = random.uniform((6e-3, 1.0, 1.02, 60), (14e-3, 1.45, 1.1, 180))
-    make = (rotor.horizontal, rotor.vertical, rotor.tilt)[number % 3]
+    make = (horizontal, vertical, tilt)[number % 3]
     low, high = ((0.05 * edge, 0.4 * edge), (1.05 * edge, 1.7 * edge), (0.03, 0.35))[number % 3]
     magnets = make(random.uniform(low, high), edge, remanence, permeability)
     truth, clear = rotor_table(magnets, "fem", 1e-5), 1.75 * edge + FLOATER.radius

@@ -15,12 +15,12 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.scene.contents import Drag, Plate, Scene
 from spinlev.geometry.shapes import Box
 
-VERTICAL = Scene(80.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
-HORIZONTAL = Scene(110.0, rotor.horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
+VERTICAL = Scene(80.0, vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
+HORIZONTAL = Scene(110.0, horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag(0.0, 0.0))
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.056)), 3.5e7)
 REGION = Region(np.array([-0.004, -0.004, 0.024]), np.array([0.004, 0.004, 0.041]))
 

@@ -14,7 +14,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import vertical
 from spinlev.geometry.scene.contents import Drag
 
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
@@ -109,7 +109,7 @@ def test_stokes_drag_is_resolved():
 @pytest.mark.parametrize(("frequency", "spin", "stable"), [(80.0, 0.0, True), (100.0, 0.0, False), (80.0, -0.4, False)])
 def test_published_stability_of_the_vertical_rotor(frequency, spin, stable):
     """PHYSICS.md: stable at 80 Hz, oscillatory loss from about 100 Hz, laterally unstable from s = -0.4."""
-    magnets = rotor.vertical(14e-3, 10e-3, 1.305, 1.0)
+    magnets = vertical(14e-3, 10e-3, 1.305, 1.0)
     scene = replace(SCENE, frequency=frequency, rotor=magnets)
     found = [e for e in find_equilibria(scene, dipole_table(magnets), spin) if 15e-3 < e.distance < 30e-3]
     assert found

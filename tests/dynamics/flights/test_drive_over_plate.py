@@ -16,7 +16,7 @@ from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
-from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import AbsoluteStart, DriveStep, Lowering, Plate, Scene
 from spinlev.geometry.shapes import Box
 

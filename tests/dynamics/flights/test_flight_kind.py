@@ -20,11 +20,11 @@ from spinlev.dynamics.flights.trajectory import (
 )
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
 TIME = np.linspace(0, 20, 5000)
-VERTICAL = Scene(80.0, rotor.vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
+VERTICAL = Scene(80.0, vertical(14e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))
 
 
 def flown(distance, ended_by, time=TIME):

@@ -13,12 +13,12 @@ from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
 from spinlev.geometry.common import InputError
+from spinlev.geometry.magnets import tilt
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Lowering, Plate, Scene
 from spinlev.geometry.shapes import Box, rotation_matrix
 
-MAGNETS = rotor.tilt(np.radians(10), 10e-3, 1.305, 1.0)
+MAGNETS = tilt(np.radians(10), 10e-3, 1.305, 1.0)
 TABLE = rotor_table(MAGNETS, "dipole")
 SIZE = np.array([0.1, 0.24, 0.03])
 PLATE = Plate(Box(SIZE, np.array([0.0, 0.0, -0.05])), 3.5e7)

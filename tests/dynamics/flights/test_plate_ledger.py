@@ -18,7 +18,7 @@ from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Plate, Scene
 from spinlev.geometry.shapes import Box
 
@@ -33,7 +33,7 @@ def memory_of(table):
 
 def test_what_a_steady_turn_loses_is_that_of_the_frequency_domain():
     """Weighing 800 t, the floater turns in one place: momentum, spin and energy lost in 55 turns, to 1e-5."""
-    magnets = rotor.horizontal(2e-3, 10e-3, 1e-12, 1.0)
+    magnets = horizontal(2e-3, 10e-3, 1e-12, 1.0)
     heavy = replace(FLOATER, density=7.5e11)
     scene = replace(SCENE, rotor=magnets, floater=heavy, drag=Drag(0.0, 0.0), gravity=np.zeros(3))
     table = rotor_table(magnets, "dipole")

@@ -13,7 +13,7 @@ from spinlev.dynamics.motion.floater_effects import moving, reynolds, spinning, 
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales, State
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import AIR_VISCOSITY, AbsoluteStart, Drag, Scene
 
 STOKES = Scene(110.0, horizontal(2e-3, 10e-3, 1.305, 1.0), FLOATER, Drag.stokes(RADIUS))

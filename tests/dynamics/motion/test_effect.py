@@ -12,7 +12,7 @@ from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales, dot
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry.rotor import vertical
+from spinlev.geometry.magnets import vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.studies.cli.options import Models
 from spinlev.studies.effects import listed_effects

@@ -15,10 +15,10 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales, State, turned_about_z
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable
-from spinlev.geometry import rotor
+from spinlev.geometry.magnets import vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
-MAGNETS = rotor.vertical(14e-3, 10e-3, 1.305, 1.0)
+MAGNETS = vertical(14e-3, 10e-3, 1.305, 1.0)
 TABLES = {
     "dipole": RotorTable("dipole", MAGNETS, (), tuple(uniform_moments(m, 1) for m in MAGNETS)),
     "cuboid": RotorTable("cuboid", MAGNETS, MAGNETS),

@@ -19,7 +19,7 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.fem.rotor_metal import CUBE, ball_losses
 from spinlev.geometry.common import MU_0, InputError
-from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box

@@ -22,7 +22,7 @@ from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.mutual.response import two_body
 from spinlev.fem.rotor.choice import cached_rotor_table, rotor_table
 from spinlev.geometry.common import InputError
-from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.magnets import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 
 SCENE = Scene(110.0, PERMEABLE_MAGNETS, PERMEABLE, Drag(0.0, 0.0))

@@ -19,7 +19,7 @@ from spinlev.dynamics.motion.events import rotor_gap
 from spinlev.dynamics.motion.state import Parameter, Scales, State, matrices_of, quaternions_of
 from spinlev.fem.harmonics.rigid import shells, sizes
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry.rotor import tilt
+from spinlev.geometry.magnets import tilt
 from spinlev.geometry.scene.contents import AbsoluteStart
 from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box

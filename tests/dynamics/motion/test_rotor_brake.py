@@ -21,7 +21,7 @@ from spinlev.dynamics.motion.state import Scales, State
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
 from spinlev.geometry.common import InputError
-from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Scene
 
 CUBE = tuple(replace(magnet, conductivity=6.7e5) for magnet in horizontal(1.5e-3, 10e-3, 1.305, 1.0))

@@ -20,7 +20,7 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
-from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Scene
 
 MAGNETS = horizontal(1.5e-3, 10e-3, 1.305, 1.0)

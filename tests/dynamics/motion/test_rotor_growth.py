@@ -15,7 +15,7 @@ from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.rotor_effects import RotorCurrents
 from spinlev.fem.rotor.choice import cached_rotor_table
 from spinlev.fem.rotor_metal import cached_rotor_losses
-from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Scene
 
 ROTORS = {

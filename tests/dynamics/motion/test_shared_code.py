@@ -12,8 +12,7 @@ from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.table import MutualTable, ResponseGrid, response_box
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.magnets import Magnet, horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Cylinder

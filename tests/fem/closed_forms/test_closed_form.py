@@ -5,12 +5,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from spinlev.fem.closed_forms.uniform import UniformField
-from spinlev.fem.elements.second_opinion import coulomb_field
+from spinlev.fem.elements.magnetostatics import coulomb_field
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.harmonics.expressions import CompiledField
 from spinlev.fem.rotor.table import RangeError, RotorTable
-from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.magnets import Magnet, horizontal, tilt, vertical
 from spinlev.geometry.shapes import Box, Cylinder, Sphere, rotation_matrix
 
 ROTORS = {

@@ -5,13 +5,11 @@ import pytest
 
 from spinlev.fem.closed_forms.moments import induced_moments
 from spinlev.fem.elements.ladder import Refinement, reaction_moments, solve_rotor
-from spinlev.fem.elements.magnetostatics import assemble, solve
-from spinlev.fem.elements.second_opinion import magnet_dipoles
+from spinlev.fem.elements.magnetostatics import assemble, magnet_dipoles, solve
 from spinlev.fem.harmonics.expansion import MultipoleExpansion, uniform_moments
 from spinlev.geometry.common import MU_0
-from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.magnets import Magnet, horizontal, vertical
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
-from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.shapes import Box, rotation_matrix
 
 TURNED = Box((0.01, 0.012, 0.008), (0.002, 0, 0), rotation_matrix((15, 40, 70)))

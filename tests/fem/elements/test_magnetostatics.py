@@ -14,11 +14,9 @@ from spinlev.fem.elements.magnetostatics import assemble, solve
 from spinlev.fem.harmonics.expansion import MultipoleExpansion
 from spinlev.fem.rotor.choice import resolve_model, rotor_table
 from spinlev.fem.rotor.models import Accuracy, fem_table
-from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
-from spinlev.geometry.rotor import horizontal, tilt, vertical
+from spinlev.geometry.magnets import Magnet, horizontal, tilt, vertical
+from spinlev.geometry.meshes.magnets import MeshSettings, find_symmetry, mesh_magnets, parity_parts
 from spinlev.geometry.shapes import Box, rotation_matrix
-from spinlev.geometry.symmetry import find_symmetry, parity_parts
 
 EDGE, REMANENCE = 0.01, 1.305
 CUBE_RATIO = 0.98366887

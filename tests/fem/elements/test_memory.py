@@ -16,9 +16,9 @@ from spinlev.fem.elements.ladder import refinement_of
 from spinlev.fem.elements.magnetostatics import assemble
 from spinlev.fem.plate.eddy import EddySpace, ShiftedSystem
 from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
 from spinlev.geometry.meshes.plate import plate_mesh
-from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.shapes import Box
 
 ROTOR = vertical(0.014, 0.01, 1.305, 1.05)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spinlev.fem.closed_forms.uniform import UniformField
-from spinlev.fem.elements.second_opinion import coulomb_field
+from spinlev.fem.elements.magnetostatics import coulomb_field
 from spinlev.fem.harmonics.expansion import MultipoleExpansion, summed_derivatives, uniform_moments
 from spinlev.fem.harmonics.expressions import CompiledField
 from spinlev.fem.harmonics.solid import BLOCK, entries, rotated_harmonics, tensors

@@ -8,8 +8,7 @@ from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.maps_of_B.columns import FieldMap, FieldMapError
 from spinlev.fem.maps_of_B.table import MAP, fit_field_map
 from spinlev.fem.rotor.table import ROTOR, RangeError, RotorTable
-from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.geometry.magnets import Magnet, horizontal, vertical
 from spinlev.geometry.shapes import Box
 
 INNER, OUTER, STEP = 0.013, 0.040, 0.002

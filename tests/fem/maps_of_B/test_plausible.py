@@ -9,8 +9,7 @@ import pytest
 from spinlev.fem.closed_forms.uniform import remanent_field
 from spinlev.fem.maps_of_B.columns import UNITS, FieldMap, FieldMapError
 from spinlev.fem.maps_of_B.table import map_table, require_plausible
-from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.geometry.magnets import Magnet, horizontal, vertical
 from spinlev.geometry.shapes import Box, Cylinder, ring
 
 ROTORS = {

@@ -17,9 +17,8 @@ from spinlev.fem.mutual.samples import TAIL, places_around, response_products
 from spinlev.fem.mutual.table import image_weights, induced_sources, reflection, response_to_charge
 from spinlev.fem.rotor.table import canonical
 from spinlev.geometry.common import InputError
-from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.magnets import Magnet, horizontal, tilt, vertical
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
-from spinlev.geometry.rotor import horizontal, tilt, vertical
 from spinlev.geometry.shapes import Box, Cylinder, Sphere, rotation_matrix
 
 FINER = MeshSettings(magnet_size=0.6)

@@ -24,7 +24,7 @@ from spinlev.fem.mutual.response import TwoBodyError, enough_degree, two_body, t
 from spinlev.fem.mutual.table import induced_sources
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
-from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.scene.floater import Floater
 
 BALL = Ball(np.array([0.001, -0.002, -0.015]), RADIUS)

@@ -20,8 +20,8 @@ from spinlev.fem.plate.tables import (
 )
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import InputError
+from spinlev.geometry.magnets import tilt
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
-from spinlev.geometry.rotor import tilt
 from spinlev.geometry.scene.contents import Lowering, Plate
 from spinlev.geometry.shapes import Box, rotation_matrix
 

@@ -22,8 +22,8 @@ from spinlev.fem.plate.tables import (
 )
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import RangeError
+from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.meshes.plate import MeshRule
-from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.scene.contents import Lowering, Plate
 from spinlev.geometry.shapes import Box
 

@@ -19,7 +19,7 @@ from spinlev.fem.plate.waves import cylinder_moments
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import AccuracyError
 from spinlev.geometry.common import MU_0, InputError
-from spinlev.geometry.rotor import tilt
+from spinlev.geometry.magnets import tilt
 from spinlev.geometry.scene.contents import Lowering, Plate
 from spinlev.geometry.shapes import Box, rotation_matrix
 

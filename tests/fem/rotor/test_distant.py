@@ -9,7 +9,7 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import Accuracy, points_around, shortened_table, typical_field
 from spinlev.fem.rotor.near_field import complete
 from spinlev.geometry.common import InputError
-from spinlev.geometry.rotor import horizontal
+from spinlev.geometry.magnets import horizontal
 
 ROTOR = horizontal(2e-3, 10e-3, 1.305, 1.0)
 RTOL, CONTACT, FAR = 1e-4, 6.35e-3, 12e-3

@@ -15,9 +15,8 @@ from spinlev.fem.rotor.models import Accuracy, AccuracyWarning, error_points, fe
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.common import InputError
 from spinlev.geometry.cutting import CONVERGENCE, cut_magnets
-from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.magnets import Magnet, horizontal, vertical
 from spinlev.geometry.meshes.magnets import MeshSettings
-from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.shapes import Box
 from spinlev.studies.catalogue.field_quality import CASES, MORE_LAYERS, OTHER_MESH, extensions, reference
 

@@ -10,7 +10,7 @@ import pytest
 from magpylib.core import magnet_cuboid_Bfield
 
 from spinlev.fem.rotor.models import Accuracy, fem_table
-from spinlev.geometry.rotor import vertical
+from spinlev.geometry.magnets import vertical
 
 pytestmark = pytest.mark.slow
 

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from spinlev.fem.elements.second_opinion import magnet_dipoles
+from spinlev.fem.elements.magnetostatics import magnet_dipoles
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import Accuracy, error_points, fem_table
 from spinlev.fem.rotor.table import ROTOR
 from spinlev.geometry.common import MU_0
-from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.magnets import Magnet, tilt
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
-from spinlev.geometry.rotor import tilt
 from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring, rotation_matrix
 
 TURN = rotation_matrix((25.0, -40.0, 10.0))

@@ -9,7 +9,7 @@ from spinlev.fem.closed_forms.moments import carrier
 from spinlev.fem.harmonics.expansion import MultipoleExpansion, uniform_moments
 from spinlev.fem.rotor.choice import cached_rotor_table
 from spinlev.fem.rotor.table import ROTOR as FILES, RotorTable
-from spinlev.geometry.rotor import horizontal, vertical
+from spinlev.geometry.magnets import horizontal, vertical
 
 ROTOR = vertical(0.012, 0.01, 1.305, 1.05)
 POINTS = np.random.default_rng(4).uniform(-0.01, 0.01, (20, 3)) - [0, 0, 0.03]

@@ -5,9 +5,8 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from spinlev.geometry.magnets import Magnet
+from spinlev.geometry.magnets import Magnet, horizontal, vertical
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets, to_meshio
-from spinlev.geometry.rotor import horizontal, vertical
 from spinlev.geometry.shapes import Box, rotation_matrix
 
 TURNED = (Magnet(Box((0.01, 0.006, 0.002), (0.001, 0.002, 0.003), rotation_matrix((20, 30, 40))), (1, 0, 0), 1.05),)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from spinlev.dynamics.equilibria.search import find_equilibria
-from spinlev.fem.elements.second_opinion import coulomb_field
+from spinlev.fem.elements.magnetostatics import coulomb_field
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Scene
-from spinlev.studies.catalogue import article_formulas as formulas
+from spinlev.studies.catalogue import article as formulas
 from spinlev.studies.catalogue.article import CONFIGURATIONS, FLOATER, WEIGHT, rotor_scene, stable_in_flight
 from spinlev.studies.catalogue.article_figures import (
     FIELD_MODELS,
