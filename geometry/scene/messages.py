@@ -2,8 +2,8 @@
 
 import difflib
 import re
-from collections.abc import Sequence
-from itertools import combinations
+from collections.abc import Iterator, Sequence
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -178,238 +178,210 @@ def _close(place: Sequence[Any]) -> list[str]:
     return difflib.get_close_matches(str(place[-1])[:LONGEST], _allowed(place), n=1)
 
 
-def key_faults(table: schema.SceneTable) -> list[str]:
+def key_faults(table: schema.SceneTable) -> Iterator[str]:
     """One sentence for each rule between keys that is broken."""
-    rotor, faults = table.rotor, []
+    rotor, there = table.rotor, table.model_fields_set
     for k, start in enumerate(table.starts):
-        faults += _start_faults(f"start[{k}]" if isinstance(table.start, list) else "start", start)
+        yield from _start_faults(f"start[{k}]" if isinstance(table.start, list) else "start", start)
     if drag := table.drag:
-        given = {key: getattr(drag, key) is not None for key in ("linear_N_s_m", "angular_N_m_s")}
-        faults += [
-            f"Input drag.{key} must be left out beside drag.model; instead received both."
-            if drag.model
-            else f"Input drag.{key} must be given; instead it is missing."
-            for key, there in given.items()
-            if there == bool(drag.model)
-        ]
+        for key in ("linear_N_s_m", "angular_N_m_s"):
+            if (getattr(drag, key) is not None) == bool(drag.model):
+                both = f"Input drag.{key} must be left out beside drag.model; instead received both."
+                yield both if drag.model else f"Input drag.{key} must be given; instead it is missing."
     magnets: dict[str, Any] = {"rotor": rotor}
     if isinstance(rotor, ExplicitRotor):
         magnets = {f"rotor.magnets[{k}]": magnet for k, magnet in enumerate(rotor.magnets)}
     for place, magnet in magnets.items():
-        faults += _shape_faults(place, magnet)
+        yield from _shape_faults(place, magnet)
         key, (along, across) = "remanence_T" if magnet is rotor else "polarization_T", magnet.recoil_permeability
         if along != across and not np.any(getattr(magnet, key)):
-            faults.append(
+            yield (
                 f"Input {place}.{key} must not be zero where recoil_permeability has an easy axis; instead it is zero."
             )
     for k, conductor in enumerate(rotor.conductors):
-        faults += _shape_faults(f"rotor.conductors[{k}]", conductor)
-    needed = () if table.coils and "rotor" not in table.model_fields_set else ("frequency_hz", "rotor")
-    missing = [key for key in needed if key not in table.model_fields_set]
-    faults += [f"Input {key} must be given; instead it is missing." for key in missing]
-    for k, coil in enumerate(table.coils or ()):
-        if coil.width_mm >= 2 * coil.radius_mm:
-            faults.append(
-                f"Input coils[{k}].width_mm must be less than twice radius_mm, of the middle of the winding; instead "
-                f"received {coil.width_mm:g}."
-            )
-        if isinstance(coil.current_A, list) and (coil.frequency_hz or coil.phase_deg):
-            faults.append(
-                f"Input coils[{k}].current_A must be a number beside frequency_hz and phase_deg; instead received a "
-                "table."
-            )
-        if isinstance(coil.current_A, list) and np.any(np.diff(np.array(coil.current_A)[:, 0]) <= 0):
-            faults.append(f"Input coils[{k}].current_A must have increasing times; instead they are not.")
-    if table.coils and "rotor" in table.model_fields_set:
-        faults += _coil_faults(table, table.coils)
+        yield from _shape_faults(f"rotor.conductors[{k}]", conductor)
+    needed = () if table.coils and "rotor" not in there else ("frequency_hz", "rotor")
+    yield from (f"Input {key} must be given; instead it is missing." for key in needed if key not in there)
+    yield from _coil_faults(table, table.coils or ())
     for name, floater in table.floaters.items():
-        faults += [re.sub("(?<!the )floater", name, fault) for fault in _floater_faults(floater, table)]
-    faults += _several_faults(table)
+        yield from (re.sub("(?<!the )floater", name, fault) for fault in _floater_faults(floater, table))
+    yield from _several_faults(table)
     for k, plate in table.plates:
-        faults += _shape_faults(f"plate[{k}]" if k >= 0 else "plate", plate)
+        yield from _shape_faults(f"plate[{k}]" if k >= 0 else "plate", plate)
         if plate.lowering != table.plates[0][1].lowering:
-            faults.append(
+            yield (
                 f"Input plate[{k}].lowering must be that of plate[0], as all plates are lowered together; "
                 "instead it is another."
             )
+    yield from _drive_faults(table)
+    if rotor.field_map is None:
+        alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(rotor, k) is not None]
+        yield from (f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone)
+
+
+def _drive_faults(table: schema.SceneTable) -> Iterator[str]:
     for k, step in enumerate(table.drive or ()):
         kinds = [key for key in ("to_hz", "stop", "hold_s") if getattr(step, key) is not None]
         ways = [key for key in ("center_mm", "axis") if getattr(step, key) is not None]
-        faults += _way_faults(f"drive[{k}]", step, table)
+        if step.axis is not None and not np.any(step.axis):
+            yield f"Input drive[{k}].axis must be a direction, not zero; instead received {step.axis}."
+        if ways and table.plate is not None:
+            yield (
+                f"Input drive[{k}].{ways[0]} must be left out beside a plate, whose currents are known for a rotor "
+                "that stays where it is; instead it is given. Leave the plate out, or lower it (plate.lowering)."
+            )
         if ways and "hold_s" in kinds:
-            faults.append(f"Input drive[{k}].hold_s must be in_s beside {ways[0]}; instead received hold_s.")
+            yield f"Input drive[{k}].hold_s must be in_s beside {ways[0]}; instead received hold_s."
         elif len(kinds) > 1 or not kinds + ways:
             received = " and ".join(kinds) or "none of them"
-            faults.append(f"Input drive[{k}] must have one of to_hz, stop and hold_s; instead received {received}.")
+            yield f"Input drive[{k}] must have one of to_hz, stop and hold_s; instead received {received}."
         elif (step.in_s is None) != (kinds == ["hold_s"]):
             rule, instead = ("be left out", "received both") if step.in_s else ("be given", "it is missing")
-            faults.append(f"Input drive[{k}].in_s must {rule} beside {(kinds + ways)[0]}; instead {instead}.")
-    if rotor.field_map is None:
-        alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(rotor, k) is not None]
-        faults += [f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone]
-    return faults
+            yield f"Input drive[{k}].in_s must {rule} beside {(kinds + ways)[0]}; instead {instead}."
 
 
-def _way_faults(place: str, step: schema.DriveTable, table: schema.SceneTable) -> list[str]:
-    """Faults of a step that moves the rotor or turns its axis."""
-    if step.center_mm is None and step.axis is None:
-        return []
-    faults = []
-    if step.axis is not None and not np.any(step.axis):
-        faults.append(f"Input {place}.axis must be a direction, not zero; instead received {step.axis}.")
-    if table.plate is not None:
-        key = "axis" if step.center_mm is None else "center_mm"
-        faults.append(
-            f"Input {place}.{key} must be left out beside a plate, whose currents are known for a rotor that stays "
-            "where it is; instead it is given. Leave the plate out, or lower it (plate.lowering)."
-        )
-    return faults
-
-
-def _coil_faults(table: schema.SceneTable, coils: Sequence[schema.CoilTable]) -> list[str]:
-    """Faults of coils beside a rotor, with what their field would do and is not computed."""
-    faults, steady = [], [not (isinstance(coil.current_A, list) or coil.frequency_hz) for coil in coils]
+def _coil_faults(table: schema.SceneTable, coils: Sequence[schema.CoilTable]) -> Iterator[str]:
+    """Faults of coils, and of those beside a rotor with what their field would do and is not computed."""
+    changing = [bool(isinstance(coil.current_A, list) or coil.frequency_hz) for coil in coils]
+    for k, coil in enumerate(coils):
+        if coil.width_mm >= 2 * coil.radius_mm:
+            yield (
+                f"Input coils[{k}].width_mm must be less than twice radius_mm, of the middle of the winding; instead "
+                f"received {coil.width_mm:g}."
+            )
+        if isinstance(coil.current_A, list):
+            if coil.frequency_hz or coil.phase_deg:
+                yield (
+                    f"Input coils[{k}].current_A must be a number beside frequency_hz and phase_deg; instead received "
+                    "a table."
+                )
+            if np.any(np.diff(np.array(coil.current_A)[:, 0]) <= 0):
+                yield f"Input coils[{k}].current_A must have increasing times; instead they are not."
+    if not coils or "rotor" not in table.model_fields_set:
+        return
     if any(step.center_mm is not None or step.axis is not None for step in table.drive or ()):
-        faults.append(
-            "Input drive must have no center_mm and no axis beside coils, which stay where they are; instead it has."
-        )
-    if isinstance(table.floater, list):
-        return [*faults, "Input floater must be one table beside coils and a rotor; instead received a list."]
-    others = [
-        k for k, (coil, same) in enumerate(zip(coils, steady, strict=True)) if any(coil.center_mm[:2]) or not same
-    ]
-    floater = table.floater
+        yield "Input drive must have no center_mm and no axis beside coils, which stay where they are; instead it has."
+    if isinstance(floater := table.floater, list):
+        yield "Input floater must be one table beside coils and a rotor; instead received a list."
+        return
+    others = [k for k, coil in enumerate(coils) if any(coil.center_mm[:2]) or changing[k]]
     if others and (floater.conductivity_S_m or floater.composite or floater.shape != "sphere"):
-        faults.append(
+        yield (
             f"Input floater must be a sphere without conductivity_S_m beside coils[{others[0]}], which is off the "
             "rotor's axis or has a current that changes: other floaters are not computed there; instead it is none. "
             "Steady currents about the axis act on any floater."
         )
     for k, plate in table.plates:
         name = f"plate[{k}]" if k >= 0 else "plate"
-        if not all(steady):
-            faults.append(
-                f"Input {name} must be left out beside coils[{steady.index(False)}], whose current changes and would "
+        if any(changing):
+            yield (
+                f"Input {name} must be left out beside coils[{changing.index(True)}], whose current changes and would "
                 "drive currents in it, which is not computed; instead it is given. Steady currents drive none."
             )
         elif plate.lowering is not None:
-            faults.append(
+            yield (
                 f"Input {name}.lowering must be left out beside coils, whose field would drive currents in a plate "
                 "that moves, which is not computed; instead it is given."
             )
-    return faults
 
 
-def _several_faults(table: schema.SceneTable) -> list[str]:
+def _several_faults(table: schema.SceneTable) -> Iterator[str]:
     """Faults of a list of floaters, or of starts."""
     number, starts = len(table.floaters), table.start if isinstance(table.start, list) else None
-    if not isinstance(table.floater, list):
-        said = "Input start must be one table beside one floater; instead received a list."
-        return [] if starts is None else [said]
-    if number < 2:
-        return [f"Input floater must be one table, or a list of two and more; instead received a list of {number}."]
     given = 0 if table.start is None else len(table.starts)
-    if starts is None or given != number:
-        said = f"Input start must be a list of {number} tables [[start]], one for each floater; instead received"
-        return [f"{said} {given or 'none'}."]
-    return [
-        f"Input start[{k}].position_mm must be given where there are several floaters; instead it is missing."
-        for k, start in enumerate(starts)
-        if start.position_mm is None
-    ]
+    if not isinstance(table.floater, list):
+        if starts is not None:
+            yield "Input start must be one table beside one floater; instead received a list."
+    elif number < 2:
+        yield f"Input floater must be one table, or a list of two and more; instead received a list of {number}."
+    elif starts is None or given != number:
+        yield (
+            f"Input start must be a list of {number} tables [[start]], one for each floater; instead received "
+            f"{given or 'none'}."
+        )
+    else:
+        for k in (k for k, start in enumerate(starts) if start.position_mm is None):
+            yield f"Input start[{k}].position_mm must be given where there are several floaters; instead it is missing."
 
 
-def _floater_faults(floater: schema.FloaterTable, whole: schema.SceneTable) -> list[str]:
+def _floater_faults(floater: schema.FloaterTable, whole: schema.SceneTable) -> Iterator[str]:
     """Faults of a floater's keys among themselves and beside others of a scene's."""
     single = [k for k in (*schema.SIZE_KEYS, "file", "remanence_T", "recoil_permeability", "density_kg_m3")
               if getattr(floater, k, None) is not None]  # fmt: skip
-    faults = []
+    sphere = floater.shape == "sphere" and not floater.composite
     if floater.composite:
         if single or floater.shape != "sphere":
             beside = " and ".join([*([] if floater.shape == "sphere" else ["shape"]), *single])
-            faults.append(
+            yield (
                 "Input floater must have its sizes and materials in floater.magnets and floater.bodies alone where it "
                 f"has such; instead received {beside} beside them."
             )
         if not floater.magnets:
-            faults.append("Input floater.magnets must have at least one magnet; instead there is ballast alone.")
+            yield "Input floater.magnets must have at least one magnet; instead there is ballast alone."
         for name, tables in (("magnets", floater.magnets), ("bodies", floater.bodies)):
             for k, table in enumerate(tables):
-                faults += _shape_faults(f"floater.{name}[{k}]", table)
+                yield from _shape_faults(f"floater.{name}[{k}]", table)
     else:
-        faults += _shape_faults("floater", floater)
-        faults += [
-            f"Input floater.{key} must be given; instead it is missing."
-            for key in ("remanence_T", "density_kg_m3")
-            if key not in single
-        ]
+        yield from _shape_faults("floater", floater)
+        missing = (key for key in ("remanence_T", "density_kg_m3") if key not in single)
+        yield from (f"Input floater.{key} must be given; instead it is missing." for key in missing)
     if floater.inertia_kg_m2 is not None:
-        if floater.shape == "sphere" and not floater.composite:
-            faults.append("Input floater.inertia_kg_m2 must be left out of a sphere; instead it is given.")
+        if sphere:
+            yield "Input floater.inertia_kg_m2 must be left out of a sphere; instead it is given."
         low, middle, high = sorted(floater.inertia_kg_m2)
         if high > (low + middle) * (1 + 1e-9):
-            faults.append(
+            yield (
                 "Input floater.inertia_kg_m2 must be moments of inertia, of which none is larger than the other two "
                 f"together; instead received {high:g} beside {low:g} and {middle:g}."
             )
-    sphere = floater.shape == "sphere" and not floater.composite
     if not sphere and floater.conductivity_S_m is not None and not whole.coils:
-        faults.append(
+        yield (
             "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
             f"known then; instead received {floater.conductivity_S_m:g}."
         )
     if not sphere and whole.drag and whole.drag.model == "air":
-        faults.append(
+        yield (
             'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
             'sphere; instead received "air".'
         )
-    return faults
 
 
-def _start_faults(place: str, start: schema.StartTable) -> list[str]:
-    faults = []
+def _start_faults(place: str, start: schema.StartTable) -> Iterator[str]:
     if start.offset_mm is not None and start.position_mm is not None:
-        faults.append(f"Input {place} must have offset_mm or position_mm; instead received both.")
-    if start.position_mm is None:
-        alone = [key for key in ("velocity_mm_s", "moment", "spin_hz", "body_x") if getattr(start, key) is not None]
-        faults += [
-            f"Input {place}.{key} must come with {place}.position_mm; instead received it alone." for key in alone
-        ]
+        yield f"Input {place} must have offset_mm or position_mm; instead received both."
+    for key in ("velocity_mm_s", "moment", "spin_hz", "body_x"):
+        if getattr(start, key) is not None and start.position_mm is None:
+            yield f"Input {place}.{key} must come with {place}.position_mm; instead received it alone."
     for key in ("moment", "body_x"):
-        given = getattr(start, key)
-        if given is not None and not any(given):
-            faults.append(f"Input {place}.{key} must be a direction, not zero; instead received {given}.")
-    return faults
+        if (given := getattr(start, key)) is not None and not any(given):
+            yield f"Input {place}.{key} must be a direction, not zero; instead received {given}."
 
 
-def _shape_faults(place: str, table: Any) -> list[str]:
-    """Faults of the sizes of a shape at a place of the scene file."""
+def _shape_faults(place: str, table: Any) -> Iterator[str]:
+    """The fault of the sizes of a shape at a place of the scene file."""
     given = [key for key in schema.SIZE_KEYS if getattr(table, key, None) is not None]
-    file = getattr(table, "file", None)
+    file, sizes = getattr(table, "file", None), " and ".join(given)
     if table.shape == "file" and not file:
-        return [f"Input {place}.file must be given, as the shape is 'file'; instead it is missing."]
-    if place == "floater" and file and table.shape != "file":
-        return ["Input floater.file must be left out, or shape be 'file'; instead it is given."]
-    if file:
-        if table.shape not in ("cuboid", "file"):
-            return [f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."]
-        sizes = " and ".join(given)
-        return [f"Input {place} must have no size beside file; instead received {sizes}."] if given else []
-    wanted = schema.SIZES[table.shape]
-    if place == "floater" and not given and table.shape == "sphere":
-        return ["Input floater.diameter_mm must be given; instead it is missing."]
-    if set(given) != set(wanted):
+        yield f"Input {place}.file must be given, as the shape is 'file'; instead it is missing."
+    elif place == "floater" and file and table.shape != "file":
+        yield "Input floater.file must be left out, or shape be 'file'; instead it is given."
+    elif file and table.shape not in ("cuboid", "file"):
+        yield f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."
+    elif file and given:
+        yield f"Input {place} must have no size beside file; instead received {sizes}."
+    elif not file and place == "floater" and not given and table.shape == "sphere":
+        yield "Input floater.diameter_mm must be given; instead it is missing."
+    elif not file and set(given) != set(wanted := schema.SIZES[table.shape]):
         more = " and ".join(key for key in given if key not in wanted)
-        return [
+        yield (
             f"Input {place} must have {' and '.join(wanted)}, as the shape is {table.shape!r}; "
-            f"instead received {' and '.join(given) or 'no size'}." + (f" Leave out {more}." if more else "")
-        ]
-    if table.shape == "ring" and table.inner_diameter_mm >= table.diameter_mm:
-        return [
+            f"instead received {sizes or 'no size'}." + (f" Leave out {more}." if more else "")
+        )
+    elif not file and table.shape == "ring" and table.inner_diameter_mm >= table.diameter_mm:
+        yield (
             f"Input {place}.inner_diameter_mm must be less than diameter_mm {table.diameter_mm:g}; "
             f"instead received {table.inner_diameter_mm:g}."
-        ]
-    return []
+        )
 
 
 def unusual(scene: Scene) -> str:
@@ -433,72 +405,69 @@ def unusual(scene: Scene) -> str:
     return f"Unusual: {', '.join(dict.fromkeys(said))}. Is that meant? Every key names its unit." if said else ""
 
 
-def overlap_faults(scene: Scene) -> list[str]:
-    """Every overlap of the scene's bodies as a message with its depth; empty if there is none.
+def overlap_faults(scene: Scene) -> Iterator[str]:
+    """Every overlap of the scene's bodies as a message with its depth.
 
     The plate is checked against the rotor over a whole turn; touching is allowed.
     """
     bodies = [(f"magnet {i}", magnet.body) for i, magnet in enumerate(scene.rotor, 1)]
     bodies += [(f"conductor {i}", part.body) for i, part in enumerate(scene.conductors, 1)]
-    faults = [
-        f"Input rotor must have magnets and conductors that do not overlap; instead {first} and {second} overlap by "
-        f"{depth * 1e3:.4g} mm; move them apart by as much."
-        for (first, one), (second, other) in combinations(bodies, 2)
-        if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING
-    ]
+    yield from _own_overlaps("rotor", "magnets and conductors", bodies)
     for k, (stretch, step) in enumerate(zip(scene.stretches, scene.drive, strict=False)):
         if step.axis and stretch.axes[:, 2] @ step.axis < -OPPOSITE:
-            faults.append(
+            yield (
                 f"Input drive[{k}].axis must not be opposite to the axis before it, as no way to it is the shortest; "
                 "instead it is. Give a step between."
             )
     metal = scene.plate.body.placed if scene.plate else ()
     plates = [("plate" if len(metal) == 1 else f"plate[{k}]", body) for k, body in enumerate(metal)]
-    faults += [
-        f"Input {plate} must stay clear of the turning rotor; instead it overlaps {name} by "
-        f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
-        for plate, fixed in plates
-        for name, body in bodies
-        if (depth := deepest_overlap_in_a_turn(body, fixed)) > TOUCHING
-    ]
-    faults += [
-        f"Input {second} must be apart from {first}, as currents of bodies that touch are not computed; instead "
-        f"they {f'overlap by {depth * 1e3:.4g} mm' if depth > TOUCHING else 'touch'}; give them as one file."
-        for (first, one), (second, other) in combinations(plates, 2)
-        if (depth := body_overlap(one, other)) > -TOUCHING
-    ]
+    for (plate, fixed), (name, body) in product(plates, bodies):
+        if (depth := deepest_overlap_in_a_turn(body, fixed)) > TOUCHING:
+            yield (
+                f"Input {plate} must stay clear of the turning rotor; instead it overlaps {name} by "
+                f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
+            )
+    for (first, one), (second, other) in combinations(plates, 2):
+        if (depth := body_overlap(one, other)) > -TOUCHING:
+            how = f"overlap by {depth * 1e3:.4g} mm" if depth > TOUCHING else "touch"
+            yield (
+                f"Input {second} must be apart from {first}, as currents of bodies that touch are not computed; "
+                f"instead they {how}; give them as one file."
+            )
     windings = [] if scene.carried_by_coils else [(f"coils[{k}]", coil.body) for k, coil in enumerate(scene.coils)]
     for name, winding in windings:
         beside = [(f"the turning rotor's {other}", deepest_overlap_in_a_turn(body, winding)) for other, body in bodies]
         beside += [(f"the {other}", body_overlap(body, winding)) for other, body in plates]
-        faults += [
-            f"Input {name} must stay clear of all bodies; instead it overlaps {other} by {depth * 1e3:.4g} mm; move it "
-            "away."
-            for other, depth in beside
-            if depth > TOUCHING
-        ]
+        for other, depth in beside:
+            if depth > TOUCHING:
+                yield (
+                    f"Input {name} must stay clear of all bodies; instead it overlaps {other} by {depth * 1e3:.4g} mm; "
+                    "move it away."
+                )
     obstacles = [*((f"rotor {name}", body) for name, body in bodies), *windings]
     obstacles += [("the plate" if len(plates) == 1 else name, body) for name, body in plates]
-    placed: list[tuple[Solid, ...]] = []
     for k, one in enumerate(scene.each):
         start, number = one.start, f"[{k}]" if scene.companions else ""
         parts = [(f"part {n}", part) for n, part in enumerate(one.floater.bodies, 1)]
-        faults += [
-            f"Input floater{number} must have magnets and bodies that do not overlap; instead {first} and {second} "
-            f"overlap by {depth * 1e3:.4g} mm; move them apart by as much."
-            for (first, part), (second, other) in combinations(parts, 2)
-            if not apart(part, other) and (depth := body_overlap(part, other)) > TOUCHING
-        ]
+        yield from _own_overlaps(f"floater{number}", "magnets and bodies", parts)
         if not isinstance(start, AbsoluteStart):
             continue
         axes = one.floater.axes(start.moment / np.linalg.norm(start.moment), start.body_x)
-        placed.append(one.floater.placed(start.position, axes))
-        place = ", ".join(f"{c * 1e3:g}" for c in start.position)
-        others = [(f"floater[{n}]", part) for n, other in enumerate(placed[:-1]) for part in other]
-        faults += [
-            f"Input start{number}.position_mm must leave the floater clear of all bodies; instead received [{place}], "
-            f"where it overlaps {name} by {depth * 1e3:.4g} mm."
-            for name, body in [*obstacles, *others]
-            if (depth := max(body_overlap(body, part) for part in placed[-1])) > TOUCHING
-        ]
-    return faults
+        own, place = one.floater.placed(start.position, axes), ", ".join(f"{c * 1e3:g}" for c in start.position)
+        for name, body in obstacles:
+            if (depth := max(body_overlap(body, part) for part in own)) > TOUCHING:
+                yield (
+                    f"Input start{number}.position_mm must leave the floater clear of all bodies; instead received "
+                    f"[{place}], where it overlaps {name} by {depth * 1e3:.4g} mm."
+                )
+        obstacles += [(f"floater[{k}]", part) for part in own]
+
+
+def _own_overlaps(owner: str, kinds: str, bodies: Sequence[tuple[str, Solid]]) -> Iterator[str]:
+    """Overlaps of the bodies of a rotor or floater among themselves."""
+    for (first, one), (second, other) in combinations(bodies, 2):
+        if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING:
+            yield (
+                f"Input {owner} must have {kinds} that do not overlap; instead {first} and {second} overlap by "
+                f"{depth * 1e3:.4g} mm; move them apart by as much."
+            )
