@@ -25,7 +25,7 @@ from ..fem.plate.table import Region
 from ..fem.plate.tables import cached_plate_table
 from ..fem.rotor.models import of_true_moment
 from ..fem.rotor.near_field import NEAR_RTOL, CompleteTable, complete
-from ..fem.rotor.table import FieldTable, RotorTable
+from ..fem.rotor.table import FieldTable, RotorTable, errors_of_sum
 from ..geometry.common import MU_0, Array, InputError
 from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
@@ -93,9 +93,8 @@ def _field(table: FieldTable, points: Array, coils: Array, slopes: Array) -> dic
         b, gradient = table.evaluate(points)
         error, gradient_error = table.relative_error(points)
     if coils.any():  # errors are those of the rotor's part
-        error = error * np.linalg.norm(b, axis=1) / np.linalg.norm(b + coils, axis=1)
-        sizes = (np.linalg.norm(slope, axis=(1, 2)) for slope in (gradient, gradient + slopes))
-        gradient_error = gradient_error * next(sizes) / next(sizes)
+        whole = b + coils, gradient + slopes
+        error, gradient_error = errors_of_sum((error, gradient_error), (b, gradient), whole)
     return {
         "model": table.model,
         "error_estimate": float(error.max()),

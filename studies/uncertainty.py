@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 from scipy.stats import qmc
 
-from ..dynamics.equilibria.derivatives import Tangent
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
 from ..geometry.common import Array, InputError, shown
 from ..geometry.scene.files import changed, scene_text
@@ -28,23 +27,21 @@ CHECKED = 0.2  # Relative difference of the two error bars from which on the fir
 
 
 def error_bars(
-    levitation: Levitation,
-    tolerances: Mapping[str, float],
-    draws: int = DRAWS,
-    seed: int = SEED,
-    name: str = "tolerances",
+    levitation: Levitation, tolerances: Mapping[str, float], draws: int = DRAWS, seed: int = SEED
 ) -> xr.Dataset:
-    """The Dataset of `uncertainty` for a scene's `levitation`; `name` is what messages call the tolerances."""
+    """The Dataset of `uncertainty` for a scene's `levitation`."""
     gradient = Gradient(levitation)
     if not isinstance(tolerances, Mapping) or not tolerances:
         raise InputError(
-            f"Input {name} must be numbers by key of the scene file; instead received {shown(tolerances)}. A scene "
+            f"Input tolerances must be numbers by key of the scene file; instead received {shown(tolerances)}. A scene "
             "file may have them: edge_mm = {value = 10, tolerance = 0.05}."
         )
-    keys = gradient.checked_keys(list(tolerances), name)
+    keys = gradient.checked_keys(list(tolerances), "tolerances")
     for key, value in tolerances.items():
         if not is_number(value) or not value > 0:
-            raise InputError(f"Input {name}: that of {key} must be a positive number; instead received {shown(value)}.")
+            raise InputError(
+                f"Input tolerances: that of {key} must be a positive number; instead received {shown(value)}."
+            )
     if isinstance(draws, bool) or not isinstance(draws, int) or not 0 <= draws <= 100_000:
         raise InputError(f"Input draws must be a number from 0 to 100000; instead received {shown(draws)}.")
     known = levitation.equilibria
@@ -52,51 +49,30 @@ def error_bars(
         raise EquilibriumError(f"At {levitation.scene.frequency:g} Hz the floater has no equilibrium.")
     wide = np.array([float(tolerances[key]) for key in keys])
     # a Latin hypercube: each number's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239)
-    drawn = (
-        wide * (2 * qmc.LatinHypercube(len(keys), seed=seed).random(draws) - 1) if draws else np.zeros((0, len(keys)))
-    )
-    rows = [_row(gradient, one, keys, wide, drawn) for one in known]
+    cube = qmc.LatinHypercube(len(keys), seed=seed).random(draws) if draws else np.zeros((0, len(keys)))
+    rows = [_row(gradient, one, keys, wide, wide * (2 * cube - 1)) for one in known]
     data: dict[str, Any] = {}
     for k, (answer, (unit, label, dims)) in enumerate(ANSWERS.items()):
-        here, shares, sample = ([row[part][k] for row in rows] for part in range(3))
-        over = ("equilibrium", *dims)
-        first, many = np.array(shares), np.array(sample)
+        here, first, sample = (np.array([row[part][k] for row in rows]) for part in range(3))
         error = np.sqrt(np.sum(first**2, axis=1))
-        data[answer] = variable(over, np.array(here), unit, label)
-        data[f"{answer}_error"] = variable(over, error, unit, f"standard deviation of the {label}, to first order")
-        data[f"{answer}_share"] = variable(("equilibrium", "key", *dims), first, unit, f"part of it: {label}")
-        if draws:
-            some = [_statistics(one) for one in many]
-            data[f"{answer}_drawn_error"] = variable(
-                over, np.array([s[0] for s in some]), unit, f"the same of draws: {label}"
-            )
-            data[f"{answer}_drawn"] = variable(
-                ("equilibrium", "percentile", *dims), np.array([s[1] for s in some]), unit, label
-            )
-    if draws:
-        known_draws = [np.isfinite(row[1][0]).all() for row in rows]
-        lost = [
-            np.isnan(row[2][0]).mean() if drawn_at else np.nan for drawn_at, row in zip(known_draws, rows, strict=True)
+        parts: list[tuple[str, tuple[str, ...], Any, str]] = [
+            ("", (), here, label),
+            ("_error", (), error, f"standard deviation of the {label}, to first order"),
+            ("_share", ("key",), first, f"part of it: {label}"),
         ]
+        if draws:
+            deviations, drawn = zip(*map(_statistics, sample), strict=True)
+            parts += [("_drawn_error", (), deviations, f"the same of draws: {label}")]
+            parts += [("_drawn", ("percentile",), drawn, label)]
+        for end, more, values, said in parts:
+            data[f"{answer}{end}"] = variable(("equilibrium", *more, *dims), np.array(values), unit, said)
+    if draws:
+        lost = [np.isnan(sample[0]).mean() if np.isfinite(shares[0]).all() else np.nan for _, shares, sample in rows]
         data["lost"] = variable(("equilibrium",), lost, "1", "part of the draws that have no such equilibrium")
     data["tolerance"] = variable(("key",), wide, "as the key", "how far the number may be off")
-    return xr.Dataset(
-        data,
-        {
-            "equilibrium": np.arange(len(known)),
-            "key": keys,
-            "mode": list(MODES),
-            "axis": list(AXIS),
-            "percentile": list(PERCENTILES),
-        },
-        {
-            "study": "uncertainty",
-            "draws": draws,
-            "seed": seed,
-            "not_known": "; ".join(gradient.reasons.values()),
-            **levitation.labels,
-        },
-    )
+    axes = {"equilibrium": np.arange(len(known)), "key": keys, "mode": list(MODES), "axis": list(AXIS)}
+    about = {"study": "uncertainty", "draws": draws, "seed": seed, "not_known": "; ".join(gradient.reasons.values())}
+    return xr.Dataset(data, {**axes, "percentile": list(PERCENTILES)}, {**about, **levitation.labels})
 
 
 def _statistics(sample: Array) -> tuple[Array, Array]:
@@ -113,12 +89,11 @@ def _row(
     """Of one equilibrium, for each answer: its value, what each tolerance makes of it (key, ...), draws (draw, ...)."""
     tangents, implicit, changes = gradient.ways(known, keys)
     values = [np.asarray(answer_of(known, name), float) for name in ANSWERS]
-    shares = [
-        np.array(
-            [_or_nan(known, tangents.get(key), name, value) * w / np.sqrt(3) for key, w in zip(keys, wide, strict=True)]
-        )
-        for name, value in zip(ANSWERS, values, strict=True)
-    ]
+    shares = [np.full((len(keys), *value.shape), np.nan) for value in values]
+    for row, name in zip(shares, ANSWERS, strict=True):
+        for k, key in enumerate(keys):
+            if key in tangents:
+                row[k] = np.asarray(derivative(known, tangents[key], name), float) * wide[k] / np.sqrt(3)
     sample = [np.full((len(drawn), *value.shape), np.nan) for value in values]
     if implicit is None or len(tangents) < len(keys):
         return values, shares, sample
@@ -133,10 +108,6 @@ def _row(
             for row, name in zip(sample, ANSWERS, strict=True):
                 row[k] = answer_of(found, name)
     return values, shares, sample
-
-
-def _or_nan(known: Equilibrium, tangent: Tangent | None, name: str, value: Array) -> Array:
-    return np.full(value.shape, np.nan) if tangent is None else np.asarray(derivative(known, tangent, name), float)
 
 
 @documented
@@ -206,11 +177,10 @@ def uncertainty_job(levitation: Levitation, out: Path) -> Answer:
         for name, (unit, _, dims) in ANSWERS.items():
             if not dims:
                 end, scale = IN_JSON[unit]
-                parts = {part: float(one[f"{name}{part}"]) / scale for part in ("_error", "_drawn_error")}
-                row[f"{name}{end}"] = {"error": parts["_error"], "drawn_error": parts["_drawn_error"]}
-                row[f"{name}{end}"]["share"] = {
-                    str(k): float(one[f"{name}_share"].sel(key=k)) / scale for k in one["key"].values
-                }
+                error, drawn = (float(one[f"{name}{part}"]) / scale for part in ("_error", "_drawn_error"))
+                shares = zip(one["key"].values.tolist(), one[f"{name}_share"].values.tolist(), strict=True)
+                by = {key: share / scale for key, share in shares}
+                row[f"{name}{end}"] = {"error": error, "drawn_error": drawn, "share": by}
         rows.append(row | {"lost": float(one["lost"])})
     first = found.isel(equilibrium=0)
     if not np.isfinite(first["distance_error"]):

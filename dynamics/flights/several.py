@@ -32,7 +32,7 @@ from ..motion.effect import ZERO, Added, Motion, interaction_of
 from ..motion.effects import with_effects
 from ..motion.events import CONTACT, clearance, motion_legs
 from ..motion.floater_effects import FloaterShape
-from ..motion.state import Parameter, Scales, State, Vector, cross, dot, rotation_of, subtract
+from ..motion.state import Parameter, Scales, State, Vector, add, cross, dot, rotation_of, subtract
 from .balls import DEGREE
 from .flight import (
     LEFT,
@@ -101,10 +101,9 @@ class Neighbours:
             for weight, own, others in pairs:
                 for arm, pole in _along(own, axes):
                     for away, source in _along(others, turn):
-                        way = [d + a - b for d, a, b in zip(apart, arm, away, strict=True)]
+                        way = subtract(add(apart, arm), away)
                         pull, turning, stored = _on_dipole(weight, pole, source, way)
-                        force = [a + b for a, b in zip(force, pull, strict=True)]
-                        torque = [a + b + c for a, b, c in zip(torque, turning, cross(arm, pull), strict=True)]
+                        force, torque = add(force, pull), add(torque, turning, cross(arm, pull))
                         energy = energy + stored
         unit = share * share
         return Added(

@@ -27,7 +27,7 @@ from ...geometry.scene.floater import Floater
 from ...geometry.solids import Solid
 from .effect import Added, Motion, Poses
 from .floater_effects import FLOATER_SHAPE
-from .state import Parameter, State, Vector, cross, dot, dotted, matrices_of
+from .state import Parameter, State, Vector, add, cross, dot, dotted, matrices_of
 
 HIGHEST = 7  # degree of the multipoles in a trajectory
 LESS = 3  # degrees by which what they feel in a ball is of a lower one than the field there
@@ -197,7 +197,7 @@ class BodyShape:
             field, gradient = self.field.expressions(place)
             pull = [dot(source, [gradient[i][j] for i in range(3)]) for j in range(3)]
             turns = zip(cross(source, field), cross(arm, pull), strict=True)
-            force = [f + p for f, p in zip(force, pull, strict=True)]
+            force = add(force, pull)
             torque = [t + b + c for t, (b, c) in zip(torque, turns, strict=True)]
             energy = energy - dot(source, field)
         return Added([unit * length * f for f in force], [unit / inertia * t for t in torque], energy=unit * energy)

@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 from ...fem.closed_forms.coil import Filaments
 from ...fem.harmonics.expressions import CompiledField, FieldExpressions
 from ...fem.harmonics.solid import tensors
-from ...fem.rotor.table import FieldFormula, keeps_shape
+from ...fem.rotor.table import FieldFormula, errors_of_sum, keeps_shape
 from ...geometry.common import Array
 from ...geometry.scene.contents import Coil, Scene
 from .effect import ZERO, Added, Interaction, Motion, interaction_of
-from .state import Parameter, about_z, cross, dot
+from .state import Parameter, about_z, add, cross, dot
 
 COILS = "coils off the axis, or with currents that change"
 AFTER = 1e-13  # of a corner's time and a second: so long before it a table's line begins, for a step that begins there
@@ -54,10 +54,7 @@ class BesideCoils:
         """See `FieldTable`."""
         parts = [self.table.expressions(position), self._filaments.expressions(position, self._currents.tolist())]
         (one, steep), (other, steeper) = parts
-        return (
-            [a + b for a, b in zip(one, other, strict=True)],
-            [[a + b for a, b in zip(*rows, strict=True)] for rows in zip(steep, steeper, strict=True)],
-        )
+        return add(one, other), [add(*rows) for rows in zip(steep, steeper, strict=True)]
 
     def derivatives(self, points: Array, order: int) -> Array:
         """See `RotorTable.derivatives`."""
@@ -82,14 +79,7 @@ class BesideCoils:
     @keeps_shape
     def relative_error(self, points: Array) -> tuple[Array, Array]:
         """See `FieldTable`; the rotor's errors by the whole field."""
-        sizes = [
-            [np.linalg.norm(part.reshape(len(points), -1), axis=1) for part in table.evaluate(points)]
-            for table in (self.table, self)
-        ]
-        first, second = (
-            e * own / whole for e, own, whole in zip(self.table.relative_error(points), *sizes, strict=True)
-        )
-        return first, second
+        return errors_of_sum(self.table.relative_error(points), self.table.evaluate(points), self.evaluate(points))
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
         """See `FieldTable`."""

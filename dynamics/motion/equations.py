@@ -47,6 +47,7 @@ from .state import (
     Parameter,
     Scales,
     Vector,
+    add,
     cross,
     dot,
     left_product,
@@ -214,13 +215,12 @@ def equations_of_motion(
     drift = subtract(drift, rotor.velocity) if moving else drift
     lag = lag_of(spin, rotor.rate, rotor.across)
     momenta = [a + inertia * b for a, b in zip(cross(position, velocity), attitude.momentum, strict=True)]
-    momentum = momenta[2]
     jacobi = [
         0.5 * dot(velocity, velocity),
         inertia * attitude.energy,
         -inertia * torque * dot(moment, field),
         -axial[2] * position[2],
-        -rotor.rate * momentum,
+        -rotor.rate * momenta[2],
     ]
     power = dot(push, drift) + inertia * attitude.braking
     motion = Motion(
@@ -235,35 +235,29 @@ def equations_of_motion(
         parts.append(by_plate)
         states, state_rates = [*states, *currents], [*state_rates, *their_rates]
     for added in parts:
-        force = [a + b for a, b in zip(force, added.force, strict=True)]
-        turn = [a + b for a, b in zip(turn, added.torque, strict=True)]
-        pulled = [a + b for a, b in zip(pulled, added.pulled, strict=True)]
-        turning = [a + b for a, b in zip(turning, added.turning, strict=True)]
+        force, turn = add(force, added.force), add(turn, added.torque)
+        pulled, turning = add(pulled, added.pulled), add(turning, added.turning)
         jacobi.append(added.energy)
         power = power + added.power
-    force = [dot(pulled, [gradient[i][j] for i in range(3)]) + f for j, f in enumerate(force)]
-    turn = [a + b for a, b in zip(cross(moment, turning), turn, strict=True)]
+    force = [dot(pulled, [row[j] for row in gradient]) + f for j, f in enumerate(force)]
+    turn = add(cross(moment, turning), turn)
     if moving:
         # E - W·L of a frame whose origin has a velocity c: c·F + W·(c × v) beside what there is without
         (x, y), whirl = rotor.across, [*rotor.across, rotor.rate]
         jacobi.append(-(x * momenta[0] + y * momenta[1]))
-        power = power + dot(rotor.velocity, [a + b for a, b in zip(force, push, strict=True)])
-        power = power + dot(whirl, cross(rotor.velocity, velocity))
+        power = power + dot(rotor.velocity, add(force, push)) + dot(whirl, cross(rotor.velocity, velocity))
         power = power - rotor.rate * (y * momenta[0] - x * momenta[1])
     if driven:
-        power = power - rotor.acceleration * momentum
+        power = power - rotor.acceleration * momenta[2]
         given = cross(position, force)[2] + inertia * turn[2]
         for added in parts:
             if added.motor is not None:
                 given = given + added.motor - cross(position, added.force)[2] - inertia * added.torque[2]
         states = [*states, *hy.make_vars("motor_momentum", "motor_work")]
         state_rates = [*state_rates, given, rotor.rate * given]
-    rates = [
-        *drift,
-        *subtract([force[i] + axial[i] + push[i] for i in range(3)], turned(velocity, rotor.rate, rotor.across)),
-        *attitude.rates(turn),
-    ]
-    return Equations([*variables, *states], [*rates, *state_rates], jacobi, power)
+    acceleration = subtract(add(force, axial, push), turned(velocity, rotor.rate, rotor.across))
+    rates = [*drift, *acceleration, *attitude.rates(turn), *state_rates]
+    return Equations([*variables, *states], rates, jacobi, power)
 
 
 def _gravity(tilted: bool, angle: hy.expression) -> tuple[Vector, Vector]:

@@ -59,7 +59,7 @@ from ...geometry.scene.contents import AIR_VISCOSITY, Scene
 from ...geometry.scene.floater import Floater
 from .coils import CoilForce
 from .effect import ZERO, Added, Effect, Motion, Poses, dissipative
-from .state import Parameter, Vector, cross, dot
+from .state import Parameter, Vector, add, cross, dot
 
 REAL_AIR = "air beyond Stokes"
 AIR_DENSITY = 1.19  # kg/m³ at 20-25 °C
@@ -190,7 +190,7 @@ class FloaterShape:
             field, gradient = formula.expressions(place) if height else (motion.field, motion.gradient)
             strength = float(dipole) * torque
             pull = [strength * inertia * length * dot(moment, [gradient[i][j] for i in range(3)]) for j in range(3)]
-            force = [a + b for a, b in zip(force, pull, strict=True)]
+            force = add(force, pull)
             arm = [float(height) / length / inertia * m for m in moment]
             turns = zip(cross(moment, field), cross(arm, pull), strict=True)
             turn = [a + strength * b + c for a, (b, c) in zip(turn, turns, strict=True)]
@@ -388,8 +388,8 @@ def _changed_field(lag: Vector, field: Vector, moving: Vector) -> Vector:
     later = hy.sum([m.share * m.delay**2.0 * (3 + m.square) * o * o for m, o in zip(modes, once, strict=True)])
     sheared = [late * a - turned * b for a, b in zip(moving, field, strict=True)]
     twice = [later * a - lifted * b for a, b in zip(moving, field, strict=True)]
-    following = cross(lag, [a + b for a, b in zip(sheared, cross(lag, twice), strict=True)])
-    return [a + b for a, b in zip(moving, following, strict=True)]
+    following = cross(lag, add(sheared, cross(lag, twice)))
+    return add(moving, following)
 
 
 def _turned_gradient(lag: Vector, gradient: Matrix) -> Matrix:

@@ -46,6 +46,7 @@ from .state import (
     Turn,
     Vector,
     about_z,
+    add,
     cross,
     dot,
     dotted,
@@ -171,7 +172,7 @@ def memory_terms(
         power=dotted(own, decay) - spent - drive,
         motor=braked,
     )
-    return added, [a + b for a, b in zip(decay, forced, strict=True)] if forced else decay
+    return added, add(decay, forced) if forced else decay
 
 
 def _rotor_terms(
@@ -204,14 +205,14 @@ def _rotor_terms(
 
     if memory.plate.lowering is not None:
         sinking = [speed * hy.subs(hy.diff(f, depth), now) for f in [*constant, *functions]]
-        changing = [a + b for a, b in zip(changing, sinking[len(constant) :], strict=True)]
+        changing = add(changing, sinking[len(constant) :])
         parts = sinking[: len(constant)] if driven else sinking
         forced = [-hy.sum([number(n, i) * f for n, f in enumerate(parts)]) for i in range(len(own))]
     if driven:
         weights = [[number(n, i) for n in range(len(constant), len(constant) + len(here))] for i in range(len(own))]
         shares = [dotted(row, here) for row in weights]
         driving = [-hy.par[first + i] * share for i, share in enumerate(shares)]
-        forced = [a + b for a, b in zip(forced or [zero] * len(own), driving, strict=True)]
+        forced = add(forced or [zero] * len(own), driving)
         braked = hy.sum([(r - y) * dotted(row, by_angle) for r, y, row in zip(shares, own, weights, strict=True)])
     spent = -dotted(own, forced) if forced else zero
     strengths = [dotted(column, here) for column in zip(*rows, strict=True)] or [zero] * count

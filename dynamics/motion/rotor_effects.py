@@ -38,7 +38,7 @@ from ...geometry.magnets import Magnet, polarizability
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.floater import Floater
 from .effect import Added, Motion, Poses, conservative, dissipative
-from .state import Parameter, Scales, State, Vector, cross, dot, dotted, subtract
+from .state import Parameter, Scales, State, Vector, add, cross, dot, dotted, subtract
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
 FALL = 3  # Minus the power of q
@@ -136,7 +136,7 @@ class Mutual(_Near):
         linear = [share * v for v in rest[:3]]
         rows = [[rest[3 + _pair(a, b)] for b in range(3)] for a in range(3)]
         seen = [v + dot(row, away) for v, row in zip(linear, rows, strict=True)]  # the energy's derivative by M
-        level = share * share * value + 0.5 * dot(away, [v + s for v, s in zip(linear, seen, strict=True)])
+        level = share * share * value + 0.5 * dot(away, add(linear, seen))
         # the energy is Σ factor · part: first the factors are summed into one polynomial, which is then differentiated
         factors = [share * share, *(share * m for m in away)]
         factors += [(0.5 if a == b else 1.0) * away[a] * away[b] for a, b in PAIRS]

@@ -141,7 +141,7 @@ def turned(vector: Vector, rate: hy.expression, across: Vector = ()) -> list[hy.
     about_z = [-rate * vector[1], rate * vector[0], hy.expression(0.0)]
     if not across:
         return about_z
-    return [a + b for a, b in zip(about_z, cross([*across, hy.expression(0.0)], vector), strict=True)]
+    return add(about_z, cross([*across, hy.expression(0.0)], vector))
 
 
 def about_z(vector: Vector, angle: hy.expression, sense: float) -> list[hy.expression]:
@@ -149,6 +149,11 @@ def about_z(vector: Vector, angle: hy.expression, sense: float) -> list[hy.expre
     cosine, sine = hy.cos(angle), sense * hy.sin(angle)
     x, y, z = vector
     return [cosine * x - sine * y, sine * x + cosine * y, z]
+
+
+def add(*vectors: Vector) -> list[hy.expression]:
+    """Sum of vectors of as many components."""
+    return [sum(rest, first) for first, *rest in zip(*vectors, strict=True)]
 
 
 def subtract(a: Vector, b: Vector) -> list[hy.expression]:

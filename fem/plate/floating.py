@@ -32,7 +32,7 @@ from ...geometry.scene.contents import Coil
 from ...geometry.solids import Solid
 from ..cache import TableKind
 from ..closed_forms.coil import CoilField
-from .currents import OtherSources, space_couplings, train
+from .currents import CurrentSpace, OtherSources, space_couplings, train
 from .eddy import EddySpace, Source, solve_eddy
 
 RADII, HEIGHTS = 96, 48  # Chebyshev points of the coils' potential, in the square of the radius and in height
@@ -95,15 +95,9 @@ class AxialPotential:
         """A (n, 3), T m, at points (n, 3), m."""
         x, y, square, place = self._scaled(points)
         rows, columns = self.coefficients.shape
-        if not np.array_equal(square, self._last[0]):  # most often the same points as before, at another height
-            self._last[:] = square, np.polynomial.chebyshev.chebvander(square, rows - 1) @ self.coefficients
-        across = self._last[1]
+        across = np.polynomial.chebyshev.chebvander(square, rows - 1) @ self.coefficients
         along = np.einsum("nl,nl->n", across, np.polynomial.chebyshev.chebvander(place, columns - 1))
         return np.stack([-y * along, x * along, 0 * along], axis=1)
-
-    @cached_property
-    def _last(self) -> list[Array]:
-        return [np.zeros(0), np.zeros(0)]
 
     @cached_property
     def _derivatives(self) -> Array:
@@ -308,19 +302,25 @@ def modes_along(
         space, missed, *_ = train(
             EddySpace(mesh, each), np.zeros((0, 3)), np.zeros((0, 3)), OtherSources(trained, probes), band, SHARE * rtol
         )
-        rates, couplings = [], []
-        for induct, b in zip(space.inductances, space.couplings(everywhere), strict=True):
-            times, vectors = np.linalg.eigh(induct)
-            kept = times * 2 * np.pi * band[1] * MOST > 1
-            rates.append(1 / times[kept])
-            couplings.append(b @ vectors[:, kept] / np.sqrt(times[kept]))
-        values = np.concatenate(couplings, axis=1).reshape(degree + 1, len(sources), -1).swapaxes(1, 2)
-        found.append(FloatingModes(np.concatenate(rates), _series(values), heights, missed, 0.0))
+        rates, couplings = _modes(space, space.couplings(everywhere), band[1])
+        values = couplings.reshape(degree + 1, len(sources), -1).swapaxes(1, 2)
+        found.append(FloatingModes(rates, _series(values), heights, missed, 0.0))
     every, amplitudes = np.linspace(low, high, 9), np.ones(len(sources))
     forces = [[modes.mean_force(z, amplitudes, np.full(len(sources), frequency)) for z in every] for modes in found]
     change = float(np.max(np.abs(np.diff(forces, axis=0)) / np.abs(forces[1])))
     modes = found[1]
     return FloatingModes(modes.rates, modes.series, heights, change + modes.error, time.perf_counter() - start)
+
+
+def _modes(space: CurrentSpace, couplings: Sequence[Array], highest: float) -> tuple[Array, Array]:
+    """Rates (n,), 1/s, of the modes that frequencies up to the `highest` (Hz) drive, and couplings (sources, n)."""
+    rates, driven = [], []
+    for inductance, b in zip(space.inductances, couplings, strict=True):
+        times, vectors = np.linalg.eigh(inductance)
+        kept = times * 2 * np.pi * highest * MOST > 1
+        rates.append(1 / times[kept])
+        driven.append(b @ vectors[:, kept] / np.sqrt(times[kept]))
+    return np.concatenate(rates), np.concatenate(driven, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -443,14 +443,8 @@ def free_modes(
     band, space = (0.1 * frequency, 4 * frequency), EddySpace(mesh, order)
     nothing = np.zeros((0, 3))
     states, missed, *_ = train(space, nothing, nothing, OtherSources(trained, probed), band, SHARE * rtol)
-    rates, weighted = [], []
     tests = states.couplings([*fitted, *probed])
-    for induct, b in zip(states.inductances, tests, strict=True):
-        times, vectors = np.linalg.eigh(induct)
-        kept = times * 2 * np.pi * band[1] * MOST > 1
-        rates.append(1 / times[kept])
-        weighted.append(b @ vectors[:, kept] / np.sqrt(times[kept]))
-    wanted, every = np.concatenate(weighted, axis=1), np.concatenate(rates)
+    every, wanted = _modes(states, tests, band[1])
     # dipoles as far from each other as can be among the quadrature points and their images
     points = np.concatenate([space.points * flip for flip in space.parity.flips])
     chosen, apart = [int(np.argmax(np.linalg.norm(points, axis=1)))], np.full(len(points), np.inf)
@@ -461,7 +455,7 @@ def free_modes(
     fields = [sum(part.field(one.place + places @ one.rotation.T)[0] for part in one.parts) @ one.rotation
               for one in [*fitted, *probed]]  # fmt: skip
     rows, scale = np.array(fields).reshape(len(fields), -1), 1 / np.sqrt(1 + (every / abs(rate)) ** 2)
-    moments = np.linalg.lstsq(rows[:end], wanted[:end], rcond=REGULAR)[0]
+    moments = np.asarray(np.linalg.lstsq(rows[:end], wanted[:end], rcond=REGULAR)[0], float)
     left, whole = (np.linalg.norm(part[end:] * scale, axis=1) for part in (rows @ moments - wanted, wanted))
     rough, fine = (np.diag(found) for found in (
         solve_eddy(mesh, order - 1, frequency, probed[:CHECKED]).couplings,

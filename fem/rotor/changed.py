@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -51,13 +52,15 @@ def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> Chan
     charged = table.model in ("fem", "surface") and _bear_charges(before) and _bear_charges(rotor)
     (minus, less), (plus, more) = ((_with_charges if charged else simple)(m) for m in (before, rotor))
     uniform = plus
-    if not _alike(table.uniform, minus):
+    if _numbers(table.uniform) != _numbers(minus):
         minus = tuple(replace(one, polarization=-one.polarization) for one in minus)
         uniform = (*table.uniform, *minus, *plus)
     added = *((part, -1) for part in less), *((part, 1) for part in more)
     parts, known = _merged([*((part, 1) for part in table.expansions), *added]), dict(table.doubts) if doubts else {}
     if doubts and charged:
-        known["charges"] = tuple(_scaled(part, STEADY_ERROR) for part in nonzero((*less, *more)))
+        known["charges"] = tuple(
+            replace(part, coefficients=STEADY_ERROR * part.coefficients) for part in nonzero((*less, *more))
+        )
         known["charges' tail"] = nonzero(extrapolated_tail(more))
     return ChangedTable(table.model, rotor, uniform, parts, known, table.provenance, table)
 
@@ -79,23 +82,10 @@ def _bear_charges(rotor: Rotor) -> bool:
     return not without_charges(rotor, accuracy, error_points(rotor, accuracy.clearance(rotor))[0])
 
 
-def _alike(some: Rotor, others: Rotor) -> bool:
-    """Whether magnets are the same in all that their closed forms have of them."""
-    return len(some) == len(others) and all(
-        type(one.body) is type(other.body)
-        and all(
-            np.array_equal(a, b)
-            for a, b in (
-                (one.polarization, other.polarization), (one.body.center, other.body.center),
-                (one.body.rotation, other.body.rotation), (one.body.shape_numbers, other.body.shape_numbers),
-            )
-        )
-        for one, other in zip(some, others, strict=True)
-    )  # fmt: skip
-
-
-def _scaled(part: MultipoleExpansion, factor: float) -> MultipoleExpansion:
-    return replace(part, coefficients=factor * part.coefficients)
+def _numbers(rotor: Rotor) -> list[tuple[Any, ...]]:
+    """All that the closed forms of magnets have of them."""
+    each = [(m.polarization, m.body.center, m.body.rotation, m.body.shape_numbers) for m in rotor]
+    return [(type(m.body), *(part.tolist() for part in parts)) for m, parts in zip(rotor, each, strict=True)]
 
 
 def _merged(parts: Sequence[tuple[MultipoleExpansion, float]]) -> tuple[MultipoleExpansion, ...]:

@@ -282,6 +282,16 @@ def alike(rotor: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
     return canonical(tuple(magnet.magnetic for magnet in rotor))
 
 
+Pair = tuple[Array, Array]
+
+
+def errors_of_sum(errors: Pair, part: Pair, whole: Pair) -> Pair:
+    """Relative `errors` (n,) of a field (n, 3) and its gradient (n, 3, 3), the `part` of a `whole`, by this."""
+    sizes = ([np.linalg.norm(each.reshape(len(each), -1), axis=1) for each in fields] for fields in (part, whole))
+    first, second = (error * own / total for error, own, total in zip(errors, *sizes, strict=True))
+    return first, second
+
+
 def _off_center(doubt: MultipoleExpansion, points: Array) -> Array:
     """The points (n, 3) m, those near a doubt's centre moved out to `DEEP` of the sphere that holds its sources.
 
