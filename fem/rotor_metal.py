@@ -373,7 +373,10 @@ def rotor_losses(
     places = np.concatenate([around(share * nearest) for share in SHELLS])
     values = found.fields(places, watch)
     scale = 1 / np.linalg.norm(values, axis=(0, 2))
-    choice = _candidates([body for group, _ in pieces for body in group], nearest)
+    # multipoles about the middles of parts of the bodies so compact that their expansions converge
+    boxes = [Magnet(Box(b.size, b.center, b.rotation), np.zeros(3)) for group, _ in pieces for b in group]
+    centers = [part.box.center for parts in cut_magnets(boxes, nearest) for part in parts]
+    choice = Multipoles.at(centers, real_kinds(1, DEGREE), nearest)
     fit = fit_multipoles(choice, places, values, np.ones(found.count), scale, FIT, lambda _: True)
     finer = [metal_of(group, conductivity, ORDER + 1) for group, conductivity in pieces]
     table = RotorLosses(fit.multipoles, sparse(fit.weights), nearest * np.array(CHECKED), np.zeros(len(CHECKED)))
@@ -411,13 +414,6 @@ def places_around(bodies: Sequence[Solid], distance: float, seed: int = 0, direc
     places = np.concatenate([places_off(body, mirrored @ body.rotation.T, distance) for body in bodies])
     clear = np.min([body.distance(places) for body in bodies], axis=0)
     return np.asarray(places[clear > distance * (1 - 1e-6)])
-
-
-def _candidates(bodies: Sequence[Solid], nearest: float) -> Multipoles:
-    """Multipoles about the middles of parts of the bodies so compact that their expansions converge."""
-    boxes = [Magnet(Box(body.size, body.center, body.rotation), np.zeros(3)) for body in bodies]
-    centers = [part.box.center for parts in cut_magnets(boxes, nearest) for part in parts]
-    return Multipoles.at(centers, real_kinds(1, DEGREE), nearest)
 
 
 def _error(table: RotorLosses, metals: Sequence[Metal], places: Array) -> float:

@@ -103,7 +103,8 @@ class Candidate:
                 "Input margin must be asked for where gravity is along the axis and the floater round about its "
                 "moment; instead this scene's is not."
             )
-        family, start, found = by_frequency(scene, self.levitation.rates, self.levitation.spin), self._start, []
+        family, found = by_frequency(scene, self.levitation.rates, self.levitation.spin), []
+        start = Scales.of(self.levitation.still).pack(self.bare.start)
         for number, border in enumerate((LOWEST, HIGHEST)):
             end = None
             if self.near is not None and "ends" in self.near.__dict__:
@@ -116,10 +117,6 @@ class Candidate:
             found.append(end)
         self.near = None
         return found[0], found[1]
-
-    @property
-    def _start(self) -> Array:
-        return Scales.of(self.levitation.still).pack(self.bare.start)
 
     def values(self, name: str) -> Array:
         """Numbers (k,) whose least is a measure. Raises EquilibriumError for the margin where it is not stable."""

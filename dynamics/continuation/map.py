@@ -72,7 +72,10 @@ class Grid:
         which, beside = [np.zeros(0, int)], [np.zeros(0, int)]
         for axis in range(self.places.shape[1]):
             for step in (1, -1):
-                found = self._at(self.places[point] + step * np.eye(self.places.shape[1], dtype=int)[axis])
+                places = self.places[point] + step * np.eye(self.places.shape[1], dtype=int)[axis]
+                inside = ((places >= 0) & (places < self._shape)).all(axis=1)
+                found = np.full(len(places), -1)
+                found[inside] = self._numbers[tuple(places[inside].T)]
                 which.append(np.flatnonzero(found >= 0))
                 beside.append(found[found >= 0])
         return np.concatenate(which), np.concatenate(beside)
@@ -98,13 +101,6 @@ class Grid:
         numbers = np.full(self._shape, -1)
         numbers[tuple(self.places.T)] = np.arange(len(self))
         return numbers
-
-    def _at(self, places: Indices) -> Indices:
-        """Numbers (n,) of the points at places (n, axes); -1 where there is none."""
-        inside = ((places >= 0) & (places < self._shape)).all(axis=1)
-        found = np.full(len(places), -1)
-        found[inside] = self._numbers[tuple(places[inside].T)]
-        return found
 
 
 def filled(grid: Grid, nodes: Indices) -> tuple[Indices, Array, Array]:

@@ -165,15 +165,12 @@ class Implicit:
         for _ in range(POLISHED):
             vectors, _, rows = np.linalg.svd(self._pencil.matrix(value or 1e-300))
             left, right = vectors[:, -1], rows[-1].conj()
-            speed = self._by_shift(left, right, value)
+            ends = [self._pencil.applied(right, value + s * STEP) for s in (1, -1)]
+            speed = complex(np.vdot(left, (ends[0] - ends[1]) / (2 * STEP)))
             if abs(speed) < COLLIDED or abs(value) < SLOWEST:
                 return _ModeAt(name, value, left, right, 0j)
             value -= np.vdot(left, self._pencil.applied(right, value)) / speed
         return _ModeAt(name, value, left, right, speed)
-
-    def _by_shift(self, left: NDArray[Any], right: NDArray[Any], value: complex) -> complex:
-        ends = [self._pencil.applied(right, value + s * STEP) for s in (1, -1)]
-        return complex(np.vdot(left, (ends[0] - ends[1]) / (2 * STEP)))
 
     def missed(self, nearby: Sequence[Nearby]) -> Array:
         """F_p (2, 12 n + 2) by a number, from the equations at some values of it, and the same of two orders less."""

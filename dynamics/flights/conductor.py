@@ -31,6 +31,7 @@ from ..motion.state import matrices_of, quaternions_of, rotation_of
 FAST = 40.0  # Rate over the highest angular frequency of a current from which a mode follows at once
 LOWEST = 50.0  # Frequency (Hz) of which coils count at least: of steady ones the motion alone drives currents
 TOLERANCE = 2e-7  # Of the integration: heights are then right to 1e-12 m, and energies balance to 1e-8
+SAMPLES = 1000  # In a second; times at which a current has a corner are added
 SMALL = 1e-3  # Height and its rate that absolute errors are relative to, in the height over the coils
 LEAST, FARTHEST = 0.5, 8.0  # Range of heights over the coils that is precomputed, in the one where a motion begins
 RASTER = 1e-4  # Ends of that range are multiples of this, m, so that motions that begin alike share it
@@ -182,7 +183,7 @@ def levitation_height(modes: FloatingModes, supply: Supply, weight: float) -> fl
     return float(brentq(left, every[falls[0]], every[falls[0] + 1], xtol=1e-12)) if len(falls) else float("nan")
 
 
-def conductor_motion(scene: Scene, modes: FloatingModes, duration: float, samples: int = 1000) -> ConductorMotion:
+def conductor_motion(scene: Scene, modes: FloatingModes, duration: float) -> ConductorMotion:
     """Simulate a conductor over the coils of a scene, from its start until contact, loss or the end.
 
     Parameters
@@ -190,7 +191,6 @@ def conductor_motion(scene: Scene, modes: FloatingModes, duration: float, sample
     scene : with an absolute start, within the heights of the modes
     modes : of its floater over its coils
     duration : s
-    samples : in a second; times at which a current has a corner are added
     """
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)
@@ -219,7 +219,7 @@ def conductor_motion(scene: Scene, modes: FloatingModes, duration: float, sample
         return found
 
     inside: Ends = [("contact", lambda u: u[0] - low), ("lost", lambda u: high - u[0])]
-    time, path, ended = _integrated(supply, state, slope, inside, allowed, duration, samples)
+    time, path, ended = _integrated(supply, state, slope, inside, allowed, duration)
     amperes = np.stack([coil.amperes(time) for coil in supply.leaders], axis=1)
     fluxes = np.array([modes.flux(z)[0][kept] for z in np.clip(path[:, 0], low, high)])
     own = path[:, 2:-2] - np.einsum("nms,ns->nm", fluxes, amperes)
@@ -236,7 +236,7 @@ Ends = list[tuple[str, Callable[[Array], float]]]  # What ends a motion where a 
 
 def _integrated(
     supply: Supply, state: Array, slope: Callable[[Array, Array, Array], Array], inside: Ends, allowed: Array,
-    duration: float, samples: int,
+    duration: float,
 ) -> tuple[Array, Array, str]:  # fmt: skip
     """Times (n,) s, states (n, m) and what ended it: of a slope by the state, the currents and their rates."""
     times, states = [np.zeros(1)], [state[None]]
@@ -250,7 +250,7 @@ def _integrated(
         def at(time: float, u: Array, functions: list[Callable[[float], tuple[float, float]]] = functions) -> Array:
             return slope(u, *np.array([f(time) for f in functions]).T)
 
-        every = np.union1d(np.arange(np.ceil(begin * samples), np.floor(end * samples) + 1) / samples, [end])
+        every = np.union1d(np.arange(np.ceil(begin * SAMPLES), np.floor(end * SAMPLES) + 1) / SAMPLES, [end])
         every = every[(every > begin) & (every <= end)]
         step = partial(solve_ivp, at, method="DOP853", rtol=TOLERANCE, atol=TOLERANCE * allowed)
         done = step((begin, end), states[-1][-1], t_eval=every, events=events)
@@ -284,7 +284,7 @@ def _turn(quaternion: Array) -> Array:
     return np.array(rotation_of((quaternion / np.linalg.norm(quaternion)).tolist()))
 
 
-def free_motion(scene: Scene, modes: FreeModes, duration: float, samples: int = 1000) -> ConductorMotion:
+def free_motion(scene: Scene, modes: FreeModes, duration: float) -> ConductorMotion:
     """Simulate a conductor over the coils of a scene in six degrees of freedom, until contact, loss or the end.
 
     Parameters
@@ -292,7 +292,6 @@ def free_motion(scene: Scene, modes: FreeModes, duration: float, samples: int = 
     scene : with an absolute start
     modes : of its floater over its coils, in the room of `room_over`
     duration : s
-    samples : in a second; times at which a current has a corner are added
     """
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)
@@ -345,9 +344,8 @@ def free_motion(scene: Scene, modes: FreeModes, duration: float, samples: int = 
     energy = mass * pull * gap
     sizes = [SMALL * gap] * 3, [SMALL * np.sqrt(pull * gap)] * 3, [SMALL] * 4, [SMALL * np.sqrt(pull / gap)] * 3
     allowed = np.concatenate([*sizes, np.full(kept.sum(), np.sqrt(energy)), [energy] * 2])
-    time, path, ended = _integrated(
-        supply, state, slope, [("contact", above), ("lost", within)], allowed, duration, samples
-    )
+    inside: Ends = [("contact", above), ("lost", within)]
+    time, path, ended = _integrated(supply, state, slope, inside, allowed, duration)
     amperes = np.stack([coil.amperes(time) for coil in supply.leaders], axis=1)
     own = path[:, 13:-2] - [(fluxes(u)[-1] @ now)[kept] for u, now in zip(path, amperes, strict=True)]
     parts = [mass * np.sum(path[:, 3:6] ** 2, axis=1) / 2, -mass * path[:, :3] @ scene.gravity,

@@ -166,25 +166,22 @@ class JointFlight:
     scene : with an absolute start of each
     tables : the rotor's field for each, with its effects
     duration : how long it shall last, s
-    tolerance : relative error of a step
 
     Raises
     ------
     StartError : `duration` is not positive, or a floater would begin in contact
     """
 
-    def __init__(
-        self, scene: Scene, tables: Sequence[FieldTable], duration: float, tolerance: float = TOLERANCE
-    ) -> None:
+    def __init__(self, scene: Scene, tables: Sequence[FieldTable], duration: float) -> None:
         if not duration > 0:
             raise StartError(f"Input duration must be positive; instead received {duration} s.")
-        self.scene, self.duration, self._tolerance = scene, duration, tolerance
+        self.scene, self.duration = scene, duration
         first, floaters = Scales.of(scene), tuple(one.floater for one in scene.each)
         self.flights, self.courses = list[Flight](), list[Course]()
         for k, (one, table) in enumerate(zip(scene.each, tables, strict=True)):
             scales = replace(Scales.of(one), length=first.length, time=first.time)
             whole = interaction_of(with_effects(one, table)).joined(Neighbours(floaters, k))
-            flight = Flight(one, whole, duration, tolerance, scales=scales)  # type: ignore[arg-type]
+            flight = Flight(one, whole, duration, scales=scales)  # type: ignore[arg-type]
             self.flights.append(flight)
             course = flight.begin(initial_state(one, table)[0], duration)
             if flight.balls:  # of one kind from the start on, as each pair of kinds is compiled
@@ -231,7 +228,7 @@ class JointFlight:
                 hy.taylor_adaptive,
                 [*zip(variables, rates, strict=True), (hy.expression("work"), power)],
                 np.zeros(len(variables) + 1),
-                tol=self._tolerance * (LOOSER if all(degrees) else 1),
+                tol=TOLERANCE * (LOOSER if all(degrees) else 1),
                 compact_mode=True,
                 opt_level=OPTIMISATION if self.scene.fastest * self.duration > SHORT_TURNS else 0,
                 t_events=[hy.t_event(each, direction=falling) for each, _ in events],

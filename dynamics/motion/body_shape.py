@@ -21,13 +21,13 @@ from ...fem.harmonics.expressions import regular_harmonics
 from ...fem.harmonics.interior import Ball, BallField
 from ...fem.harmonics.rigid import field_coefficients, harmonics, matrices, shells, shifted, sizes
 from ...fem.rotor.floater import FloaterSources, floater_sources, shares, slopes_of, strength
-from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable, RangeError
+from ...fem.rotor.table import DerivedField, FieldFormula, RangeError
 from ...geometry.common import Array, even_directions
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Solid
 from .effect import Added, Motion, Poses
 from .floater_effects import FLOATER_SHAPE
-from .state import Parameter, State, Vector, add, cross, dot, dotted, matrices_of
+from .state import Parameter, State, Vector, add, cross, dot, dotted, matrices_of, subtract
 
 HIGHEST = 7  # degree of the multipoles in a trajectory
 LESS = 3  # degrees by which what they feel in a ball is of a lower one than the field there
@@ -208,20 +208,16 @@ class BodyShape:
         if motion.quaternion is None:
             turn: Vector = cross(given[3:6], motion.moment)
         else:
-            turn = self._turn(given[3:7], motion.quaternion)
-        change = [*(p - q for p, q in zip(motion.position, given[:3], strict=True)), *turn]
+            (w, x, y, z), (a, b, c, d) = given[3:7], motion.quaternion
+            # twice the vector part of q q0*, which is the small turn from the one to the other
+            turn = [
+                2.0 * (-a * x + b * w - c * z + d * y),
+                2.0 * (-a * y + b * z + c * w - d * x),
+                2.0 * (-a * z - b * y + c * x + d * w),
+            ]
+        change = [*subtract(motion.position, given), *turn]
         values = [given[7 + i] + dotted(given[13 + 6 * i : 19 + 6 * i], change) for i in range(6)]
         return Added(values[:3], values[3:])
-
-    @staticmethod
-    def _turn(before: Vector, quaternion: Vector) -> Vector:
-        (w, x, y, z), (a, b, c, d) = before, quaternion
-        # twice the vector part of q q0*, which is the small turn from the one to the other
-        return [
-            2.0 * (-a * x + b * w - c * z + d * y),
-            2.0 * (-a * y + b * z + c * w - d * x),
-            2.0 * (-a * z - b * y + c * x + d * w),
-        ]
 
     def numbers(self, field: DerivedField, poses: Poses) -> Array:
         """See `Placeable`."""
@@ -259,7 +255,7 @@ class BodyShape:
         for share in REACHES:
             try:
                 there = field_coefficients(
-                    lambda points: self._table.evaluate(points)[0],
+                    lambda points: self.field.evaluate(points)[0],  # type: ignore[attr-defined]
                     ball.center, max(share * min(apart, 10 * self.floater.radius), ball.radius), degree,
                     self.floater.radius,
                 )  # fmt: skip
@@ -275,10 +271,6 @@ class BodyShape:
         rest = np.linalg.norm(moved[:, way == self._way + 1], axis=1) @ np.abs(self.moments[self.kept] / unit[:, 0])
         error = (self._way + 1) * rest / ball.radius / (strength(self.floater) * float(np.linalg.norm(gradient)) or 1.0)
         return moved[:, way <= self._way].ravel(), float(error) / ALLOWED[self._way]
-
-    @property
-    def _table(self) -> FieldTable:
-        return self.field  # type: ignore[return-value]
 
 
 def _combined(weights: Array, values: Vector) -> hy.expression:

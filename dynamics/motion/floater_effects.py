@@ -345,7 +345,7 @@ class FloaterCurrents:
         change = _changed_field(lag, motion.field, [dot(row, drift) for row in gradient])
         sheared = _turned_gradient(lag, gradient)
         changes = [[dot(bend[i][j], drift) - sheared[i][j] for j in range(3)] for i in range(3)]
-        pull = [_contracted(changes, [[bend[i][j][k] for j in range(3)] for i in range(3)]) for k in range(3)]
+        pull = [hy.sum([changes[i][j] * bend[i][j][k] for i in range(3) for j in range(3)]) for k in range(3)]
         force = [
             -tilt * inertia * (dot([gradient[i][k] for i in range(3)], change) + GRADIENT * pull[k]) for k in range(3)
         ]
@@ -423,26 +423,17 @@ def curvature(motion: Motion) -> list[Matrix]:
     gradient, upper = motion.gradient, ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
     tensors = hy.diff_tensors([gradient[i][j] for i, j in upper], diff_args=list(motion.position), diff_order=1)
     slopes = hy.par[Parameter.LENGTH] * np.asarray(tensors.jacobian).reshape(5, 3)
-    known = {(0, *pair): slopes[row, 0] for row, pair in enumerate(upper)}
+    known: dict[tuple[int, ...], hy.expression] = {(0, *pair): slopes[row, 0] for row, pair in enumerate(upper)}
     known |= {(1, 1, 1): slopes[3, 1], (1, 1, 2): slopes[4, 1]}
     known |= {(0, 2, 2): -known[0, 0, 0] - known[0, 1, 1], (1, 2, 2): -known[0, 0, 1] - known[1, 1, 1]}
     known |= {(2, 2, 2): -known[0, 0, 2] - known[1, 1, 2]}
-    return [[[known[_sorted(i, j, k)] for k in range(3)] for j in range(3)] for i in range(3)]
-
-
-def _sorted(i: int, j: int, k: int) -> tuple[int, int, int]:
-    low, middle, high = sorted((i, j, k))
-    return low, middle, high
+    return [[[known[tuple(sorted((i, j, k)))] for k in range(3)] for j in range(3)] for i in range(3)]
 
 
 def _commutator(turn: Vector, matrix: Matrix) -> Matrix:
     """w× M - M w× of a symmetric matrix: symmetric."""
     columns = [cross(turn, column) for column in matrix]  # [j][i]: of w× M
     return [[columns[j][i] + columns[i][j] for j in range(3)] for i in range(3)]
-
-
-def _contracted(a: Matrix, b: Matrix) -> hy.expression:
-    return hy.sum([a[i][j] * b[i][j] for i in range(3) for j in range(3)])
 
 
 # The effects that a scene alone decides: `of(scene)` is one, or None where the scene is without it. Searches, motion,

@@ -55,6 +55,7 @@ from .state import (
     turned_about_z,
 )
 
+SETTLED = 33  # Angles of a turn at which the rotor's field is seen
 ENDLESS = 1e30  # Rate of a rotor, rad/s, that no current follows
 
 
@@ -311,11 +312,11 @@ class PlateForce:
         found = np.fft.ifft(factors[:, :, None] * harmonics, axis=1)
         return found if shift else found.real
 
-    def settled(self, state: Array, count: int = 33) -> Array:
+    def settled(self, state: Array) -> Array:
         """States (states,) of the plate at t = 0 under a floater that has long turned with the rotor, (12,)."""
-        times = 2 * np.pi * np.arange(count) / count
-        signals = self(times, np.broadcast_to(state, (count, 12))).signals
-        return np.asarray(np.einsum("ib,bi->i", self.remembered(count)[:, 0], signals))
+        times = 2 * np.pi * np.arange(SETTLED) / SETTLED
+        signals = self(times, np.broadcast_to(state, (SETTLED, 12))).signals
+        return np.asarray(np.einsum("ib,bi->i", self.remembered(SETTLED)[:, 0], signals))
 
     @property
     def _depth(self) -> float:

@@ -66,7 +66,8 @@ def matrices(degree: int) -> tuple[Array, Array]:
             if len(columns):
                 solved = np.linalg.lstsq(values[:, columns], np.concatenate(wanted[:, :, rows], axis=1))[0]
                 one[:, rows[:, None], columns] = solved.T.reshape(3, len(rows), len(columns))
-        found.append(_clean(one))
+        # round-off of the solutions, whose entries are small rational numbers
+        found.append(np.where(np.abs(one) < 1e-11 * np.abs(one).max(), 0.0, one))
     return found[0], found[1]
 
 
@@ -90,11 +91,6 @@ def _ways(way: int) -> tuple[Array, list[Array]]:
     ways = even_directions(2 * (way + 1) ** 2)
     values = harmonics(way, ways)[0]
     return ways, [np.asarray(np.linalg.pinv(values[:, shells(way) == j]), float) for j in range(way + 1)]
-
-
-def _clean(values: Array) -> Array:
-    """Round-off of the solutions, whose entries are small rational numbers, set to zero."""
-    return np.where(np.abs(values) < 1e-11 * np.abs(values).max(), 0.0, values)
 
 
 def field_coefficients(

@@ -40,7 +40,10 @@ class HarmonicBasis:
         for k, (center, radius) in enumerate(zip(self.centers, self.radii, strict=True)):
             harmonics = irregular_values(self.degree + 1, (points - center) / radius)
             for row, l, m in _terms(self.degree, len(self.centers), k):
-                _fill(result, row, m, irregular_gradient(harmonics, l, m), sizes[l, m])
+                gradient = -(2.0 if m else 1.0) / sizes[l, m] * np.array(irregular_gradient(harmonics, l, m))
+                result[row] = gradient.real  # of Re c_lm; the terms ±m are complex conjugates
+                if m:
+                    result[row + 1] = -gradient.imag  # of Im c_lm
         return result
 
     def coefficients(self, unknowns: Array, degree: int) -> list[Coefficients]:
@@ -66,15 +69,6 @@ def _terms(degree: int, centers: int, k: int) -> Iterator[tuple[int, int, int]]:
         first = centers * (l * l - 1) + k * (2 * l + 1)
         for m in range(l + 1):
             yield first + max(2 * m - 1, 0), l, m
-
-
-def _fill(result: Array, row: int, m: int, gradient: list[Array], size: float) -> None:
-    """Field of Re c_lm, and for m > 0 of Im c_lm in the row after; the terms ±m are complex conjugates."""
-    factor = -(2.0 if m else 1.0) / size
-    for axis in range(3):
-        result[row, axis] = factor * gradient[axis].real
-        if m:
-            result[row + 1, axis] = -factor * gradient[axis].imag
 
 
 # Groups of points, each of which is held out once: they choose the degree, and the fits without them differ.

@@ -209,7 +209,9 @@ def _units_below(table: _Table, reading: MapReading) -> dict[int, str]:
 
 def _numbers(table: _Table, columns: Mapping[int, Column], skipped: int) -> dict[str, Array]:
     values = {k: array("d") for k in columns}
-    comma, is_decimal = _has_decimal_comma(table, columns), False
+    cells = (row[k] for row in table.rows() for k in columns if k < len(row))
+    comma = next((mark == "," for cell in cells for mark in cell if mark in ",."), False)  # of the first with either
+    is_decimal = False
     for number, row in enumerate(table.rows(), 1 - skipped):
         if number < 1:
             continue
@@ -226,12 +228,6 @@ def _numbers(table: _Table, columns: Mapping[int, Column], skipped: int) -> dict
     if not all(values.values()):
         raise FieldMapError("Input map must have numbers below its titles; instead it has none.")
     return {column.name: np.frombuffer(values[k]) for k, column in columns.items()}
-
-
-def _has_decimal_comma(table: _Table, columns: Mapping[int, Column]) -> bool:
-    """Whether the first number with a mark of decimals has a comma for it."""
-    cells = (row[k] for row in table.rows() for k in columns if k < len(row))
-    return next((mark == "," for cell in cells for mark in cell if mark in ",."), False)
 
 
 def _require_width(table: _Table, number: int, row: list[str]) -> None:

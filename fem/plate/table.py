@@ -133,12 +133,8 @@ class RotorShare:
 
     def by_depth(self, depth: float) -> Array:
         """Polynomials (k,) of the series at a depth of the plate (m)."""
-        return np.asarray(
-            np.polynomial.chebyshev.chebvander(np.array([self._place(depth)]), self.series.shape[2] - 1)[0]
-        )
-
-    def _place(self, depth: float) -> float:
-        return 2 * depth / self.distance - 1 if self.distance else 0.0
+        place = 2 * depth / self.distance - 1 if self.distance else 0.0
+        return np.asarray(np.polynomial.chebyshev.chebvander(np.array([place]), self.series.shape[2] - 1)[0])
 
     def basis(self, angle: hy.expression, depth: hy.expression) -> list[list[hy.expression]]:
         """Harmonics of the angle (rad) times Chebyshev polynomials of the depth (m), as `series` has them."""

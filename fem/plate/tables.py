@@ -44,7 +44,6 @@ def plate_table(
     region: Region,
     frequencies: tuple[float, float] = (0.5, 250.0),
     rtol: float = 1e-3,
-    rule: MeshRule | None = None,
 ) -> PlateTable:
     """Table of `plate` for dipoles in `region` (plate's frame) and frequencies (Hz).
 
@@ -53,10 +52,9 @@ def plate_table(
     Parameters
     ----------
     rtol : relative accuracy asked of reaction tensors G, Frobenius norm
-    rule : mesh (default by `rtol`)
     """
     checked_ranges(frequencies, rtol)
-    solution = solve_currents(plate, [region], frequencies, rtol, rule)
+    solution = solve_currents(plate, [region], frequencies, rtol)
     reduced = from_elements(plate, solution, region, frequencies, rtol, OtherSources(), solution.space_error)
     return _reduced_table(reduced, rtol, CONDUCTOR, unwatched)[1]
 

@@ -56,11 +56,10 @@ class EasyField:
     ----------
     magnets : the rotor's
     floater : a magnet in the rotor's frame, or None
-    rtol : error asked of the elements, relative to the largest remanence
     """
 
-    def __init__(self, magnets: Sequence[Magnet], floater: Magnet | None = None, rtol: float = RTOL) -> None:
-        self.magnets, self.floater, self.rtol = tuple(magnets), floater, rtol
+    def __init__(self, magnets: Sequence[Magnet], floater: Magnet | None = None) -> None:
+        self.magnets, self.floater = tuple(magnets), floater
         bodies = self.magnets if floater is None else (*self.magnets, floater)
         self.elements = NearElements(bodies)
 
@@ -71,7 +70,7 @@ class EasyField:
 
     def near(self, points: Array) -> NearField:
         """The field of all at points (n, 3) m."""
-        return near_field(self.elements.magnets, points, self.rtol, HIGHEST, self.elements)
+        return near_field(self.elements.magnets, points, RTOL, HIGHEST, self.elements)
 
     def section(self, number: int, first: Array, steps: int) -> tuple[Array, Array, Array, Array]:
         """μ0 H · e on a plane through a magnet's centre.

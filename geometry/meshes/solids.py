@@ -25,6 +25,7 @@ from ..solids import Part, Solid, moved
 MILLIMETRE = 1e-3
 CURVED, ROUND = 6, 2.0  # Degree of the elements at round surfaces, and how many of them in a radius of curvature
 METAL_CURVED, METAL_ROUND = 5, 1.0  # the same for metal; they leave 1e-4 of a mantle's volume and place
+METAL_LARGEST = 0.7  # Element of metal, in cube roots of the smallest body's volume
 # Least element that a radius of curvature asks for, in cube roots of a part's volume: one spans a small fillet.
 SMALLEST = 0.06
 # Of that, where the mesher fails: its luck with the same part is another with elements of other sizes.
@@ -45,7 +46,8 @@ def occ_solid(body: Solid, center: Array, unit: float) -> Any:
     if isinstance(body, Sphere):
         return occ.Sphere(occ.Pnt(*map(float, (body.center - center) / unit)), body.radius / unit)
     if isinstance(body, Part):
-        return _part(body, center, unit)
+        solid = _turned(read_brep(body.brep).Move(_vector(body.origin / MILLIMETRE)), body.rotation)
+        return solid.Scale(occ.Pnt(0, 0, 0), MILLIMETRE / unit).Move(_vector((body.center - center) / unit))
     foot = (body.center - center - body.half_edges[2] * z) / unit
     if isinstance(body, Box):
         half = body.half_edges / unit
@@ -72,14 +74,14 @@ class SolidMesh:
         return np.asarray(points * self.unit + self.center)
 
 
-def mesh_metal(bodies: Sequence[Solid], largest: float = 0.7) -> SolidMesh:
-    """Mesh of bodies that touch, without air; `largest` element in cube roots of the smallest body's volume."""
+def mesh_metal(bodies: Sequence[Solid]) -> SolidMesh:
+    """Mesh of bodies that touch, without air."""
     center = np.mean([body.center for body in bodies], axis=0)
     unit = min(body.volume for body in bodies) ** (1 / 3)
     shape = occ_solid(bodies[0], center, unit)
     for body in bodies[1:]:
         shape = shape + occ_solid(body, center, unit)
-    sizes = {"maxh": largest, "curvaturesafety": METAL_ROUND}
+    sizes = {"maxh": METAL_LARGEST, "curvaturesafety": METAL_ROUND}
     mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
     mesh.Curve(METAL_CURVED)
     return SolidMesh(mesh, frozen_array(center, (3,)), unit)
@@ -92,11 +94,6 @@ def read_brep(brep: str) -> Any:
         copy.flush()
         (solid,) = occ.OCCGeometry(copy.name).shape.solids
     return solid
-
-
-def _part(body: Part, center: Array, unit: float) -> Any:
-    solid = _turned(read_brep(body.brep).Move(_vector(body.origin / MILLIMETRE)), body.rotation)
-    return solid.Scale(occ.Pnt(0, 0, 0), MILLIMETRE / unit).Move(_vector((body.center - center) / unit))
 
 
 def _turned(shape: Any, rotation: Array) -> Any:

@@ -170,9 +170,9 @@ def cube(problem: str) -> tuple[Magnet, ...]:
     return horizontal(0.0, EDGE, REMANENCE, PERMEABILITIES[problem])
 
 
-def sphere_points(number: int = 200) -> Array:
-    """Points (d, n, 3) m at the distances, all around the cube."""
-    way = np.random.default_rng(5).normal(size=(number, 3))
+def sphere_points() -> Array:
+    """Points (d, 200, 3) m at the distances, all around the cube."""
+    way = np.random.default_rng(5).normal(size=(200, 3))
     return np.asarray(np.array(DISTANCES)[:, None, None] * way / np.linalg.norm(way, axis=1)[:, None])
 
 

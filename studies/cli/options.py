@@ -378,7 +378,10 @@ def parse_vary(requested: Sequence[str]) -> dict[str, list[Any]]:
             raise _wrong(text)
         if key in found:
             raise InputError(f"Input --vary must give each key once; instead received {shown(key)} twice.")
-        found[key] = [part.strip() for part in values.split(",")] if key in NAMES else _values(text, values)
+        numbers = [part.strip() for part in values.split(",")] if key in NAMES else _numbers(values)
+        if numbers is None:
+            raise _wrong(text)
+        found[key] = numbers
     return checked_values(found, "--vary")
 
 
@@ -425,13 +428,6 @@ def frequency_grid(text: str) -> Array:
             f"instead received {shown(text)}.{_decimal_point(text)}"
         )
     return np.array(numbers)
-
-
-def _values(text: str, values: str) -> list[float]:
-    numbers = _numbers(values)
-    if numbers is None:
-        raise _wrong(text)
-    return numbers
 
 
 def _numbers(values: str) -> list[float] | None:
