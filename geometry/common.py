@@ -107,11 +107,6 @@ def millimetres(lengths: ArrayLike) -> str:
     return f"({listed(np.asarray(lengths, float) * 1e3)}) mm"
 
 
-def millimetre_size(lengths: ArrayLike) -> str:
-    """Edges (n,) in m as `x × y × z mm`."""
-    return f"{' × '.join(f'{length:.4g}' for length in np.asarray(lengths, float) * 1e3)} mm"
-
-
 def listed(values: ArrayLike) -> str:
     """Numbers (n,) joined by commas, round-off of 1e-9 left out."""
     return ", ".join(f"{value:.4g}" for value in np.round(np.asarray(values, float), 9) + 0.0)

@@ -160,11 +160,6 @@ def closing_shifts(magnets: Sequence[Magnet]) -> Array:
     return shifts
 
 
-def largest_shift(magnets: Sequence[Magnet]) -> float:
-    """Length of the longest of the `closing_shifts`, m."""
-    return float(np.linalg.norm(closing_shifts(magnets), axis=1).max())
-
-
 def separate_pieces(conductors: Sequence[Conductor]) -> list[tuple[Conductor, ...]]:
     """The conductors in groups among which no current can flow.
 

@@ -103,13 +103,10 @@ def second_moments_of_part(part: Part) -> Array:
 
 def inertia_of(brep: str) -> Array:
     """(3, 3) tensor of inertia, m⁵, of the solid of a BREP text about the centre of its volume."""
-    import netgen.occ as occ
+    from .meshes.solids import read_brep
 
-    with tempfile.NamedTemporaryFile("w", suffix=".brep", encoding="utf-8") as copy:
-        copy.write(brep)
-        copy.flush()
-        shape = occ.OCCGeometry(copy.name).shape
-    return MILLI**5 * np.array([[shape.inertia[i, j] for j in range(3)] for i in range(3)])
+    solid = read_brep(brep)
+    return MILLI**5 * np.array([[solid.inertia[i, j] for j in range(3)] for i in range(3)])
 
 
 def _solids(text: str) -> tuple[list[Any], int]:

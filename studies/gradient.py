@@ -402,17 +402,12 @@ def gradient(
     """
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
     found = Gradient(levitation)
-    names, keys = checked_answers(of), found.checked_keys(by)
+    every = [*ANSWERS, *MORE, *ENDS]
+    names = list(ANSWERS) if of is None else _checked("of", of, every, "answers that have derivatives")
+    keys = found.checked_keys(by)
     if not levitation.equilibria:
         raise EquilibriumError(f"At {levitation.scene.frequency:g} Hz the floater has no equilibrium to differentiate.")
     return found.dataset(levitation.equilibria, names, keys).assign_attrs(scene=scene_text(levitation.scene))
-
-
-def checked_answers(of: Sequence[str] | None) -> list[str]:
-    """The answers asked for, or all of an equilibrium. Raises InputError for one that has no derivatives."""
-    return (
-        list(ANSWERS) if of is None else _checked("of", of, [*ANSWERS, *MORE, *ENDS], "answers that have derivatives")
-    )
 
 
 def _checked(name: str, given: Sequence[str], known: Collection[str], what: str) -> list[str]:

@@ -24,7 +24,7 @@ from ..fem.plate.choice import resolve_plate_model
 from ..fem.plate.table import Region
 from ..fem.rotor.table import ROTOR, RotorTable
 from ..fem.rotor_metal import losses_key, pieces_of
-from ..geometry.common import Array, InputError, Watch, millimetre_size, shown
+from ..geometry.common import Array, InputError, Watch, shown
 from ..geometry.overlap import TOUCHING, sphere_overlap
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import check_files, load_scene, map_digest
@@ -132,9 +132,9 @@ def plate_plan(scene: Scene, models: Models, place: Array | None) -> PlatePlan:
     """Model of a `scene`'s plate by `models` for a floater that comes to a `place` (3,) m; its reason is reported."""
     choice = resolve_plate_model(scene, models.plate_model, place, models.plate_rtol, note)
     if scene.plate is not None:
-        size = scene.plate.box.size
-        said = PLATE_WORDS[choice.model].format(size=millimetre_size(size), thickness=1e3 * min(size))
-        note(f"Plate: {said}")
+        edges = 1e3 * scene.plate.box.size
+        size = f"{' × '.join(f'{edge:.4g}' for edge in edges)} mm"
+        note(f"Plate: {PLATE_WORDS[choice.model].format(size=size, thickness=min(edges))}")
         detail(f"Plate model: {choice.model} ({choice.reason})")
     return PlatePlan(choice.model, choice.edges, models.plate_rtol)
 

@@ -36,7 +36,6 @@ from ..motion.events import (
     Leg,
     clearance,
     flight_events,
-    lost_distance,
     motion_legs,
     plate_depth,
     range_events,
@@ -199,7 +198,8 @@ class Flight:
         It is sampled at multiples of `interval`, scaled; None: not at all.
         """
         values, own = self.values.copy(), np.zeros(0)
-        values[Parameter.LOST_DISTANCE] = lost_distance(start.position) / self.scales.length
+        farthest = max(0.1, 2 * float(np.linalg.norm(start.position)))  # of the rotor's origin; beyond, it is lost
+        values[Parameter.LOST_DISTANCE] = farthest / self.scales.length
         if self.memory is not None:
             depth = float(plate_depth(self.memory.plate, np.zeros(1))[0])
             rate = ENDLESS if self.scene.drive else self.scene.angular_velocity

@@ -79,11 +79,6 @@ def _excess(body: Solid, position: Vector, contact: float) -> hy.expression:
     return hy.sum([b * b for b in beyond])
 
 
-def lost_distance(start: Array) -> float:
-    """Distance from the rotor's origin at which a floater that began at a place (3,) m is lost, m."""
-    return max(0.1, 2 * float(np.linalg.norm(start)))
-
-
 def clearance(scene: Scene, time: Array, position: Array, orientation: Array | None = None) -> Array:
     """Smallest gap (n,) in m between floater and bodies of `scene` at `time` (n,) s, `position` (n, 3) m (rotor's).
 

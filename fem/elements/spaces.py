@@ -137,11 +137,6 @@ def _collect(space: Any, region: Any, measure: Any) -> IntegrationPoints:
 IntArray = NDArray[np.int64]
 
 
-def edge_vertices(mesh: ngsolve.Mesh) -> IntArray:
-    """(n, 2) vertex numbers of all edges."""
-    return np.array([[v.nr for v in edge.vertices] for edge in mesh.edges], dtype=np.int64)
-
-
 def region_edges(mesh: ngsolve.Mesh, region: ngsolve.Region) -> NDArray[np.bool_]:
     """Which edges belong to a volume or boundary region."""
     found = np.zeros(mesh.nedge, bool)

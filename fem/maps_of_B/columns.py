@@ -53,13 +53,6 @@ class FieldMap:
     def observations(self) -> int:
         return int(np.isfinite(self.field).sum())
 
-    def require_observations(self, needed: int) -> None:
-        """Raise FieldMapError if fewer than `needed` components were observed."""
-        if self.observations < needed:
-            raise FieldMapError(
-                f"Input field must hold at least {needed} observed components; instead received {self.observations}."
-            )
-
     def where(self, chosen: ArrayLike) -> FieldMap:
         """The part of the map at `chosen` points: (n,) booleans or indices."""
         chosen = np.asarray(chosen)

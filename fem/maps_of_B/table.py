@@ -351,8 +351,10 @@ def _radii(distances: Array, radius: float | None) -> Array:
 
 def _basis(field_map: FieldMap, centers: Array, radii: Array, max_degree: int) -> HarmonicBasis:
     smallest = HarmonicBasis(centers, radii, 1)
-    field_map.require_observations(2 * smallest.count(1))
-    fitting = [d for d in range(1, max_degree + 1) if 2 * smallest.count(d) <= field_map.observations]
+    seen, needed = field_map.observations, 2 * smallest.count(1)
+    if seen < needed:
+        raise FieldMapError(f"Input field must hold at least {needed} observed components; instead received {seen}.")
+    fitting = [d for d in range(1, max_degree + 1) if 2 * smallest.count(d) <= seen]
     return replace(smallest, degree=max(fitting))
 
 

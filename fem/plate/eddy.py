@@ -29,7 +29,7 @@ from ...geometry.shapes import Box
 from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import HomogeneousField, unit_dipoles
 from ..elements.condensed import require_memory, solve_condensed
-from ..elements.spaces import Parity, edge_vertices, region_edges, tree_edges, value_matrix
+from ..elements.spaces import Parity, region_edges, tree_edges, value_matrix
 from ..rotor.models import AccuracyError
 from .table import OPTION
 
@@ -84,7 +84,7 @@ class EddySpace:
         weight.Assemble()
         self.weights = np.array(weight.vec.FV().NumPy()) * MILLIMETRE**3
         self.root = np.repeat(np.sqrt(self.weights * conductors.images), 3)
-        self._edges = edge_vertices(mesh)
+        self._edges = np.array([[v.nr for v in edge.vertices] for edge in mesh.edges], dtype=np.int64)
         self._conducting = region_edges(mesh, self.region)
 
     def elements(self, complex_valued: bool) -> ngsolve.FESpace:

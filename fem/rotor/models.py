@@ -14,7 +14,7 @@ from ...geometry.common import MU_0, Array, InputError, Watch, even_directions, 
 from ...geometry.cutting import CONVERGENCE, cells_of, cut_magnets
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings
-from ...geometry.overlap import largest_shift
+from ...geometry.overlap import closing_shifts
 from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Part, places_off
 from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
@@ -247,7 +247,7 @@ def fem_table(
     whole = solution.expansions(sums)
     # gaps that were closed for the mesh are to the magnets as their error to the reaction
     smallest = min(float(magnet.box.size.min()) for magnet in magnets)
-    gap = GAP_SAFETY * largest_shift(magnets) / smallest
+    gap = GAP_SAFETY * float(np.linalg.norm(closing_shifts(magnets), axis=1).max()) / smallest
     doubts = {
         **{cause: nonzero(step) for cause, step in steps.items()},
         "quadrature": nonzero(solution.expansions(unsure)),

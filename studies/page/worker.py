@@ -66,11 +66,6 @@ class Worker:
         """Whether an answer is still to come."""
         return self._task is not None and not self._task.done()
 
-    @property
-    def waits(self) -> bool:
-        """Whether a question still waits for its turn."""
-        return bool(self._waiting)
-
     def ask(self, key: Hashable, call: Call, receive: Callable[[Any], None]) -> None:
         """Compute something when its turn comes.
 
