@@ -118,7 +118,7 @@ def solve(
     system: System,
     sources: Sequence[Magnet],
     formulation: Formulation = "split",
-    boundary_degree: int = 8,
+    boundary_degree: int = BOUNDARY_DEGREE,
     signs: tuple[int, ...] = (),
     rest: Array | None = None,
 ) -> Solution:
