@@ -19,17 +19,20 @@ from ..cache import TableKind
 from ..closed_forms.potentials import unit_dipole_fields
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
-from .response import OWN, ChargeResponse, enough_degree, two_body
-from .samples import (
+from .response import (
     CHUNK,
     NEAR_GAPS,
+    OWN,
     ROTOR_GAPS,
     SPHERE_GAPS,
+    ChargeResponse,
+    enough_degree,
     places_around,
     places_facing,
     response_products,
     returned_samples,
     sphere_samples,
+    two_body,
 )
 from .table import (
     MANY,

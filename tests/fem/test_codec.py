@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from spinlev.fem.codec import CodecError, from_dataset, to_dataset
+from spinlev.fem.cache import CodecError, from_dataset, to_dataset
 from spinlev.fem.harmonics.expansion import MultipoleExpansion
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.magnets import Magnet

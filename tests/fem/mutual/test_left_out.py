@@ -7,8 +7,7 @@ from second_opinions.magnet_elements import element_ladder
 
 from spinlev.fem.harmonics.interior import dipole_sources, field_at_center, multipole_force, multipole_torque
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import two_body
-from spinlev.fem.mutual.samples import places_around
+from spinlev.fem.mutual.response import places_around, two_body
 from spinlev.fem.mutual.table import induced_sources
 
 DEGREE = 20

@@ -12,8 +12,7 @@ from second_opinions.magnet_elements import element_response
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center, multipole_force
 from spinlev.fem.mutual import response
 from spinlev.fem.mutual.making import MUTUAL, cached_mutual_table, mutual_table
-from spinlev.fem.mutual.response import ChargeResponse, enough_degree, two_body
-from spinlev.fem.mutual.samples import TAIL, places_around, response_products
+from spinlev.fem.mutual.response import TAIL, ChargeResponse, enough_degree, places_around, response_products, two_body
 from spinlev.fem.mutual.table import image_weights, induced_sources, reflection, response_to_charge
 from spinlev.fem.rotor.table import canonical
 from spinlev.geometry.common import InputError
