@@ -124,30 +124,24 @@ def parse_scene(
 
 def _keys(text: str, source: str) -> dict[str, Any]:
     """The tables of a text, of which TOML's parser survives the reading."""
-    if LONGEST_KEY.search(text):
-        raise SceneError(source, ["Input key must have fewer than 20 parts; instead there is one with more."])
+    fault = "Input key must have fewer than 20 parts; instead there is one with more."
     try:
-        return tomllib.loads(text)
+        if not LONGEST_KEY.search(text):
+            return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
+        why = str(error)[:200].replace("Cannot overwrite a value", "A key stands twice")
+        fault = f"Input scene must be TOML; instead: {why}."
         for number, line in enumerate(text.splitlines(), 1):
             if DECIMAL_COMMA.match(line) and f"at line {number}," in str(error):
-                raise SceneError(
-                    source,
-                    [
-                        f"Input line {number} must have a decimal point, not a comma (lists have square brackets); "
-                        f"instead received {shown(line.strip())}."
-                    ],
-                ) from None
-        why = str(error)[:200].replace("Cannot overwrite a value", "A key stands twice")
-        raise SceneError(source, [f"Input scene must be TOML; instead: {why}."]) from None
+                fault = (
+                    f"Input line {number} must have a decimal point, not a comma (lists have square brackets); "
+                    f"instead received {shown(line.strip())}."
+                )
     except RecursionError:
-        raise SceneError(
-            source, ["Input scene must be TOML with few lists in each other; instead some are nested too deep."]
-        ) from None
+        fault = "Input scene must be TOML with few lists in each other; instead some are nested too deep."
     except ValueError:  # Python's own limit
-        raise SceneError(
-            source, ["Input scene must have numbers of a few digits; instead one has thousands."]
-        ) from None
+        fault = "Input scene must have numbers of a few digits; instead one has thousands."
+    raise SceneError(source, [fault])
 
 
 def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", known: Scene | None = None) -> Scene:

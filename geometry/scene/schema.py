@@ -1,7 +1,7 @@
 """The scene file's keys, types and ranges, the rules between keys, and what they say in SI units."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
+from ..common import Array
 from ..magnets import Conductor, Magnet, Rotor, horizontal, tilt, vertical
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix
 from ..solids import Part, Solid, known_shape
@@ -90,12 +91,6 @@ def solid_of(table: Table) -> Solid:
     return Box(np.array([given["edge_mm"]] * 3 if shape == "cube" else given["size_mm"]) * MILLI, *pose)
 
 
-def _placed_part(part: Part, center_mm: list[float], rotation_deg: list[float]) -> Part:
-    """The solid of a file with the file's origin in a place, turned about it."""
-    turn = rotation_matrix(rotation_deg)
-    return replace(part, center=MILLI * np.array(center_mm) - turn @ part.origin, rotation=turn)
-
-
 class _Placed(Table):
     """A body in a place, with the keys of its shape."""
 
@@ -104,6 +99,28 @@ class _Placed(Table):
     height_mm: Length | None = None
     center_mm: Three[Coordinate]
     rotation_deg: Three[Angle] = [0.0, 0.0, 0.0]
+
+
+class _Shaped(_Placed):
+    """A body in a place that a file may hold."""
+
+    shape: Literal["cuboid", "cylinder", "ring", "sphere"] = "cuboid"
+    inner_diameter_mm: Length | None = None
+    file: Name | None = None
+
+    def body(self, part: Part | None) -> Solid:
+        """The body, or that of a file with the file's origin in its place, turned about it."""
+        if part is None:
+            return solid_of(self)
+        turn = rotation_matrix(self.rotation_deg)
+        part = replace(part, center=MILLI * np.array(self.center_mm) - turn @ part.origin, rotation=turn)
+        return known_shape(part) or part
+
+    def along(self, body: Solid, vector: list[float]) -> Array:
+        """A vector along the table's axes along those of its `body`: a known shape in a file can have others."""
+        if not self.file or isinstance(body, Part):
+            return np.array(vector)
+        return np.asarray(body.rotation.T @ rotation_matrix(self.rotation_deg) @ np.array(vector))
 
 
 class ConductorTable(_Placed):
@@ -116,12 +133,9 @@ class ConductorTable(_Placed):
         return Conductor(solid_of(self), self.conductivity_S_m)
 
 
-class MagnetTable(_Placed):
+class MagnetTable(_Shaped):
     """One magnet of an explicit rotor; its polarisation is along the body's axes and turns with it."""
 
-    shape: Literal["cuboid", "cylinder", "ring", "sphere"] = "cuboid"
-    inner_diameter_mm: Length | None = None
-    file: Name | None = None
     polarization_T: Annotated[Three[Polarization], _zero_or(1e-12)]
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
     conductivity_S_m: Conductivity | None = None
@@ -131,14 +145,9 @@ class MagnetTable(_Placed):
         """The magnet, its body from a file where that is given; what it does not say, its `rotor` says."""
         conductivity = rotor.conductivity_S_m if self.conductivity_S_m is None else self.conductivity_S_m
         knee = self.coercivity_kA_m or rotor.coercivity_kA_m
-        along, across = self.recoil_permeability
+        (along, across), body = self.recoil_permeability, self.body(part)
         material = along, across, conductivity, 1e3 * knee if knee else None
-        polarization = np.array(self.polarization_T)
-        if part is None:
-            return Magnet(solid_of(self), polarization, *material)
-        part = _placed_part(part, self.center_mm, self.rotation_deg)
-        body = known_shape(part) or part
-        return Magnet(body, polarization if body is part else body.rotation.T @ part.rotation @ polarization, *material)
+        return Magnet(body, self.along(body, self.polarization_T), *material)
 
 
 class AnyRotor(Table):
@@ -163,8 +172,9 @@ class ArticleRotor(AnyRotor):
     remanence_T: Remanence
     recoil_permeability: MagnetPermeability = [RECOIL_PERMEABILITY, RECOIL_PERMEABILITY]
 
-    def _of(self, magnets: Rotor) -> Rotor:
+    def _of(self, build: Callable[..., Rotor], measure: float) -> Rotor:
         knee = None if self.coercivity_kA_m is None else 1e3 * self.coercivity_kA_m
+        magnets = build(measure, solid_of(self), self.remanence_T, *self.recoil_permeability)
         return tuple(replace(magnet, conductivity=self.conductivity_S_m, coercivity=knee) for magnet in magnets)
 
 
@@ -175,10 +185,7 @@ class DisplacedRotor(ArticleRotor):
     displacement_mm: Annotated[NotNegative, Field(le=1e6)]
 
     def in_si(self, parts: Mapping[int, Part]) -> Rotor:
-        build = horizontal if self.configuration == "horizontal" else vertical
-        return self._of(
-            build(self.displacement_mm * MILLI, solid_of(self), self.remanence_T, *self.recoil_permeability)
-        )
+        return self._of(horizontal if self.configuration == "horizontal" else vertical, self.displacement_mm * MILLI)
 
 
 class TiltRotor(ArticleRotor):
@@ -188,8 +195,7 @@ class TiltRotor(ArticleRotor):
     angle_deg: Annotated[Number, Field(ge=-90.0, le=90.0)]
 
     def in_si(self, parts: Mapping[int, Part]) -> Rotor:
-        angle = float(np.radians(self.angle_deg))
-        return self._of(tilt(angle, solid_of(self), self.remanence_T, *self.recoil_permeability))
+        return self._of(tilt, float(np.radians(self.angle_deg)))
 
 
 class ExplicitRotor(AnyRotor):
@@ -208,32 +214,25 @@ def _rotor_kind(rotor: Any) -> str | None:
     return "magnets" if "magnets" in table else configuration if isinstance(configuration, str) else None
 
 
-class _FloaterPartTable(_Placed):
-    """A part of a floater, placed along the axes of the floater's keys."""
+class BallastTable(_Shaped):
+    """A part of a floater that is not magnetic, placed along the axes of the floater's keys."""
 
-    shape: Literal["cuboid", "cylinder", "ring", "sphere"] = "cuboid"
-    inner_diameter_mm: Length | None = None
-    file: Name | None = None
     density_kg_m3: Density
 
-    def body(self, part: Part | None) -> Solid:
-        """Its body, from a file where that is given."""
-        if part is None:
-            return solid_of(self)
-        turn = rotation_matrix(self.rotation_deg)
-        part = replace(part, center=MILLI * np.array(self.center_mm) - turn @ part.origin, rotation=turn)
-        return known_shape(part) or part
+    def piece(self, part: Part | None) -> FloaterPart:
+        return FloaterPart(Magnet(self.body(part), np.zeros(3)), self.density_kg_m3)
 
 
-class FloaterMagnetTable(_FloaterPartTable):
-    """A magnet of a floater; its polarisation is along the body's axes and turns with it."""
+class FloaterMagnetTable(BallastTable):
+    """A magnet of a floater, likewise; its polarisation is along the body's axes and turns with it."""
 
     polarization_T: Annotated[Three[Polarization], _zero_or(1e-12)]
     recoil_permeability: Permeability = RECOIL_PERMEABILITY
 
-
-class BallastTable(_FloaterPartTable):
-    """A part of a floater that is not magnetic."""
+    def piece(self, part: Part | None) -> FloaterPart:
+        body = self.body(part)
+        polarization = self.along(body, self.polarization_T)
+        return FloaterPart(Magnet(body, polarization, self.recoil_permeability), self.density_kg_m3)
 
 
 class FloaterTable(Table):
@@ -263,10 +262,7 @@ class FloaterTable(Table):
         permeability = self.recoil_permeability or RECOIL_PERMEABILITY
         given = None if self.inertia_kg_m2 is None else tuple(self.inertia_kg_m2)
         if self.composite:
-            pieces = [
-                FloaterPart(self._magnet(table, table.body(parts.get(k))), table.density_kg_m3)
-                for k, table in enumerate(self.tables)
-            ]
+            pieces = [table.piece(parts.get(k)) for k, table in enumerate(self.tables)]
             return Floater.composed(pieces, self.conductivity_S_m, given)  # type: ignore[arg-type]
         assert self.remanence_T is not None
         assert self.density_kg_m3 is not None
@@ -281,7 +277,7 @@ class FloaterTable(Table):
         return Floater(shape.circumradius, *material, own, moments_of_inertia=given)  # type: ignore[arg-type]
 
     @property
-    def tables(self) -> list[FloaterMagnetTable | BallastTable]:
+    def tables(self) -> list[BallastTable]:
         """Its magnets, then its ballast."""
         return [*self.magnets, *self.bodies]
 
@@ -290,15 +286,6 @@ class FloaterTable(Table):
         """The files that its parts name, by their numbers in `tables`; its own by -1."""
         files = {-1: self.file} | {k: table.file for k, table in enumerate(self.tables)}
         return {k: file for k, file in files.items() if file}
-
-    @staticmethod
-    def _magnet(table: FloaterMagnetTable | BallastTable, body: Solid) -> Magnet:
-        if isinstance(table, BallastTable):
-            return Magnet(body, np.zeros(3))
-        polarization = np.array(table.polarization_T)
-        if table.file:  # its axes may be those of a known shape
-            polarization = body.rotation.T @ rotation_matrix(table.rotation_deg) @ polarization
-        return Magnet(body, polarization, table.recoil_permeability)
 
 
 class LoweringTable(Table):
@@ -309,22 +296,17 @@ class LoweringTable(Table):
     distance_mm: Annotated[NotNegative, Field(le=1e6), _zero_or(1e-6)]
 
 
-class PlateTable(_Placed):
+class PlateTable(_Shaped):
     """The conducting plate."""
 
-    shape: Literal["cuboid", "disc", "cylinder", "ring", "sphere", "file"] = "cuboid"
-    inner_diameter_mm: Length | None = None
-    file: Name | None = None
+    shape: Literal["cuboid", "disc", "cylinder", "ring", "sphere", "file"] = "cuboid"  # type: ignore[assignment]
     conductivity_S_m: Metal
     lowering: LoweringTable | None = None
 
     def plate(self, part: Part | None) -> Plate:
         down = self.lowering
         lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-        if part is None:
-            return Plate(solid_of(self), self.conductivity_S_m, lowering)
-        body = _placed_part(part, self.center_mm, self.rotation_deg)
-        return Plate(known_shape(body) or body, self.conductivity_S_m, lowering)
+        return Plate(self.body(part), self.conductivity_S_m, lowering)
 
 
 class CoilTable(Table):

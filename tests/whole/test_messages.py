@@ -25,6 +25,7 @@ RELAYED = {
     "described_faults(error.errors())": "scene/making: sentences of scene/messages",
     "refusal(plate, frequency, rtol, best)": "plate_network/reaction: a sentence of limits",
     "str(error)": "an error's own sentence, with another class",
+    "[fault]": "scene/files: one of the sentences about what is no TOML, literals there",
     "[str(error)]": "scene/making: the sentence of step_file about a magnet's file",
     "no_argument(function.__name__, name, missing)": "geometry/common: a sentence there",
     "no_argument(function.__name__, name, known)": "geometry/common: a sentence there",
