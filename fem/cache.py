@@ -36,8 +36,7 @@ from filelock import FileLock, Timeout
 from xarray.backends import H5NetCDFStore
 
 from ..geometry.common import ComputationError, InputError
-from ..geometry.files import regular_file
-from .files import MOST, closed, hdf5_fault, ours, seal, sealed, user, write_whole
+from ..geometry.files import MOST, closed, hdf5_fault, ours, regular_file, seal, sealed, user, write_whole
 
 # Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
 # another shape of its file, has the next number, and nothing of the old one is read any more.

@@ -20,8 +20,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from ..geometry.files import seal, unsealed, write_whole
 from .cache import cache_folder, cache_limit, key_of, make_room, others_may_write, own_folder
-from .files import seal, unsealed, write_whole
 
 LIMIT = 2**29  # Size of all that is kept, bytes; what was not used for the longest time makes room
 # Memory of functions that this process keeps at hand, bytes; those in use are not lost by it, and integrators, which

@@ -16,9 +16,9 @@ from ..dynamics.continuation.frequencies import branch_through, levitates, on_br
 from ..dynamics.equilibria.equilibrium import CRITERION, STABILITIES, Equilibrium, EquilibriumError, Survey, nearest_of
 from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.state import Scales
-from ..fem.files import write_whole
 from ..fem.rotor.models import of_true_moment
 from ..geometry.common import Array, InputError
+from ..geometry.files import write_whole
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from ..geometry.solids import Part

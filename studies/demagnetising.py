@@ -10,9 +10,9 @@ import xarray as xr
 
 from ..dynamics.equilibria.equilibrium import EquilibriumError
 from ..dynamics.flights.flight import most_like_levitation
-from ..fem.files import write_whole
 from ..fem.rotor.working_point import EasyField, easy_axis, working_points
 from ..geometry.common import InputError
+from ..geometry.files import write_whole
 from .cli.console import note, to_json
 from .cli.options import Answer
 from .figures.run import working_point_figure

@@ -25,8 +25,8 @@ from ..dynamics.continuation.frequencies import (
 )
 from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
 from ..dynamics.motion.state import Scales
-from ..fem.files import write_whole
 from ..geometry.common import Array, ComputationError, InputError, SpinlevError, shown
+from ..geometry.files import write_whole
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, load_scene, scene_numbers, scene_text, toml_tables
 from .candidates import OF_SCENE, Candidate, Search, survey_near

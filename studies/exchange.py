@@ -12,10 +12,10 @@ import xarray as xr
 from ..dynamics.equilibria.search import free_of_bodies
 from ..dynamics.motion.state import State
 from ..fem.closed_forms.uniform import closed_form_error, fields_of_magnets, fields_of_sphere
-from ..fem.files import replacing
 from ..fem.rotor.choice import rotor_table
 from ..fem.rotor.near_field import near_field
 from ..geometry.common import MU_0, Array, InputError
+from ..geometry.files import replacing
 from ..geometry.scene.contents import AbsoluteStart, Scene
 from .cli.console import note
 from .cli.options import Answer, Models

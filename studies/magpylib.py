@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..fem.cache import cache_folder
-from ..fem.files import write_whole
 from ..fem.rotor.table import RotorTable
 from ..geometry.common import MU_0, Array, InputError
+from ..geometry.files import write_whole
 from ..geometry.meshes.solids import faceted, joined, lies_within, segment, shifted, solid_of, step_text
 from ..geometry.scene.files import pose_keys, shape_keys
 from ..geometry.scene.making import magnets

@@ -18,7 +18,6 @@ from ..dynamics.flights.flight import starting_point
 from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
 from ..fem.cache import program_digest
 from ..fem.closed_forms.eddy_bodies import ComplexArray
-from ..fem.files import write_whole
 from ..fem.plate.eddy import plate_reaction
 from ..fem.plate.slab import Slab, edge_error, reaction_tensor
 from ..fem.plate.table import Region
@@ -27,6 +26,7 @@ from ..fem.rotor.models import of_true_moment
 from ..fem.rotor.near_field import NEAR_RTOL, CompleteTable, complete
 from ..fem.rotor.table import FieldTable, RotorTable, errors_of_sum
 from ..geometry.common import MU_0, Array, InputError
+from ..geometry.files import write_whole
 from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
 from .cli.console import note, to_json

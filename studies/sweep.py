@@ -18,8 +18,8 @@ import numpy as np
 import xarray as xr
 
 from ..fem.cache import program_digest
-from ..fem.files import seal, unsealed, write_whole
 from ..geometry.common import ComputationError, InputError, counted
+from ..geometry.files import seal, unsealed, write_whole
 from .cli.console import missing_extra, note, progress, to_json
 from .cli.options import Workers
 from .processes import Death, NoProcessError, program, results

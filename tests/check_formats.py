@@ -40,7 +40,7 @@ ALONE = {"code": ("dynamics/motion/equations.py", "dynamics/motion/rates.py", "f
 """Modules that count by themselves: formulas are in the keys of what is compiled from them."""
 BESIDE = (
     *("studies/", "geometry/scene/", "geometry/files.py", "geometry/step_file.py"),
-    *("fem/cache.py", "fem/compiled_code.py", "fem/files.py"),
+    *("fem/cache.py", "fem/compiled_code.py"),
 )
 """What reads, writes and speaks: no number of a table is from there but by what is in its key. Of scenes what they hold
 counts all the same."""

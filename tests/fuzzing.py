@@ -36,14 +36,14 @@ import psutil
 import xarray as xr
 from tornado import httpclient
 
-from spinlev.fem import cache as checked_files, files as whole_files
+from spinlev.fem import cache as checked_files
 from spinlev.fem.cache import TableFileError, write_checked
-from spinlev.fem.files import look_through
 from spinlev.fem.maps_of_B import read as readers
 from spinlev.fem.maps_of_B.columns import FieldMapError
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.table import ROTOR
-from spinlev.geometry import files as own_process, step_file
+from spinlev.geometry import files as own_files, step_file
+from spinlev.geometry.files import look_through
 from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.meshes import solids
 from spinlev.geometry.scene.files import load_scene
@@ -320,7 +320,7 @@ def called_in_fork(seconds: float, function: Callable[..., Any], *given: Any) ->
         os.dup2(nowhere, 2)
         try:
             with os.fdopen(writing, "wb") as stream:
-                stream.write(own_process.sent_answer(pickle.dumps((seconds, function, given))))
+                stream.write(own_files.sent_answer(pickle.dumps((seconds, function, given))))
         finally:
             os._exit(0)
     os.close(writing)
@@ -328,7 +328,7 @@ def called_in_fork(seconds: float, function: Callable[..., Any], *given: Any) ->
         sent = stream.read()
     _, status, used = os.wait4(child, 0)
     PEAKS["MB"], PEAKS["s"] = max(PEAKS["MB"], used.ru_maxrss / 1e3), max(PEAKS["s"], used.ru_utime + used.ru_stime)
-    return own_process.outcome(os.waitstatus_to_exitcode(status), sent)
+    return own_files.outcome(os.waitstatus_to_exitcode(status), sent)
 
 
 def fault_in_fork(path: Path) -> str | None:
@@ -486,7 +486,7 @@ def result(chance: random.Random, folder: Path) -> int:
     path.parent.mkdir(exist_ok=True)
     content = whole.read_bytes()
     if chance.random() < 0.5:  # as another program would have written it: HDF5 must find the damage
-        content = content[: -whole_files.LENGTH]
+        content = content[: -own_files.LENGTH]
     path.write_bytes(damaged(content, chance))
     command = chance.choice(["figure", "show", "cite", "report"])
     with mock.patch("spinlev.studies.catalogue.runner.save_figures", return_value=[]):

@@ -11,8 +11,8 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from ...fem.files import seal, unsealed, write_whole
 from ...geometry.common import Array, ComputationError, InputError, html_table, millimetres
+from ...geometry.files import seal, unsealed, write_whole
 from ..equilibria.balance import Indices
 from ..motion.events import CONTACT, LOST
 from ..motion.state import State

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fem.harmonics.expressions import regular_harmonics
-from ...fem.harmonics.interior import Ball, BallField
-from ...fem.harmonics.rigid import field_coefficients, harmonics, matrices, shells, shifted, sizes
+from ...fem.harmonics.interior import Ball, BallField, field_coefficients, harmonics, matrices, shells, shifted, sizes
 from ...fem.rotor.floater import FloaterSources, floater_sources, shares, slopes_of, strength
 from ...fem.rotor.table import DerivedField, FieldFormula, RangeError
 from ...geometry.common import Array, even_directions

@@ -21,10 +21,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...geometry.common import Array, InputError, shown
-from ...geometry.files import file_content, regular_file
+from ...geometry.files import file_content, hdf5_fault, is_hdf5, regular_file
 from ...geometry.scene.contents import MapReading
 from ..cache import TableFileError, read_checked
-from ..files import hdf5_fault, is_hdf5
 from .columns import (
     AXES,
     COMPONENTS,

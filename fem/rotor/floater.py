@@ -22,8 +22,7 @@ from ...geometry.shapes import rotation_matrix
 from ..closed_forms.potentials import unit_dipole_fields
 from ..elements.surface import SurfaceCharges, bears_charges
 from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
-from ..harmonics.interior import sphere
-from ..harmonics.rigid import field_coefficients, harmonics, matrices, shells as multipole_degrees
+from ..harmonics.interior import field_coefficients, harmonics, matrices, shells as multipole_degrees, sphere
 from ..harmonics.solid import factorials, regular_values, tensors
 from .changed import changed_table
 from .choice import cached_rotor_table
@@ -69,7 +68,7 @@ class FloaterSources:
         )
 
     def multipoles(self, degree: int, unit: float) -> Array:
-        """(K,) A m: M_k of `harmonics.rigid` up to a degree about the centre, lengths in a `unit`, m."""
+        """(K,) A m: M_k of `harmonics.interior` up to a degree about the centre, lengths in a `unit`, m."""
         _, slopes = harmonics(degree, self.places / unit)
         values, _ = harmonics(degree, self.corners / unit)
         return np.asarray(np.einsum("ni,nki->k", self.moments, slopes) / unit + self.charges @ values)

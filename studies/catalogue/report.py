@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...fem.files import write_whole
 from ...geometry.common import InputError
-from ...geometry.files import file_content
+from ...geometry.files import file_content, write_whole
 from ..cli.console import note
 from ..figures.pictures import seen_from
 from ..figures.renderer import RenderError, rendered, turnable_page

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from ...dynamics.equilibria.equilibrium import CRITERION
 from ...dynamics.motion.state import State
 from ...fem.cache import owned, read_checked
-from ...fem.files import write_whole
 from ...geometry.common import InputError
+from ...geometry.files import write_whole
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import check_files, parse_scene
 from ...geometry.solids import moved

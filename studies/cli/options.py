@@ -476,7 +476,7 @@ def new_scene(name: str, path: Path) -> Path:
         raise InputError(f"Input NAME must be one of {', '.join(KINDS)}; instead received {name}.")
     if path.exists():
         raise InputError(f"Input FILE must not exist yet; instead {path} is there. Choose another name.")
-    from ...fem.files import write_whole
+    from ...geometry.files import write_whole
 
     write_whole(path, shipped_scene(KINDS[name]).read_bytes())
     return path

@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
-from ...fem.files import write_whole
 from ...geometry.common import ComputationError
+from ...geometry.files import write_whole
 from ..processes import Death, results
 from .view import Sample
 

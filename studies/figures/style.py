@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, ParamSpec
 
 import numpy as np
 
-from ...fem.files import write_whole
+from ...geometry.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

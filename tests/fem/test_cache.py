@@ -20,8 +20,8 @@ from filelock import FileLock
 
 from spinlev.fem import cache as cache_module
 from spinlev.fem.cache import FORMATS, TableKind, cache_folder, owned, read_checked, write_checked
-from spinlev.fem.files import seal, write_whole
 from spinlev.geometry.common import InputError
+from spinlev.geometry.files import seal, write_whole
 
 IMPORT_ALL = """
 import importlib, os, pkgutil, spinlev

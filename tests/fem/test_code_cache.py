@@ -12,10 +12,11 @@ import heyoka as hy
 import numpy as np
 import pytest
 
-from spinlev.fem import cache, compiled_code, files as whole_files
+from spinlev.fem import cache, compiled_code
 from spinlev.fem.cache import make_room
 from spinlev.fem.compiled_code import compiled, compiled_later, one_thread
-from spinlev.fem.files import seal, unsealed
+from spinlev.geometry import files as whole_files
+from spinlev.geometry.files import seal, unsealed
 
 CONSTANT = 3.1640625
 VALUE = CONSTANT * np.sin(1.0) + np.exp(1.0)

@@ -27,10 +27,10 @@ import xarray as xr
 
 from spinlev.fem.cache import cache_folder, read_checked, write_checked
 from spinlev.fem.elements import condensed as memory
-from spinlev.fem.files import hdf5_fault, replacing, seal, write_whole
 from spinlev.fem.maps_of_B.columns import FieldMapError
 from spinlev.fem.maps_of_B.read import read_field_map
 from spinlev.fem.rotor.table import RotorTable
+from spinlev.geometry.files import hdf5_fault, replacing, seal, write_whole
 from spinlev.geometry.scene.files import load_scene
 from spinlev.studies.cli.main import _status
 from spinlev.studies.cli.start import STOPPED
@@ -614,7 +614,7 @@ def test_no_solve_is_begun_that_the_memory_does_not_hold(spinlev, monkeypatch):
 def test_files_of_killed_processes_are_tidied_and_those_of_living_ones_are_not(tmp_path):
     """A process that dies between two bytes leaves a file under a temporary name; the next writer removes it."""
     code = (
-        "import os, signal, sys; from spinlev.fem.files import replacing\n"
+        "import os, signal, sys; from spinlev.geometry.files import replacing\n"
         "with replacing(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
@@ -711,7 +711,7 @@ def test_a_foreign_file_that_hdf5_does_not_return_from_is_given_up(tmp_path):
 def test_a_foreign_file_that_hdf5_crashes_on_is_refused(spinlev, monkeypatch, tmp_path):
     """The process that looks through it dies, as HDF5 has made it on damaged files; the program does not."""
     foreign_file("r.nc")
-    crashing(monkeypatch, tmp_path / "dies", "fem.files.look")
+    crashing(monkeypatch, tmp_path / "dies", "geometry.files.look")
     status, _, said = spinlev("cite", "r.nc")
     assert status == 2
     assert "HDF5 crashes on it" in said.replace("\n", " ")
@@ -721,6 +721,6 @@ def test_hdf5_of_a_mesh_is_looked_through_too(monkeypatch, tmp_path):
     points = np.random.default_rng(0).uniform(-1e-2, 1e-2, (8, 3))
     meshio.Mesh(points, [("vertex", np.arange(8)[:, None])], {"B": points}).write(tmp_path / "map.xdmf")
     np.testing.assert_array_equal(read_field_map(tmp_path / "map.xdmf").field, points)
-    crashing(monkeypatch, tmp_path / "dies", "fem.files.look")
+    crashing(monkeypatch, tmp_path / "dies", "geometry.files.look")
     with pytest.raises(FieldMapError, match="HDF5 crashes on it"):
         read_field_map(tmp_path / "map.xdmf")

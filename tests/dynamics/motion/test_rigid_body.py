@@ -17,7 +17,7 @@ from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.events import rotor_gap
 from spinlev.dynamics.motion.state import Parameter, Scales, State, matrices_of, quaternions_of
-from spinlev.fem.harmonics.rigid import shells, sizes
+from spinlev.fem.harmonics.interior import shells, sizes
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import tilt
 from spinlev.geometry.scene.contents import AbsoluteStart

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from spinlev.fem.harmonics.rigid import field_coefficients, harmonics, matrices, shells, shifted
+from spinlev.fem.harmonics.interior import field_coefficients, harmonics, matrices, shells, shifted
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.floater import floater_sources, force_and_torque, slopes_of
 from spinlev.geometry.magnets import Magnet
