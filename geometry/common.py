@@ -5,10 +5,10 @@ from __future__ import annotations
 import difflib
 import inspect
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import wraps
 from html import escape
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,10 +62,20 @@ class MeshError(ComputationError):
 
 def no_argument(function: str, name: str, allowed: Iterable[str]) -> str:
     """Message for a `name` that is no argument of a `function`, with the one of the `allowed` that it may stand for."""
-    names = list(allowed)
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(names)}"
-    return f"Input {name} must be an argument of {function}; instead it is none ({hint})."
+    return f"Input {name} must be an argument of {function}; instead it is none ({_hint(name, list(allowed))})."
+
+
+def _hint(name: str, known: Collection[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
+
+
+def check_names(given: Iterable[Any], known: Collection[str], name: str, what: str) -> None:
+    """Raises InputError about the input `name` unless all that is `given` is `known`, which are `what`."""
+    for one in given:
+        if one not in known:
+            hint = _hint(str(one), known)
+            raise InputError(f"Input {name} must name {what}; instead received {shown(one)} ({hint})")
 
 
 def spelled(function: Callable[P, T]) -> Callable[P, T]:

@@ -7,7 +7,6 @@ are followed from one scene to the next by Newton's method; the last scene is se
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -25,7 +24,7 @@ from ..dynamics.continuation.frequencies import (
 )
 from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
 from ..dynamics.motion.state import Scales
-from ..geometry.common import Array, ComputationError, InputError, SpinlevError, shown
+from ..geometry.common import Array, ComputationError, InputError, SpinlevError, check_names, shown
 from ..geometry.files import write_whole
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, load_scene, scene_numbers, scene_text, toml_tables
@@ -79,11 +78,7 @@ def checked_measures(values: object, name: str, known: Mapping[str, Any], what: 
     """Values by name, or InputError unless each name is `known`."""
     if not isinstance(values, Mapping):
         raise InputError(f"Input {name} must be ranges by {what}; instead received {shown(values)}.")
-    for one in values:
-        if one not in known:
-            close = difflib.get_close_matches(str(one), known, n=1)
-            hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
-            raise InputError(f"Input {name} must name {what}; instead received {shown(one)} ({hint})")
+    check_names(values, known, name, what)
     return values
 
 

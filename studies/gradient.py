@@ -6,7 +6,6 @@ What a number changes at a fixed state is differenced, and nothing else: the equ
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +23,7 @@ from ..dynamics.motion.events import rotor_gap
 from ..dynamics.motion.rotor_effects import Mutual
 from ..dynamics.motion.state import Scales, State
 from ..fem.rotor.choice import PERMEABLE
-from ..geometry.common import Array, InputError, shown
+from ..geometry.common import Array, InputError, check_names, shown
 from ..geometry.cutting import united
 from ..geometry.scene.files import changed, scene_numbers, scene_text
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented
@@ -414,11 +413,7 @@ def _checked(name: str, given: Sequence[str], known: Collection[str], what: str)
     """The names `given` as an argument; InputError unless each is `known`, which all are `what`."""
     if isinstance(given, str) or not given or not all(isinstance(one, str) for one in given):
         raise InputError(f"Input {name} must be a list of {what}; instead received {shown(given)}.")
-    for one in given:
-        if one not in known:
-            close = difflib.get_close_matches(one, known, n=1)
-            hint = f"did you mean `{close[0]}`?" if close else f"allowed are {', '.join(known)}"
-            raise InputError(f"Input {name} must name {what}; instead received {shown(one)} ({hint})")
+    check_names(given, known, name, what)
     if len(set(given)) < len(given):
         raise InputError(f"Input {name} must name each once; instead received {shown(list(given))}.")
     return list(given)

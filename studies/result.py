@@ -18,7 +18,7 @@ import xarray as xr
 from ..dynamics.equilibria.equilibrium import LIBRATION, SIDE, TILT, Equilibrium, ForceCurve, LeftOut, Survey
 from ..dynamics.flights.trajectory import Trajectory
 from ..dynamics.motion.plate import PlateMemory
-from ..dynamics.motion.state import State
+from ..dynamics.motion.state import State, polar_angle
 from ..fem.cache import write_checked
 from ..fem.rotor.table import FieldTable
 from ..geometry.common import Array, millimetres
@@ -387,7 +387,7 @@ def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) ->
     lab, rotor = flight.lab, flight.rotor
     dims = ("time", "axis")
     far = np.linalg.norm(rotor.position, axis=1)
-    tilt = np.degrees(np.arctan2(np.hypot(lab.moment[:, 0], lab.moment[:, 1]), lab.moment[:, 2]))
+    tilt = np.degrees(polar_angle(lab.moment))
     found = xr.Dataset(
         {
             **state_columns(lab, "time"),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.common import Array, ComputationError, html_table, millimetres
-from ..motion.state import State
+from ..motion.state import State, polar_angle
 from .balance import tangent_basis
 
 INSTANTS = 129  # Of a turn, at which quantities in the laboratory are looked at; odd
@@ -245,8 +245,8 @@ class Equilibrium:
         """Distance and lateral offset, m, and polar angle, °, through a turn; one of each where it is at rest."""
         at_rest = State(*(vector[None] for vector in self.state.vectors))
         turn = at_rest if self.turn is None else self.laboratory_turn
-        offset, (x, y, z) = np.hypot(*turn.position[:, :2].T), turn.moment.T
-        return np.linalg.norm(turn.position, axis=1), offset, np.degrees(np.arctan2(np.hypot(x, y), z))
+        offset = np.hypot(*turn.position[:, :2].T)
+        return np.linalg.norm(turn.position, axis=1), offset, np.degrees(polar_angle(turn.moment))
 
     @property
     def distance(self) -> float:

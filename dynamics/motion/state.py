@@ -216,6 +216,11 @@ class State:
         return self.position, self.velocity, self.moment, self.spin
 
 
+def polar_angle(vectors: Array) -> Array:
+    """Angle (...) to +z, rad, of vectors (..., 3)."""
+    return np.asarray(np.arctan2(np.hypot(vectors[..., 0], vectors[..., 1]), vectors[..., 2]))
+
+
 def turned_about_z(vectors: ArrayLike, angle: ArrayLike) -> Array:
     """Turn `vectors` (..., 3) by `angle` (...) in rad about +z."""
     vectors = np.asarray(vectors, float)

@@ -95,11 +95,6 @@ def stable_in_flight(growth: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(np.asarray(growth) <= 1 / FLIGHT)
 
 
-def polar_angle(moments: Array) -> Array:
-    """Angle (...) to the axis, rad, of moments (..., 3)."""
-    return np.asarray(np.arctan2(np.hypot(moments[..., 0], moments[..., 1]), moments[..., 2]))
-
-
 def rotor_scene(
     configuration: str,
     value: float,

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from ...dynamics.continuation.frequencies import kicked, levitating_branch
 from ...dynamics.flights.flight import simulate
+from ...dynamics.motion.state import polar_angle
 from ...geometry.common import Array
 from ..figures.style import DASHES, NAMES, PALETTE, legend_below, panels, plain_log, plot_branch, styled
 from ..levitation import Levitation
@@ -192,7 +193,7 @@ def _along_curve(levitation: Levitation, grid: Array) -> Array:
     curve = max(curves, key=lambda curve: float(curve.moment[:, 2].max()))
     parts = article.FLOATER.moment * curve.moment * model.evaluate(curve.position)[1][:, :, 2]
     error = article.FLOATER.moment * model.absolute_error(curve.position)[1]
-    found = np.stack([parts[:, 2], parts[:, 0] + parts[:, 1], error, article.polar_angle(curve.moment)])
+    found = np.stack([parts[:, 2], parts[:, 0] + parts[:, 1], error, polar_angle(curve.moment)])
     order = np.argsort(-curve.position[:, 2])
     return np.asarray(CubicSpline(-curve.position[order, 2], found[:, order], axis=1, extrapolate=False)(grid))
 

@@ -14,7 +14,7 @@ from ...dynamics.continuation.frequencies import by_frequency, distance_error, k
 from ...dynamics.continuation.slow_drift import drift
 from ...dynamics.flights.flight import simulate
 from ...dynamics.flights.trajectory import flight_kind
-from ...dynamics.motion.state import Scales
+from ...dynamics.motion.state import Scales, polar_angle
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
@@ -88,7 +88,7 @@ def _in_field(point: Point, grid: Array) -> dict[str, Any]:
         known = [(k, there) for k, there in enumerate(branch.side(side, grid)) if there is not None]
         for k, there in known:
             error = distance_error(scene, field, family, there)
-            row[k] = -there.position[2], error, there.growth_per_s, article.polar_angle(there.state[6:9])
+            row[k] = -there.position[2], error, there.growth_per_s, polar_angle(there.state[6:9])
         stable = [there for _, there in known if article.stable_in_flight(there.growth_per_s)]
         if side == "near" and point["model"] == SIMULATED and stable:
             places = np.unique(np.linspace(0, len(stable) - 1, point["flights"]).astype(int))

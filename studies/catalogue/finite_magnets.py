@@ -16,7 +16,7 @@ from ...dynamics.equilibria.perturbed import balanced_directions, shifted_equili
 from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates
-from ...dynamics.motion.state import Scales
+from ...dynamics.motion.state import Scales, polar_angle
 from ...fem.mutual.response import ChargeResponse, RotorResponse, two_body, two_body_ladder
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
@@ -28,7 +28,7 @@ from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, recorded, study_of_one
 from . import showing
-from .article import levitated_rotors, levitation_of, polar_angle, rotor_scene
+from .article import levitated_rotors, levitation_of, rotor_scene
 
 # How wrong is the dipole? Levitation of the article's rotors by dipoles and by finite magnets, cause by cause.
 MODELS = ("article", "dipole", "cuboid", "fem", "mutual")

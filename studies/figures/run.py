@@ -14,6 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import ConvexHull
 
 from ...dynamics.equilibria.equilibrium import CRITERION, MARGINAL, STABILITIES
+from ...dynamics.motion.state import polar_angle
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ...geometry.solids import Solid
@@ -175,7 +176,7 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     seconds, moment = result["time"].values, result["moment"].values
     time, unit = (seconds / 3600, "h") if seconds[-1] > HOURS else (seconds, "s")
     distance = -1e3 * result["position_rotor_frame"].sel(axis="z").values
-    angle = np.degrees(np.arctan2(np.hypot(moment[:, 0], moment[:, 1]), moment[:, 2]))
+    angle = np.degrees(polar_angle(moment))
     up = str(result.attrs.get("ended_by", "duration")) in ("duration", "stopped")
     near = slice(0, SHOWN) if up else slice(-SHOWN, None)
     parts = np.array_split(np.arange(len(time)), min(PARTS, max(1, len(time) // 8)))

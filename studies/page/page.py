@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...dynamics.motion.state import polar_angle
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..cli.options import KINDS, shipped_scene
@@ -240,7 +241,7 @@ class Page:
         self.tell(equilibria=[[position[0], position[2]] for position, _ in places])
         if places:
             position, moment = places[0]
-            self._sample(np.array([[0.0], [position[2]], [work.polar_angle(np.array(moment))]]), fresh=True)
+            self._sample(np.array([[0.0], [position[2]], [np.degrees(polar_angle(np.array(moment)))]]), fresh=True)
             pose = {"position": position, "moment": moment, "seen": position, "angle": 0.0, "plate": 0.0}
             self.tell(pose={**pose, "flying": False})
 

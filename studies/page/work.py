@@ -29,7 +29,7 @@ from ...dynamics.equilibria.path import NEAR, NEWTON_STEPS
 from ...dynamics.equilibria.search import survey
 from ...dynamics.flights.live import LiveFlight, Piece
 from ...dynamics.motion.events import plate_depth
-from ...dynamics.motion.state import Scales
+from ...dynamics.motion.state import Scales, polar_angle
 from ...fem.cache import NotKeptError, kept_only
 from ...fem.rotor.choice import PERMEABLE
 from ...fem.rotor.models import of_true_moment
@@ -421,7 +421,7 @@ def _frame(piece: Piece | None = None) -> Frame:
     seen = piece.lab.to_rotor(flight.scene.angle(piece.time)).position
     words = ENDS.get(piece.ended_by, "")
     return {
-        "samples": np.stack([piece.time, 1e3 * places[:, 2], polar_angle(moments)]),
+        "samples": np.stack([piece.time, 1e3 * places[:, 2], np.degrees(polar_angle(moments))]),
         "pose": {
             "position": 1e3 * places[-1],
             "moment": moments[-1],
@@ -432,11 +432,6 @@ def _frame(piece: Piece | None = None) -> Frame:
         "ended": f"After {flight.time:.3g} s {words}." if words else "",
         "message": "",
     }
-
-
-def polar_angle(moments: Array) -> Array:
-    """Of moments (..., 3) from +z, degrees."""
-    return np.asarray(np.degrees(np.arctan2(np.hypot(moments[..., 0], moments[..., 1]), moments[..., 2])))
 
 
 def content(kind: str, state: PageState) -> bytes:
