@@ -218,11 +218,16 @@ def test_what_nobody_foresaw_ends_in_one_message(monkeypatch, capsys):
         _status([], io.StringIO())
 
 
-def test_a_small_plate_is_answered_by_finite_elements():
-    """35 mm over 100 × 120 mm too much lies beyond the edges for the infinite slab, which is wrong by half there."""
+def small_plate():
+    """A plate of 100 × 120 mm, and a place 35 mm over it."""
     plate = replace(load_scene(SCENES / "tilt-over-plate.toml").plate, lowering=None)
     small = replace(plate, body=replace(plate.box, size=np.array([0.1, 0.12, 0.01]), center=np.zeros(3)))
-    place = small.box.rotation @ np.array([0.0, 0.01, 0.04])
+    return small, small.box.rotation @ np.array([0.0, 0.01, 0.04])
+
+
+def test_a_small_plate_is_answered_by_finite_elements():
+    """35 mm over 100 × 120 mm too much lies beyond the edges for the infinite slab, which is wrong by half there."""
+    small, place = small_plate()
     answer, slab = (response(small, place, 50.0, name, 0.1) for name in ("auto", "slab"))
     (model, tensor, _, _), (_, flat, error, _) = answer, slab
     assert model == "fem"
@@ -233,9 +238,7 @@ def test_a_small_plate_is_answered_by_finite_elements():
 
 @pytest.mark.slow
 def test_the_reduced_plate_is_that_of_the_finite_elements():
-    plate = replace(load_scene(SCENES / "tilt-over-plate.toml").plate, lowering=None)
-    small = replace(plate, body=replace(plate.box, size=np.array([0.1, 0.12, 0.01]), center=np.zeros(3)))
-    place = small.box.rotation @ np.array([0.0, 0.01, 0.04])
+    small, place = small_plate()
     reduced, fem = (response(small, place, 50.0, name, 0.1) for name in ("reduced", "fem"))
     apart = np.linalg.norm(reduced[1] - fem[1]) / np.linalg.norm(fem[1])
     assert apart < reduced[2] + fem[2]

@@ -82,13 +82,18 @@ def test_angle_is_the_integral_of_the_rate():
     assert DOWN.fastest == 140.0
 
 
+def assert_given_momentum(flown):
+    """Angular momentum about the axis has changed by what the motor gave."""
+    orbit = FLOATER.mass * np.cross(flown.lab.position, flown.lab.velocity)[:, 2]
+    momentum = orbit + FLOATER.inertia * flown.lab.spin[:, 2]
+    assert np.abs(momentum - momentum[0] - flown.given[:, 0]).max() < 1e-12 * np.abs(momentum).max()
+
+
 def test_the_motor_gives_the_floater_its_angular_momentum():
     """Without air, plate and sideways gravity nothing else has a torque about the axis: round-off."""
     scene = replace(DOWN, drag=NO_DRAG, gravity=np.array([0.0, 0.0, -9.81]))
     flown = integrate(Flight(scene, TABLE, 0.12), START, 0.12)
-    orbit = FLOATER.mass * np.cross(flown.lab.position, flown.lab.velocity)[:, 2]
-    momentum = orbit + FLOATER.inertia * flown.lab.spin[:, 2]
-    assert np.abs(momentum - momentum[0] - flown.given[:, 0]).max() < 1e-12 * np.abs(momentum).max()
+    assert_given_momentum(flown)
     energy = [
         FLOATER.mass * (np.sum(state.velocity**2) / 2 + 9.81 * state.position[2])
         + FLOATER.inertia * np.sum(state.spin**2) / 2
@@ -107,9 +112,7 @@ def test_currents_in_rotor_and_floater_take_it_from_the_motor():
     floater = replace(FLOATER, conductivity=MAGNET_CONDUCTIVITY)
     scene = replace(STEADY, drag=NO_DRAG, floater=floater, drive=STEPS)
     flown = integrate(Flight(scene, whole, 0.2), START, 0.2)
-    orbit = FLOATER.mass * np.cross(flown.lab.position, flown.lab.velocity)[:, 2]
-    momentum = orbit + FLOATER.inertia * flown.lab.spin[:, 2]
-    assert np.abs(momentum - momentum[0] - flown.given[:, 0]).max() < 1e-12 * np.abs(momentum).max()
+    assert_given_momentum(flown)
     assert flown.energy_error < 1e-12
 
 

@@ -36,16 +36,16 @@ STATE = State(
     np.array([1.0, 2.0, -3.0]) / np.sqrt(14),
     np.array([30.0, -800.0, 200.0]),
 )
+ROTOR = np.array([0.0, 0.0, BARE.angular_velocity])
+RATES = np.concatenate([STATE.velocity - np.cross(ROTOR, STATE.position), STATE.spin - ROTOR])
+MATRIX = LOSSES.dissipation(STATE.position[None], PERMEABLE.moment * STATE.moment[None])[0]
 
 
 def test_force_and_torque_are_minus_the_tables_matrix():
     """-D q̇ with q̇ the velocity against the rotor and the turn against it, back in SI units."""
     values, given = parameters(BARE, SCALES), SCALES.pack(STATE)[None]
     added = (Rates(TABLE)(given, values)[0] - Rates(FIELD)(given, values)[0])[0]
-    rotor = np.array([0.0, 0.0, BARE.angular_velocity])
-    rates = np.concatenate([STATE.velocity - np.cross(rotor, STATE.position), STATE.spin - rotor])
-    matrix = LOSSES.dissipation(STATE.position[None], PERMEABLE.moment * STATE.moment[None])[0]
-    wrench = -matrix @ rates
+    wrench = -MATRIX @ RATES
     assert np.linalg.norm(wrench[:3]) > 1e-6
     np.testing.assert_allclose(added[3:6] * PERMEABLE.mass * SCALES.length / SCALES.time**2, wrench[:3], rtol=1e-8)
     np.testing.assert_allclose(added[9:] * PERMEABLE.inertia / SCALES.time**2, wrench[3:], rtol=1e-8)
@@ -54,8 +54,7 @@ def test_force_and_torque_are_minus_the_tables_matrix():
 def test_a_floater_in_step_with_the_rotor_feels_nothing():
     """Also one that spins about its own moment."""
     values = parameters(BARE, SCALES)
-    rotor = np.array([0.0, 0.0, BARE.angular_velocity])
-    still = replace(STATE, velocity=np.cross(rotor, STATE.position), spin=rotor - 300.0 * STATE.moment)
+    still = replace(STATE, velocity=np.cross(ROTOR, STATE.position), spin=ROTOR - 300.0 * STATE.moment)
     given = SCALES.pack(still)[None]
     added = Rates(TABLE)(given, values)[0] - Rates(FIELD)(given, values)[0]
     assert np.abs(added).max() < 1e-15
@@ -99,11 +98,8 @@ def test_its_power_is_the_loss_of_the_table():
     power = hy.cfunc([equations.power], list(equations.variables), compact_mode=True, opt_level=0)
     values = parameters(BARE, SCALES)[: power.nparams]
     found = power(SCALES.pack(STATE), pars=values)[0]
-    rotor = np.array([0.0, 0.0, BARE.angular_velocity])
-    rates = np.concatenate([STATE.velocity - np.cross(rotor, STATE.position), STATE.spin - rotor])
-    matrix = LOSSES.dissipation(STATE.position[None], PERMEABLE.moment * STATE.moment[None])[0]
     unit = PERMEABLE.mass * SCALES.length**2 / SCALES.time**3
-    assert found * unit == pytest.approx(-rates @ matrix @ rates, rel=1e-9)
+    assert found * unit == pytest.approx(-RATES @ MATRIX @ RATES, rel=1e-9)
 
 
 def test_metal_in_which_currents_have_memory_is_refused():
