@@ -1,7 +1,5 @@
 """Constants of nature and of the experiment's materials, and arrays that frozen objects hold."""
 
-from __future__ import annotations
-
 import difflib
 import inspect
 import math
@@ -78,7 +76,7 @@ def check_names(given: Iterable[Any], known: Collection[str], name: str, what: s
             raise InputError(f"Input {name} must name {what}; instead received {shown(one)} ({hint})")
 
 
-def spelled(function: Callable[P, T]) -> Callable[P, T]:
+def spelled(function: "Callable[P, T]") -> "Callable[P, T]":
     """A function that says of a slip in the name of an argument which one was probably meant."""
     signature = inspect.signature(function)
 

@@ -5,8 +5,6 @@ it damage is known before any library tries to make sense of the content: HDF5 i
 given a damaged file it may print, raise anything, or not return at all.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import hashlib

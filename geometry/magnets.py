@@ -3,8 +3,6 @@
 They are in the rotor's frame at t = 0; SI units, angles in rad.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -54,12 +52,12 @@ class Magnet:
         return self.body.box
 
     @property
-    def rigid(self) -> Magnet:
+    def rigid(self) -> "Magnet":
         """The magnet with the same remanence and μr = 1."""
         return replace(self, recoil_permeability=1.0, transverse_permeability=None)
 
     @property
-    def magnetic(self) -> Magnet:
+    def magnetic(self) -> "Magnet":
         """The magnet without what its field does not depend on: equal fields, equal keys of kept tables."""
         across = None if self.isotropic else self.transverse_permeability
         return replace(self, transverse_permeability=across, conductivity=None, coercivity=None)

@@ -4,8 +4,6 @@ Newton's method finds the equilibrium of a scene from that of one nearby, from w
 stable frequencies are followed likewise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -74,7 +72,7 @@ class Candidate:
     levitation: Levitation
     known: Equilibrium
     keys: tuple[str, ...]  # of the numbers that may change
-    near: Candidate | None = None  # one whose ends of stability are near
+    near: "Candidate | None" = None  # one whose ends of stability are near
     step: Any = 0.0  # (key,) of the numbers from that
 
     @property

@@ -5,8 +5,6 @@ all of them, each of which is smooth; to make it large, a bound below all of the
 are followed from one scene to the next by Newton's method; the last scene is searched anew.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Numbers of a scene that fit what was measured: least squares over equilibria with their derivatives."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping, Sequence
 from os import PathLike

@@ -4,8 +4,6 @@ What a number changes at a fixed state is differenced, and nothing else: the equ
 `nearby_scenes`; the equilibrium and its modes follow by `dynamics.equilibria.derivatives`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Field, effects, equilibria and trajectory of one scene, and its plate's currents, which follow the floater."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -105,13 +103,13 @@ class Levitation:
 
     # Sharing with other scenes
 
-    def elsewhere(self, models: Models | None = None, **changes: Any) -> Levitation:
+    def elsewhere(self, models: Models | None = None, **changes: Any) -> "Levitation":
         """Another scene, which shares the tables that fit it; `changes` are fields of `Scene`, SI units."""
         other = Levitation(replace(self.scene, **changes), models or self.models, self.spin)
         other.share(self)
         return other
 
-    def share(self, other: Levitation, changed: bool = False) -> None:
+    def share(self, other: "Levitation", changed: bool = False) -> None:
         """Use the tables and the compiled equations of another scene where they fit, made or yet to make.
 
         With `changed` also its field of permeable magnets, which follows what differs in them.
@@ -126,13 +124,13 @@ class Levitation:
         self.without_plate, self.searched = known, searched
 
     @cached_property
-    def mean(self) -> Levitation:
+    def mean(self) -> "Levitation":
         """That of the floater's mean over turns about its moment; this one where it is round about that."""
         floater = self.scene.floater
         return self if floater.round else self.elsewhere(floater=floater.averaged)
 
     @cached_property
-    def quiet(self) -> Levitation:
+    def quiet(self) -> "Levitation":
         """That without coils off the axis and currents that change, where a trajectory begins; this one without such.
 
         Of steady coils about the axis the field stands still in the rotor's frame, and there are equilibria.

@@ -1,7 +1,5 @@
 """Rotors from magpylib's magnets, and the field of a table as a source of magpylib."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -96,7 +94,7 @@ class _Magnet:
     def in_rotor(self) -> Array:
         return self.rotation @ self.polarization
 
-    def seen_from(self, frame: _Magnet) -> Any:
+    def seen_from(self, frame: "_Magnet") -> Any:
         """Its solid in the axes of another."""
         back = frame.rotation.T
         return shifted(self.solid, back @ (self.center - frame.center), back @ self.rotation)

@@ -4,8 +4,6 @@ The rotor's field and the effects at a few values of a number: a lone magnet's t
 others, which no such law gives, are made anew beside it, with as many points.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

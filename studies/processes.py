@@ -4,8 +4,6 @@ No port and no shared memory is needed, and no guard in the user's script: a pro
 loads nothing from the folder it happens to be in, and then gets where this one looks for modules.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import select

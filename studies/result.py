@@ -1,7 +1,5 @@
 """The result of a scene: its numbers once, as labelled data for files, as a mapping for JSON and in words."""
 
-from __future__ import annotations
-
 import math
 import shlex
 import sys

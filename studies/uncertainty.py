@@ -1,7 +1,5 @@
 """Error bars of equilibria from the tolerances of a scene's numbers, to first order, and a check by draws."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Unpack

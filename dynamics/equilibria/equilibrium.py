@@ -1,7 +1,5 @@
 """A synchronous equilibrium with its modes, the curve on which it lies, and the survey of all."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -194,7 +192,7 @@ class Equilibrium:
     #: (n, k) states of the plate then, √J; None where the plate's currents are not modelled
     currents: Array | None = None
     #: the fixed point that it would be without the plate and with gravity along the axis
-    without: Equilibrium | None = None
+    without: "Equilibrium | None" = None
     #: (5, 5) derivatives of the scaled balances, see `Balance`; NaN for a periodic motion
     slope: Array = field(default_factory=lambda: np.full((5, 5), np.nan))
     #: (12, 12) derivatives of the scaled state's rates by the state; NaN for a periodic motion

@@ -8,8 +8,6 @@ time domain: J. P. Boyd, Chebyshev and Fourier Spectral Methods, 2001, ch. 6 and
 The equations keep |m̂| and the body spin s = Ω·m̂/ω; both are prescribed beside them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

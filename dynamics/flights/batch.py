@@ -5,8 +5,6 @@ another's: it is the same to the last bit whichever are in its batch, in one wor
 thread (the default).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -224,7 +222,7 @@ class Endings:
     left_plate_table: NDArray[np.bool_]
 
     @classmethod
-    def joined(cls, parts: Sequence[Endings]) -> Endings:
+    def joined(cls, parts: "Sequence[Endings]") -> "Endings":
         vectors = zip(*(part.last.vectors for part in parts), strict=True)
         names = ("ended_by", "levitated_s", "changes", "left_plate_table")
         whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}

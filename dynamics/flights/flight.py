@@ -7,8 +7,6 @@ A `Flight` is a scene's motion in machine code, one part for each kind of ball a
 last bit.  `initial_state` says where a trajectory begins.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from time import perf_counter
@@ -192,7 +190,7 @@ class Flight:
 
     def begin(
         self, start: State, duration: float, currents: Array | None = None, interval: float | None = None
-    ) -> Course:
+    ) -> "Course":
         """The course of `duration` (s) from a start (rotor's frame, t = 0), the plate's states being `currents` (k,).
 
         It is sampled at multiples of `interval`, scaled; None: not at all.

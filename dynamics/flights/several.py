@@ -10,8 +10,6 @@ magnets, F, beside the few C in the middles of the magnets. Its shape matters tw
 and the last term is left out: the product of two corrections, each of the fourth power of size over distance for cubes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise

@@ -6,8 +6,6 @@ Beside a magnet, where no ball is, it is that of a few dipoles with the same mul
 and modes, it is force and torque on many dipoles all over the body with their exact derivatives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -59,22 +57,22 @@ class BodyShape:
     ball: BallField | None = None  # whose centre and radius are among the runtime parameters
 
     @classmethod
-    def of(cls, floater: Floater, field: FieldFormula, magnets: Sequence[Solid]) -> BodyShape:
+    def of(cls, floater: Floater, field: FieldFormula, magnets: Sequence[Solid]) -> "BodyShape":
         """That of a floater in a `field` of `magnets`."""
         degree = int(min(max(1.0, floater.radius / (floater.inner_radius or 1e-9) / 3**0.5) * SUMMED, MOST))
         sources = floater_sources(floater, degree=degree)
         sources = sources.averaged() if floater.mean and not floater.turned else sources
         return cls(field, floater, tuple(magnets), sources)
 
-    def placed(self, first: int) -> BodyShape:
+    def placed(self, first: int) -> "BodyShape":
         """See `Placeable`."""
         return self._changed(first=first)
 
-    def in_ball(self, ball: BallField, first: int) -> BodyShape:
+    def in_ball(self, ball: BallField, first: int) -> "BodyShape":
         """See `Fittable`."""
         return self._changed(ball=ball, first=first)
 
-    def _changed(self, **changes: Any) -> BodyShape:
+    def _changed(self, **changes: Any) -> "BodyShape":
         """The same elsewhere, with what is known of the multipoles: a ball would take half a second without."""
         found = replace(self, **changes)
         found.__dict__.update({name: getattr(self, name) for name in ("moments", "shares", "kept")})

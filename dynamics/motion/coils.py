@@ -6,8 +6,6 @@ the laboratory's axes (`CoilForce`). With U = -m·B, B = Σ I_k(t) b_k, the Jaco
 the rotor's frame, -W times the coils' torque about its axis on the floater, and Σ İ_k ∂U/∂I_k.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -65,7 +63,7 @@ class BesideCoils:
     def _compiled(self) -> CompiledField:
         return CompiledField(self.table.expressions)
 
-    def at(self, measures: Array) -> BesideCoils:
+    def at(self, measures: Array) -> "BesideCoils":
         """That beside a rotor with another measure, see `MovableField`."""
         return replace(self, table=self.table.at(measures)) if hasattr(self.table, "at") else self
 
@@ -103,7 +101,7 @@ class CoilForce:
     name: str = COILS
 
     @classmethod
-    def of(cls, scene: Scene) -> CoilForce | None:
+    def of(cls, scene: Scene) -> "CoilForce | None":
         """See `OF_SCENE`."""
         coils = scene.other_coils
         return cls(coils, scene.floater.inner_radius) if coils else None

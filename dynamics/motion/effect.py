@@ -3,8 +3,6 @@
 All in the units of `Scales`, energies in M R²/T², along the axes that turn with the rotor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, cast, runtime_checkable
@@ -91,7 +89,7 @@ class Placeable(Effect, Protocol):
     def count(self) -> int:
         """Of its numbers."""
 
-    def placed(self, first: int) -> Placeable:
+    def placed(self, first: int) -> "Placeable":
         """The same with numbers from runtime parameter `first` on; it and its first derivatives hold at one pose."""
 
     def numbers(self, field: DerivedField, poses: Poses) -> Array:
@@ -102,7 +100,7 @@ class Placeable(Effect, Protocol):
 class Fittable(Placeable, Protocol):
     """One that has a form of its own in balls."""
 
-    def in_ball(self, ball: BallField, first: int) -> Fittable:
+    def in_ball(self, ball: BallField, first: int) -> "Fittable":
         """The same with numbers from the runtime parameter `first` on, in a ball that other parameters tell."""
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
@@ -184,7 +182,7 @@ class Interaction:
     def in_range(self, points: ArrayLike) -> NDArray:  # type: ignore[type-arg]
         return self._table.in_range(points)
 
-    def joined(self, *effects: Effect) -> Interaction:
+    def joined(self, *effects: Effect) -> "Interaction":
         """The same with further effects, those already known by their name left out."""
         known = {effect.name for effect in self.effects}
         return replace(self, effects=(*self.effects, *(e for e in effects if e.name not in known)))

@@ -39,8 +39,6 @@ torque are.  Degree 3 is left out; it changes the growth rates of modes by 1 to 
 more nearer by.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -98,7 +96,7 @@ class RealAir:
     name: str = REAL_AIR
 
     @classmethod
-    def of(cls, scene: Scene) -> RealAir | None:
+    def of(cls, scene: Scene) -> "RealAir | None":
         """See `OF_SCENE`."""
         return cls() if scene.drag.air else None
 
@@ -147,7 +145,7 @@ class FloaterShape:
     fields: tuple[LocalField, ...] = ()  # the field about the dipoles off the centre; none: as the table writes it
 
     @classmethod
-    def of(cls, floater: Floater, sources: FloaterSources, field: FieldFormula) -> FloaterShape:
+    def of(cls, floater: Floater, sources: FloaterSources, field: FieldFormula) -> "FloaterShape":
         """Dipoles with the multipoles of a floater's `sources`, in `field`, less the one that the equations have."""
         axis = np.array([[0.0, 0.0, 1.0]])
         half = max(float(abs(body.center[2]) + body.reach(axis)[0]) for body in floater.bodies)
@@ -167,7 +165,7 @@ class FloaterShape:
         """Numbers in the code of the equations, see `Rates.elsewhere`."""
         return (*self.heights.tolist(), *self.dipoles.tolist())
 
-    def placed(self, first: int) -> FloaterShape:
+    def placed(self, first: int) -> "FloaterShape":
         """See `Placeable`."""
         numbers = range(len(self.heights) - 1)
         return replace(self, fields=tuple(LocalField(first + k * LocalField.count) for k in numbers))
@@ -235,7 +233,7 @@ class InducedShape:
     name: str = INDUCED_SHAPE
 
     @classmethod
-    def of(cls, floater: Floater) -> InducedShape:
+    def of(cls, floater: Floater) -> "InducedShape":
         """That of a floater; one that is round about its moment, or the mean of turns about it, has a round one."""
         tensor = polarizability_tensor(floater) - floater.polarizability * np.eye(3)
         if floater.round:
@@ -332,7 +330,7 @@ class FloaterCurrents:
     name: str = FLOATER_CURRENTS
 
     @classmethod
-    def of(cls, scene: Scene) -> FloaterCurrents | None:
+    def of(cls, scene: Scene) -> "FloaterCurrents | None":
         """See `OF_SCENE`."""
         return cls() if scene.floater.conductivity else None
 

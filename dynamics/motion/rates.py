@@ -4,8 +4,6 @@ What a rotor's field and its effects are about a pose, the runtime parameters te
 a table computes.  So the code depends on which effects there are, and on nothing else of a scene.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from copy import copy
 from functools import cached_property
@@ -57,7 +55,7 @@ class Rates:
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._level = 1 if optimised else 0
 
-    def elsewhere(self, table: FieldFormula) -> Rates:
+    def elsewhere(self, table: FieldFormula) -> "Rates":
         """The rates in another table, by the same code where its effects differ by runtime parameters alone."""
         whole, first = interaction_of(table), self._local.first + self._local.count
         # what effects have in their code beside their kind, as places of dipoles, must be the same
@@ -139,7 +137,7 @@ class Rates:
         return getattr(self._field, "rough", self._field)
 
     @cached_property
-    def rough(self) -> Rates:
+    def rough(self) -> "Rates":
         """The same by the same code with a field of few moments, and without the numbers of effects that have some.
 
         Of mutual magnetisation the moment that the rotor's field induces in the floater stays.

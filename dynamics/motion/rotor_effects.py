@@ -17,8 +17,6 @@ pose S is a constant: where the floater is frequency-locked the rates vanish, so
 a ball S is q⁻³ times polynomials of degree 1. The work that force and torque do is that power exactly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Runtime parameters of the equations of motion, and vectors and quaternions of expressions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, auto
@@ -180,15 +178,15 @@ class State:
     # moment, where nothing depends on its turn about it
     axes: Array | None = None
 
-    def __getitem__(self, chosen: Any) -> State:
+    def __getitem__(self, chosen: Any) -> "State":
         """One of many states, or some."""
         return replace(State(*(v[chosen] for v in self.vectors)), axes=None if self.axes is None else self.axes[chosen])
 
-    def to_rotor(self, angle: ArrayLike) -> State:
+    def to_rotor(self, angle: ArrayLike) -> "State":
         """Components along the rotor's axes, from those along the laboratory's; `angle` of the rotor in rad."""
         return self.to_lab(-np.asarray(angle, float))
 
-    def to_lab(self, angle: ArrayLike) -> State:
+    def to_lab(self, angle: ArrayLike) -> "State":
         """Components along the laboratory's axes, from those along the rotor's; `angle` of the rotor in rad."""
         axes = None
         if self.axes is not None:
@@ -196,12 +194,12 @@ class State:
             axes = columns.swapaxes(-1, -2)
         return replace(State(*(turned_about_z(v, angle) for v in self.vectors)), axes=axes)
 
-    def moved(self, center: Array, axes: Array) -> State:
+    def moved(self, center: Array, axes: Array) -> "State":
         """In the laboratory, from along axes (n, 3, 3) with an origin at (n, 3) m; velocities are the same."""
         position, *rest = (np.einsum("nij,nj->ni", axes, vector) for vector in self.vectors)
         return replace(State(position + center, *rest), axes=None if self.axes is None else axes @ self.axes)
 
-    def brought_back(self, center: Array, axes: Array) -> State:
+    def brought_back(self, center: Array, axes: Array) -> "State":
         """What `moved` takes away."""
         shifted = replace(self, position=self.position - center)
         return shifted.moved(np.zeros(3), axes.swapaxes(1, 2))
@@ -244,7 +242,7 @@ class Scales:
     pointing: tuple[float, float, float] | None = None
 
     @classmethod
-    def of(cls, scene: Scene) -> Scales:
+    def of(cls, scene: Scene) -> "Scales":
         floater, weight = scene.floater, float(np.linalg.norm(scene.gravity))
         x, y, z = floater.pointing.tolist()
         turning = (floater.spin_ratio, None) if floater.round else (1.0, (x, y, z))

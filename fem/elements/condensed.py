@@ -13,8 +13,6 @@ Robin term 2/R is exact for l = 1; what other degrees lack is a matrix of low ra
 `degree`. On a part of the sphere that mirror planes cut out, only harmonics of the potential's parity take part.
 """
 
-from __future__ import annotations
-
 import contextlib
 import resource
 from pathlib import Path

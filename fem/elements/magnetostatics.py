@@ -9,8 +9,6 @@ In the formulation "split" H0 is the closed form of the remanence; in "direct" i
 Two others to compare with: Coulomb's law in 80-bit numbers, slow and without cancellation, and elements of scikit-fem.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -5,8 +5,6 @@ A mirror R = diag(±1) takes a polar vector field A to R A(R x).  With the plane
 component on its plane: a Dirichlet condition for A there.  An even class has the natural condition.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

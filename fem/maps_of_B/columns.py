@@ -1,7 +1,5 @@
 """A map of B: values at points, from a probe or from another program."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -53,13 +51,13 @@ class FieldMap:
     def observations(self) -> int:
         return int(np.isfinite(self.field).sum())
 
-    def where(self, chosen: ArrayLike) -> FieldMap:
+    def where(self, chosen: ArrayLike) -> "FieldMap":
         """The part of the map at `chosen` points: (n,) booleans or indices."""
         chosen = np.asarray(chosen)
         errors = None if self.errors is None else self.errors[chosen]
         return FieldMap(self.points[chosen], self.field[chosen], errors, self.read_as)
 
-    def outside(self, center: ArrayLike, radius: float) -> FieldMap:
+    def outside(self, center: ArrayLike, radius: float) -> "FieldMap":
         """The part of the map farther than `radius` (m) from `center` (3,) m: to leave out what lies in a magnet."""
         return self.where(np.linalg.norm(self.points - np.asarray(center, float), axis=1) > radius)
 

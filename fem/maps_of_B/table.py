@@ -3,8 +3,6 @@
 A map that cannot be one of the scene's magnets is refused: a wrong unit makes it wrong by powers of ten.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

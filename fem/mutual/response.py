@@ -3,8 +3,6 @@
 And samples of them, of which tables are made: by charges on the magnets' surfaces, and exactly for the sphere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -242,7 +240,7 @@ class Wrench:
     force: Array
     torque: Array
 
-    def __sub__(self, other: Wrench) -> Wrench:
+    def __sub__(self, other: "Wrench") -> "Wrench":
         return Wrench(self.force - other.force, self.torque - other.torque)
 
 

@@ -1,7 +1,5 @@
 """Which model of the plate a scene needs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

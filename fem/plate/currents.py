@@ -11,8 +11,6 @@ solving again.
 `solve_currents` does so for dipoles in some boxes, to a wanted accuracy: the expensive part of a plate.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -213,7 +211,7 @@ class ClassBasis:
     potentials: Array
     inductance: Array
 
-    def extended(self, fields: Array, potentials: Array) -> ClassBasis:
+    def extended(self, fields: Array, potentials: Array) -> "ClassBasis":
         """The basis and what is new in more fields."""
         for _ in range(2):  # Gram-Schmidt once leaves what cancellation spoils
             known = fields @ self.fields.T

@@ -11,8 +11,6 @@ S. Zaglmayr, High order finite element methods for electromagnetic field computa
 A `Ladder` solves at rising orders until a tolerance is met.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol

@@ -3,8 +3,6 @@
 B = -∇ Σ c_k Θ_k: each multipole is free of divergence and curl by construction.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -74,12 +72,12 @@ class Multipoles:
             object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.kinds), 3)))
 
     @classmethod
-    def at(cls, centers: Iterable[Array], kinds: Sequence[tuple[int, int, int]], scale: float) -> Multipoles:
+    def at(cls, centers: Iterable[Array], kinds: Sequence[tuple[int, int, int]], scale: float) -> "Multipoles":
         """All `kinds` at each of `centers`, with a `scale`."""
         pairs = list(product(centers, kinds))
         return cls(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs], float), scale)
 
-    def subset(self, numbers: Sequence[int]) -> Multipoles:
+    def subset(self, numbers: Sequence[int]) -> "Multipoles":
         return Multipoles(self.centers[list(numbers)], self.kinds[list(numbers)], self.scale)
 
     def factors(self, order: int) -> Array:

@@ -11,8 +11,6 @@ R w = λ L w with wᵀ L w = 1 (eigenmodes of the plate itself converge far more
 M. Clemens, T. Weiland, IEEE Trans. Magn. 35 (1999) 1163 (discrete eddy-current operators).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -59,7 +57,7 @@ class PassiveNetwork:
     couplings: Callable[[Sequence[Source]], Array]
     # for a tolerance of reaction tensors the multipoles, their weights (states, k), 1/√J, and the error that they
     # leave, which may be more
-    field_functions: Callable[[PassiveNetwork, float, Watch], tuple[Multipoles, Array, float]]
+    field_functions: "Callable[[PassiveNetwork, float, Watch], tuple[Multipoles, Array, float]]"
     mesh_error: float  # estimated relative errors of reaction tensors
     state_error: float
     provenance: Mapping[str, str | float]  # how it was made; texts and numbers
@@ -79,7 +77,7 @@ class OrderedBasis:
     resistance: Array  # (n, n)
     inductance: Array
 
-    def leading(self, energy: float) -> OrderedBasis:
+    def leading(self, energy: float) -> "OrderedBasis":
         """The part whose energies exceed a level."""
         n = int(np.sum(self.energies > energy))
         return OrderedBasis(self.energies[:n], self.fields[:n], self.resistance[:n, :n], self.inductance[:n, :n])

@@ -16,8 +16,6 @@ at d = 0.15.  No scale of the problem (1/h, 1/t, 1/δ, ωμ0σt) needs to be kno
 J. R. Reitz, J. Appl. Phys. 41 (1970) 2067; W. R. Smythe, Static and Dynamic Electricity (3rd ed.), ch. X.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

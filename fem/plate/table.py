@@ -7,8 +7,6 @@ floater they do Σ y_i d(b_i·m)/dt, on the rotor Σ y_i ∂r_i/∂φ per radian
 and floater is not in these sums.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -65,7 +63,7 @@ class Region:
         extent = self.upper - self.lower
         return tuple(int(a) for a in np.flatnonzero(np.abs(self.lower + self.upper) <= SYMMETRIC * extent))
 
-    def moved(self, shift: Array) -> Region:
+    def moved(self, shift: Array) -> "Region":
         """The region displaced by (3,) m."""
         return Region(self.lower + shift, self.upper + shift)
 

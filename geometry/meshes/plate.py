@@ -1,7 +1,5 @@
 """Meshes of conductors: hexahedral ones of boxes on a tensor-product grid, curved tetrahedra of any other solid."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -137,7 +135,7 @@ class MeshRule:
     # cube
     reach: float = 12.0
 
-    def finer(self) -> MeshRule:
+    def finer(self) -> "MeshRule":
         """The next finer mesh: cells 0.6 times as large, and a slower growth."""
         return MeshRule(0.6 * self.distance_share, 0.6 * self.skin_share, 0.8 * self.growth, self.reach)
 

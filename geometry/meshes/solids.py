@@ -1,7 +1,5 @@
 """Bodies as solids of OpenCASCADE: for meshes, rules of integration and STEP files."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import re

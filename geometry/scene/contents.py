@@ -1,7 +1,5 @@
 """The scene in SI units: plate, drag, start, and the whole."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -48,7 +46,7 @@ class Plate:
     each: tuple[float, ...] = ()  # of several the conductivity of each, S/m
 
     @classmethod
-    def of(cls, plates: Sequence[Plate]) -> Plate:
+    def of(cls, plates: "Sequence[Plate]") -> "Plate":
         """One or several as one; they are lowered as the first is."""
         if len(plates) == 1:
             return plates[0]
@@ -275,7 +273,7 @@ class Scene:
     drive: tuple[DriveStep, ...] = ()
     coils: tuple[Coil, ...] = ()
     companions: tuple[Companion, ...] = ()
-    keys: tuple[Mapping[str, Any], Scene] | None = field(default=None, compare=False, repr=False)
+    keys: "tuple[Mapping[str, Any], Scene] | None" = field(default=None, compare=False, repr=False)
     tolerances: tuple[tuple[str, float], ...] = field(default=(), compare=False)
 
     @property
@@ -284,7 +282,7 @@ class Scene:
         return 2 * np.pi * self.frequency
 
     @property
-    def each(self) -> tuple[Scene, ...]:
+    def each(self) -> "tuple[Scene, ...]":
         """The scene of each floater alone."""
         first = replace(self, companions=()) if self.companions else self
         alone = (replace(first, floater=c.floater, drag=c.drag, start=c.start) for c in self.companions)

@@ -4,8 +4,6 @@ Its frame has the origin in the centre of mass and the principal axes of inertia
 Of a body that is round about its moment the moment is along z; a cuboid's axes are its edges.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -190,7 +188,7 @@ class Floater:
         return bool(np.linalg.norm(np.cross(spinning, self.pointing)) <= FREELY * self.principal_inertia.max())
 
     @cached_property
-    def averaged(self) -> Floater:
+    def averaged(self) -> "Floater":
         """Its mean over turns about its moment, which is round."""
         turn, along = _frame_about(self.pointing), float(self.principal_inertia @ self.pointing**2)
         across = (float(self.principal_inertia.sum()) - along) / 2
@@ -224,7 +222,7 @@ class Floater:
         return polarizability(sum(magnet.body.volume for magnet in self.magnets), self.recoil_permeability)
 
     @property
-    def ball(self) -> Floater:
+    def ball(self) -> "Floater":
         """A sphere of its magnets' volume, remanence and permeability: itself where it is one."""
         if self.is_sphere:
             return self

@@ -10,8 +10,6 @@ each has a probability, soft by the surrogate's error and by how the residual mo
 trajectory in fifty may end for a reason that nobody thought of, so that no fact can rule out everything.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -371,7 +369,7 @@ def _rotor(values: Values, kind: str, distance: float) -> dict[str, Array]:
     return {"displacement": 0 * every, "tilt": every, "stack": np.full_like(every, distance)}
 
 
-def log_likelihoods(models: Models, values: Values, facts: Mapping[str, Fact]) -> dict[str, Array]:
+def log_likelihoods(models: Models, values: Values, facts: "Mapping[str, Fact]") -> dict[str, Array]:
     """Logarithm of the likelihood (n,) of each of the facts, for unknowns (n,) by name."""
     known = courses(models, values, tuple(dict.fromkeys(flight for fact in facts.values() for flight in fact.flights)))
     # now and then a fact has a reason outside of the model

@@ -1,7 +1,5 @@
 """Checked input from the command line and Python: numbers, points of a file, models, values to vary."""
 
-from __future__ import annotations
-
 import csv
 import difflib
 import inspect

@@ -1,7 +1,5 @@
 """Start of the command line: streams, signals and a home folder, before anything large is loaded."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal
@@ -86,7 +84,7 @@ def _listen(stop: threading.Event) -> None:
             os.close(nowhere)
         raise KeyboardInterrupt
 
-    def dropped(what: sys.UnraisableHookArgs) -> None:  # in a destructor
+    def dropped(what: "sys.UnraisableHookArgs") -> None:  # in a destructor
         if issubclass(what.exc_type, KeyboardInterrupt):
             signal.setitimer(signal.ITIMER_REAL, AGAIN)
         else:

@@ -1,7 +1,5 @@
 """What is shown of a trajectory in three dimensions: its end, its frames, the field, and the currents in the plate."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

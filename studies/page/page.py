@@ -1,7 +1,5 @@
 """One page in the browser: what its reader does, what is computed for it, and what it shows; lengths mm."""
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import binascii

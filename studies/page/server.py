@@ -4,8 +4,6 @@ A page is a file with its program, and a line (WebSocket) over which it gets wha
 is not there.
 """
 
-from __future__ import annotations
-
 import asyncio
 import hmac
 import html
@@ -71,7 +69,7 @@ class LivePage:
     opened : the pages that are open
     """
 
-    def __init__(self, address: str, local: bool, gate: _Gate, listening: socket.socket) -> None:
+    def __init__(self, address: str, local: bool, gate: "_Gate", listening: socket.socket) -> None:
         self.address, self.local, self.opened = address, local, gate.opened
         self._gate, self._listening, self._over = gate, listening, asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -83,7 +81,7 @@ class LivePage:
     def _repr_html_(self) -> str:
         return f'<iframe src="{html.escape(self.address)}" width="100%" height="{HEIGHT}" style="border:0"></iframe>'
 
-    def begin(self) -> LivePage:
+    def begin(self) -> "LivePage":
         """Serve in a thread of its own."""
         self._thread = threading.Thread(target=self.run, name="spinlev explore", daemon=True)
         self._thread.start()

@@ -1,7 +1,5 @@
 """What a page is about: a scene, the models and the body spin; and the same as the text of an address."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -68,7 +66,7 @@ class PageState:
         command = f"cat > scene.toml << 'END'\n{text}END\n{line}\n"
         return {"line": line, "command": command, "python": f"import spinlev as sl\n\n{program}"}
 
-    def changed(self, key: str, value: float) -> PageState:
+    def changed(self, key: str, value: float) -> "PageState":
         """With another number: of the scene file, by its dotted key, or `spin`. Raises SceneError."""
         if key == "spin":
             return replace(self, spin=finite("spin", value))
@@ -79,7 +77,7 @@ class PageState:
         parts = {"model": self.model, "plate_model": self.plate_model, "spin": json.dumps(self.spin)}
         return urlencode(parts | dict(_flat(self.keys)))
 
-    def with_query(self, asked: Mapping[str, str]) -> PageState:
+    def with_query(self, asked: Mapping[str, str]) -> "PageState":
         """The state of an address: of a whole scene, or one that changes what it names; its rotor or plate is whole.
 
         Raises SceneError: the scene cannot be, or names a file that the first scene does not; InputError: a model that
@@ -105,7 +103,7 @@ class PageState:
         scene = assemble(kept, self.source, known=self.first or self.scene)
         return replace(self, scene=scene, **{**chosen, "spin": spin})
 
-    def opened(self, content: bytes, name: str) -> PageState:
+    def opened(self, content: bytes, name: str) -> "PageState":
         """The state in which a page shows a scene file of its reader's. Raises as `with_query`."""
         if len(content) > LARGEST:
             raise InputError(f"Input scene must have at most {LARGEST} bytes in a page; instead it has {len(content)}.")

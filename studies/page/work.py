@@ -1,7 +1,5 @@
 """What is computed for a page, by processes of its own."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
@@ -79,7 +77,7 @@ FILES = {
 }  # What can be taken home: a file's name and its type
 
 
-Pose: TypeAlias = "tuple[list[float], list[float]]"  # Position, mm, and direction of the moment at t = 0
+Pose: TypeAlias = tuple[list[float], list[float]]  # Position, mm, and direction of the moment at t = 0
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,6 @@
 They are reached over a pair of sockets that nobody else can open.
 """
 
-from __future__ import annotations
-
 import asyncio
 import multiprocessing
 import os
