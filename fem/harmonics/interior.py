@@ -20,6 +20,7 @@ another place is A_k = Σ P_kn R_n(ξ) of its distance ξ.  All matrices are kno
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from typing import ClassVar
 
@@ -300,6 +301,9 @@ def _relative_miss(missed: Array, values: Array) -> float:
     return worst / size if size else worst
 
 
+DENOMINATOR = 1000  # Largest of the entries of `matrices`
+
+
 def harmonics(degree: int, points: Array) -> tuple[Array, Array]:
     """R_k (n, K) and their gradients (n, K, 3) at points (n, 3), up to a degree."""
     complex_ones = regular_values(degree, *np.ascontiguousarray(points.T))
@@ -329,7 +333,21 @@ def shells(degree: int) -> NDArray[np.intp]:
 @cache
 def sizes(degree: int) -> Array:
     """(K,) root mean square of each R_k on the unit sphere: of R_k over these a turn is a rotation."""
-    return np.asarray(np.sqrt(np.mean(harmonics(degree, even_directions(4000))[0] ** 2, axis=0)))
+    l, m, _ = np.array(members(degree)).T
+    doubled = np.cumprod([1.0, *range(1, 2 * degree, 2)])[l]  # (2l-1)!!: R_k is (l-m)!/(2l-1)!! P_lm(cos θ) cos mφ
+    ratio = factorials(degree)[l, m] / (2 * l + 1) * np.where(m, 0.5, 1.0)  # (l-m)! (l+m)!
+    return np.asarray(np.sqrt(ratio) / doubled)
+
+
+@cache
+def turns(degree: int) -> Array:
+    """(3, K, K) of `matrices`' G for R_k over their `sizes`: antisymmetric, whose squares are integers over four.
+
+    Equal entries are equal to the last bit, so that expressions share what they multiply.
+    """
+    unit = sizes(degree)
+    found = matrices(degree)[1] * unit / unit[:, None]
+    return np.asarray(np.sign(found) * np.sqrt(np.round(4 * found**2)) / 2)
 
 
 @cache
@@ -346,8 +364,10 @@ def matrices(degree: int) -> tuple[Array, Array]:
             if len(columns):
                 solved = np.linalg.lstsq(values[:, columns], np.concatenate(wanted[:, :, rows], axis=1))[0]
                 one[:, rows[:, None], columns] = solved.T.reshape(3, len(rows), len(columns))
-        # round-off of the solutions, whose entries are small rational numbers
-        found.append(np.where(np.abs(one) < 1e-11 * np.abs(one).max(), 0.0, one))
+        # without round-off: the entries are rational numbers with small denominators
+        known = {float(v): float(Fraction(v).limit_denominator(DENOMINATOR)) for v in np.unique(one)}
+        exact = np.vectorize(known.__getitem__)(one)
+        found.append(np.where(np.abs(exact - one) < 1e-11 * np.abs(one).max(), exact, one))
     return found[0], found[1]
 
 

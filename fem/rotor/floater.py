@@ -67,6 +67,11 @@ class FloaterSources:
             charges=np.tile(self.charges, TURNS) / TURNS,
         )
 
+    @property
+    def dipole_moment(self) -> Array:
+        """(3,) A m² about the centre."""
+        return np.asarray(self.moments.sum(axis=0) + self.charges @ self.corners)
+
     def multipoles(self, degree: int, unit: float) -> Array:
         """(K,) A m: M_k of `harmonics.interior` up to a degree about the centre, lengths in a `unit`, m."""
         _, slopes = harmonics(degree, self.places / unit)
