@@ -117,7 +117,7 @@ class MovedEffect:
         measure, length, move = hy.par[Parameter.MEASURE], hy.par[Parameter.LENGTH], self.move
         place = move.place([length * x for x in motion.position], measure)
         names = ("velocity", "moment", "spin", "drift", "lag", "field")
-        seen = {name: move.into(getattr(motion, name), measure) for name in names}
+        seen: dict[str, Any] = {name: move.into(getattr(motion, name), measure) for name in names}
         gradient = move.tensor(motion.gradient, measure)
         position = [x / length for x in place]
         found = self.effect.added(Motion(position=position, gradient=gradient, turn=motion.turn, **seen))

@@ -17,11 +17,11 @@ from ...fem.rotor.table import FieldTable, RangeError
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..motion.coils import BesideCoils
-from ..motion.effect import Effect, Fittable, Interaction, interaction_of
+from ..motion.effect import SMALLEST, Effect, Fittable, Interaction, interaction_of
 from ..motion.events import clearance, rotor_gap
 from ..motion.state import Parameter, turned_about_z
 
-DEGREE = len(Parameter)  # Number of the runtime parameter that says of which degree the ball is: 0 where there is none
+DEGREE = len(Parameter)  # Number of the runtime parameter that is the `number` of the ball's kind; 0: in no ball
 # The second kind, twice as wide and half again as slow, is for a floater that has left a small ball.
 SMALL, LARGE = BallField(DEGREE + 1, 7), BallField(DEGREE + 1, 9)
 FIRST = DEGREE + 1 + LARGE.count  # Number of the first runtime parameter of the effects in a ball
@@ -31,11 +31,14 @@ FIRST = DEGREE + 1 + LARGE.count  # Number of the first runtime parameter of the
 WORTH = 5e6
 # Of a ball's field and its gradient, relative; the gradient of a table by finite elements is known to 4e-5.
 ERROR = 1e-6
-# Kinds and error for a body that is not round, whose multipoles are left out up to some 5e-3 of the force: 140 of 1351
-# operations less.
-OF_BODIES = BallField(DEGREE + 1, 6), BallField(DEGREE + 1, 8)
-ERROR_OF_BODIES = 1e-5
+# Kinds of balls and their errors for a body that is not round, whose multipoles are left out up to some 5e-3 of the
+# force. The first two are about an equilibrium: there a ball is so much smaller than its distance from the magnets that
+# the field's error is 1e-6 where the floater is, and its multipoles' 1e-4. In the plane in which the rotor is its own
+# mirror image half of what a ball's sums add up is zero. A cube asks for 807, 1030, 1545 and 2240 operations.
+OF_BODIES = BallField(DEGREE + 1, SMALLEST, True), *(BallField(DEGREE + 1, degree) for degree in (SMALLEST, 6, 8))
+ERROR_OF_BODIES = {SMALLEST: 1e-4, 6: 1e-5, 8: 1e-5}
 SPACING = 1 / 32  # Of the lattice, in radii of the floater
+FINE = 1 / 128  # Of that about an equilibrium, where a place in the middle counts: what multipoles miss is its cube
 LEAST = 1.5  # Smallest radius of a ball in spacings: a floater that enters it is at most 0.87 of them from the centre
 TRIALS = 5
 WIDEST = 1 / 4  # No ball is larger, of the distance from a body: at degree 9 it would err by 1e-5 at least
@@ -51,6 +54,7 @@ PART = 0.3
 # Largest spacing of their lattice in tenths of the distance from a body: the coarser, the fewer balls there are (half
 # of those at 0.4), but above 0.8 a floater would often be near the surface of the nearest one.
 COARSE = 0.78
+ORIGIN = np.zeros(3)
 NEIGHBOURS = np.indices((3, 3, 3)).reshape(3, -1).T - 1.0  # (27, 3) of a cell, and itself
 
 
@@ -85,41 +89,53 @@ class Balls:
     _known: dict[tuple[float, ...], tuple[Array, float] | None] = field(default_factory=dict)
 
     @property
-    def kinds(self) -> tuple[BallField, BallField]:
-        """The small and the large ball."""
+    def kinds(self) -> tuple[BallField, ...]:
+        """From the smallest to the largest."""
         return OF_BODIES if self.whole.turning else (SMALL, LARGE)
 
     @property
-    def allowed(self) -> float:
+    def usual(self) -> tuple[BallField, ...]:
+        """Those for a floater of which it is not known that it moves about an equilibrium."""
+        return tuple(kind for kind in self.kinds if kind.degree > SMALLEST)
+
+    def after(self, number: int) -> tuple[BallField, ...]:
+        """The larger kinds than that of a number, and at least the largest; 0: in none."""
+        return tuple(kind for kind in self.kinds if kind.degree > abs(number) > 0) or self.kinds[-1:]
+
+    def allowed(self, formula: BallField) -> float:
         """The error of a ball's field."""
-        return ERROR_OF_BODIES if self.whole.turning else ERROR
+        return ERROR_OF_BODIES[formula.degree] if self.whole.turning else ERROR
 
     @cached_property
     def end(self) -> int:
         """Number of the first runtime parameter that is not a ball's."""
         return FIRST + sum(effect.count for effect in _fitted(self.whole, LARGE))
 
-    def enter(self, formulas: Sequence[BallField], state: Array, values: Array, time: float = 0.0) -> float:
+    def enter(
+        self, formulas: Sequence[BallField], state: Array, values: Array, time: float = 0.0, offset: Array = ORIGIN
+    ) -> float:
         """Set the runtime parameters `values` to the first ball of `formulas` that will do for a scaled state; error.
 
         It must hold the circle on which the rotor sees a floater that turns less than the rotor, or not at all: once a
         turn, backwards, at the rate of a scaled `time`.  Where no ball does, those of the last of `formulas` hold a
-        part of the way each.
+        part of the way each.  `offset` (3,) m is how far the state is from what the floater moves about.
         """
         length, (x, y, _) = values[Parameter.LENGTH], state[:3]
         rate = values[Parameter.RATE] + values[Parameter.ACCELERATION] * time
-        lost, spacing = float(values[Parameter.LOST_DISTANCE]) * length, SPACING * self.scene.floater.radius
+        lost = float(values[Parameter.LOST_DISTANCE]) * length
         drift = state[3:6] - rate * np.array([-y, x, 0.0])
         arm = rate * np.array([-drift[1], drift[0], 0.0])
-        middle, way = (state[:3] - arm) * length, float(abs(drift[2]) if rate else np.linalg.norm(drift)) * length
+        middle = (state[:3] - arm) * length - offset
+        way = float(abs(drift[2]) if rate else np.linalg.norm(drift)) * length
         values[DEGREE : self.end] = 0.0
         held = float(np.linalg.norm(arm)) * length <= WIDEST * self._distance(middle)  # else none is fitted in vain
         for formula in formulas:
-            found = self.at(formula, spacing, lost, middle) if held else None
+            found = self.at(formula, self._spacing(formula), lost, middle) if held else None
             if found is None:
                 continue
             numbers, error = found
-            reach = float(np.linalg.norm(arm)) * length + float(np.linalg.norm(middle - numbers[:3]))
+            reach = float(np.linalg.norm(arm)) * length + float(np.linalg.norm(offset))
+            reach += float(np.linalg.norm(middle - numbers[:3]))
             if reach * numbers[3] <= SNUG and STAY * way * numbers[3] <= 1:
                 break
         else:
@@ -127,8 +143,26 @@ class Balls:
             if found is None:
                 return 0.0
             formula, (numbers, error) = formulas[-1], found
-        values[DEGREE], values[DEGREE + 1 : DEGREE + 1 + len(numbers)] = formula.degree, numbers
+        values[DEGREE], values[DEGREE + 1 : DEGREE + 1 + len(numbers)] = formula.number, numbers
         return error
+
+    def centre(self, values: Array, ways: Array) -> float | None:
+        """Set the runtime parameters `values` to a ball of their kind about the middle of `ways` (n, 3) m.
+
+        Its error; None where there is none that holds them, and `values` stay.
+        """
+        formula = next(kind for kind in self.kinds if kind.number == values[DEGREE])
+        lost, middle = float(values[Parameter.LOST_DISTANCE] * values[Parameter.LENGTH]), ways.mean(axis=0)
+        found = self.at(formula, self._spacing(formula), lost, middle)
+        if found is None or np.linalg.norm(ways - found[0][:3], axis=1).max() * found[0][3] > SNUG:
+            return None
+        values[DEGREE + 1 : DEGREE + 1 + len(found[0])] = found[0]
+        return found[1]
+
+    def _spacing(self, formula: BallField) -> float:
+        """Of the lattice of a small ball, m."""
+        fine = self.whole.turning and formula.degree == SMALLEST
+        return (FINE if fine else SPACING) * self.scene.floater.radius
 
     def _ahead(
         self, formula: BallField, lost: float, place: Array, drift: Array, arm: Array
@@ -169,7 +203,7 @@ class Balls:
         It is about the nearest point of a lattice of a `spacing` (m); at a distance `lost` (m) the floater is lost.
         """
         cell = np.round(place / spacing)
-        key = formula.degree, spacing, lost, *cell.tolist()
+        key = formula.number, spacing, lost, *cell.tolist()
         if key not in self._known:
             if len(self._known) >= MOST:
                 self._known.clear()
@@ -184,7 +218,7 @@ class Balls:
         """The largest ball about `center` whose expansion has at most the error allowed."""
         room, least = _room(self.scene, center, lost), LEAST * SPACING * self.scene.floater.radius
         # first so large that the terms left out, (radius / distance)^(degree - 1) nearly, are about the error allowed
-        allowed = self.allowed
+        allowed = self.allowed(formula)
         part = (allowed / 4) ** (1 / (formula.degree - 1))
         radius = min(room, self._distance(center) * (min(part, FITTED) if _fitted(self.whole, formula) else part))
         error = np.inf
@@ -213,7 +247,7 @@ class Balls:
         found = [effect.fit(ball, gradient) for effect in effects]
         padded = np.concatenate([values, np.zeros(FIRST - DEGREE - 1 - len(values))])
         return np.concatenate([padded, *(numbers for numbers, _ in found)]), max(
-            error, *(self.allowed * share for _, share in found)
+            error, *(self.allowed(formula) * share for _, share in found)
         )
 
 

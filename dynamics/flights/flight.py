@@ -19,7 +19,7 @@ from ...fem.compiled_code import compiled
 from ...fem.harmonics.interior import BallField
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array, InputError
-from ...geometry.scene.contents import AbsoluteStart, Scene
+from ...geometry.scene.contents import AbsoluteStart, OffsetStart, Scene
 from ..continuation.frequencies import way_out
 from ..equilibria.equilibrium import AXIAL, Equilibrium, EquilibriumError
 from ..equilibria.search import find_equilibria
@@ -39,7 +39,7 @@ from ..motion.events import (
     range_events,
 )
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory, plate_numbers
-from ..motion.state import DRIVEN, STEADY, Parameter, Scales, State
+from ..motion.state import DRIVEN, STEADY, Given, Parameter, Scales, State
 from .balls import DEGREE, Balls, in_ball, is_long
 from .trajectory import (
     DURATION,
@@ -71,6 +71,7 @@ OPTIMISATION = 1
 SHORT_TURNS = 1000.0
 # Turns from which on straight code saves more time (in a ball 21 of 47 µs a step) than its compilation takes.
 STRAIGHT_TURNS = 2e5
+LOOKED_AHEAD = 16.0  # Turns in the middle of whose way a ball is put: three periods of the axial mode
 MOST_SAMPLES, SAMPLES_PER_TURN = 20000, 32
 
 
@@ -117,28 +118,29 @@ class Flight:
         self.values = np.concatenate([values, np.zeros(self.first - len(values)), own])
         """Runtime parameters, in no ball: those of the equations, of a ball, and of the plate."""
         self.parts: dict[int, Part] = {}
-        """By the degree of the ball, 0: in none."""
+        """By the `number` of the ball's kind, 0: in none."""
         self.compile_seconds, self._tolerance, self._turns = 0.0, tolerance, scene.fastest * duration
         long = memory is None and self._turns > STRAIGHT_TURNS  # straight code of a plate takes minutes to compile
         self._straight = long if compact is None else not compact
 
     def degree(self, values: Array) -> int:
-        """Of the ball in runtime parameters; 0: none."""
+        """The `number` of the ball's kind in runtime parameters; 0: none."""
         return int(values[DEGREE]) if self.balls else 0
 
     def part(self, degree: int) -> Part:
-        """The compiled motion in balls of a degree, or, 0, in the table's own field."""
+        """The compiled motion in balls of a kind, or, 0, in the table's own field."""
         if degree not in self.parts:
             # in small balls most of a long trajectory is spent: straight code is for them, or where there are none
             began = perf_counter()
             equations, events = self.equations(degree)
             falling = hy.event_direction.negative
+            small = [kind.number for kind in self.balls.kinds[:-1]] if self.balls else []
             integrator = compiled(
                 hy.taylor_adaptive,
                 [*zip(equations.variables, equations.rates, strict=True), (hy.expression("work"), equations.power)],
                 np.zeros(len(equations.variables) + 1),
                 tol=self._tolerance * (LOOSER if degree else 1) * (ROUGHER if self.whole.turning and degree else 1),
-                compact_mode=not self._straight or (self.balls is not None and degree != self.balls.kinds[0].degree),
+                compact_mode=not self._straight or (self.balls is not None and degree not in small),
                 opt_level=OPTIMISATION if self.memory or self._turns > SHORT_TURNS else 0,
                 t_events=[hy.t_event(each, direction=falling) for each, _ in events],
             )
@@ -151,11 +153,13 @@ class Flight:
 
     def equations(self, degree: int) -> tuple[Equations, Events]:
         """Equations of motion and terminal events; a ball is free of bodies and ends before the floater is lost."""
-        ball = BallField(DEGREE + 1, degree)
+        ball = BallField(DEGREE + 1, abs(degree), degree < 0)
         whole = in_ball(self.whole, ball) if degree else self.whole
         driven = bool(self.scene.drive)
         moving = self.scene.moving
-        equations = equations_of_motion(whole, self.tilted, self.memory, self.first, driven, moving)
+        # the code of a floater that is not round is its own anyway, as multipoles are written in
+        given = Given(self.values if whole.turning else None)
+        equations = equations_of_motion(whole, self.tilted, self.memory, self.first, driven, moving, given)
         position, turn = equations.variables[:3], DRIVEN if driven else STEADY
         if degree:
             away = ball.offset([hy.par[Parameter.LENGTH] * x for x in position])
@@ -205,7 +209,7 @@ class Flight:
             own = ((0.0 if currents is None else currents) - left) * values[Parameter.PLATE_SHARE]
         given = np.zeros(3 if self.scene.drive else 1)  # by the motor, and the work
         course = Course(self, duration, values, np.concatenate([self.own_states(start), own, given]))
-        course.enter_ball()
+        course.enter_ball(self.scene.start.offset if isinstance(self.scene.start, OffsetStart) else None)
         if interval is not None:
             row, now = course.state[None], np.zeros(1)
             terms = self.jacobi(course.values, now, row)
@@ -246,14 +250,41 @@ class Course:
     def seconds(self) -> float:
         return self.time[0] * self.flight.scales.time
 
-    def enter_ball(self) -> None:
-        """Begin in a ball, a small one if it will do."""
-        if self.flight.balls:
-            error = self.flight.balls.enter(self.flight.balls.kinds, self.state, self.values, self.time[0])
-            self.changes = FieldChanges(error=error)
+    def enter_ball(self, offset: Array | None = None) -> None:
+        """Begin in a ball, a small one if it will do.
+
+        A body that is not round, and begins at an `offset` (3,) m from an equilibrium, gets one about that.
+        """
+        balls = self.flight.balls
+        if not balls:
+            return
+        if offset is None or not self.flight.whole.turning:
+            error = balls.enter(balls.usual, self.state, self.values, self.time[0])
+        else:
+            error = balls.enter(balls.kinds, self.state, self.values, self.time[0], offset)
+            error = self._centred() or error
+        self.changes = FieldChanges(error=error)
+
+    def _centred(self) -> float | None:
+        """The error of a ball about the middle of the first turns' way, if there is one that holds that.
+
+        A body that is not round swings about another place than its mean, and what a ball misses of multipoles is the
+        cube of the distance from its centre.
+        """
+        balls, number = self.flight.balls, self.flight.degree(self.values)
+        if not balls or not number:
+            return None
+        integrator = self.flight.part(number).integrator
+        integrator.pars[:], integrator.state[:] = self.values[: len(integrator.pars)], self.state
+        integrator.dtime = self.time
+        integrator.reset_cooldowns()
+        outcome, *_, states = integrator.propagate_grid(self.time[0] + 2 * np.pi * np.arange(0.0, LOOKED_AHEAD, 0.125))
+        if outcome != hy.taylor_outcome.time_limit:
+            return None
+        return balls.centre(self.values, states[:, :3] * self.values[Parameter.LENGTH])
 
     def change_ball(self) -> None:
-        """Go over to a large ball about the place now; its difference in energy is added to the work."""
+        """Go over to a larger ball about the place now; its difference in energy is added to the work."""
         if self.flight.balls is None:
             return
         degree, *center, inverse = self.values[DEGREE : DEGREE + 5]
@@ -261,7 +292,7 @@ class Course:
         if degree and away @ away * inverse**2 < INSIDE:
             return
         after, now, row = self.values.copy(), np.array([self.time[0]]), self.state[None]
-        error = self.flight.balls.enter(self.flight.balls.kinds[1:], self.state, after, self.time[0])
+        error = self.flight.balls.enter(self.flight.balls.after(int(degree)), self.state, after, self.time[0])
         if np.array_equal(after, self.values):
             return
         jump = float(self.flight.jacobi(after, now, row).sum() - self.flight.jacobi(self.values, now, row).sum())

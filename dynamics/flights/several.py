@@ -183,7 +183,7 @@ class JointFlight:
             self.flights.append(flight)
             course = flight.begin(initial_state(one, table)[0], duration)
             if flight.balls:  # of one kind from the start on, as each pair of kinds is compiled
-                flight.balls.enter(flight.balls.kinds[1:], course.state, course.values)
+                flight.balls.enter(flight.balls.kinds[-1:], course.state, course.values)
             self.courses.append(course)
         self.weights = np.array([one.mass for one in floaters]) / floaters[0].mass
         self.stride = max(len(course.values) for course in self.courses)
@@ -274,7 +274,7 @@ class JointFlight:
             if degree and away @ away * inverse**2 < 1 - 1e-9:
                 continue
             after = course.values.copy()
-            error = flight.balls.enter(flight.balls.kinds[1:], self.state[own], after, self.time[0])
+            error = flight.balls.enter(flight.balls.kinds[-1:], self.state[own], after, self.time[0])
             course.values = after
             self.changes = replace(self.changes, error=max(self.changes.error, error))
         if not np.array_equal(before[1], self.values):

@@ -15,10 +15,12 @@ from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.harmonics.interior import Ball, BallField
 from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable
 from ...geometry.common import Array
-from .state import STEADY, Parameter, State, Turn, Vector
+from .state import STEADY, Given, Parameter, State, Turn, Vector
 
 ZERO = hy.expression(0.0)
 NOTHING = (ZERO, ZERO, ZERO)
+PARAMETERS = Given()
+SMALLEST = 5  # Degree of the ball in which a body that is not round moves about an equilibrium, see `flights.balls`
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,7 @@ class Motion:
     # (3, 3) whose columns are the body's axes, and (4,) the quaternion of it; None of a body that is round
     axes: list[list[hy.expression]] | None = None
     quaternion: Vector | None = None
+    given: Given = PARAMETERS
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,11 +39,12 @@ from ...fem.closed_forms.eddy_bodies import thin_field_torque
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
-from .effect import NOTHING, Motion, interaction_of
+from .effect import NOTHING, PARAMETERS, Motion, interaction_of
 from .plate import PlateMemory, memory_terms
 from .state import (
     DRIVEN,
     STEADY,
+    Given,
     Parameter,
     Scales,
     Vector,
@@ -100,20 +101,20 @@ def lag_of(spin: Vector, rate: hy.expression, across: Vector = ()) -> list[hy.ex
     return [x, y, spin[2] - rate]
 
 
-def turning_attitude(quaternion: Vector, spin: Vector, rate: hy.expression, across: Vector = ()) -> Attitude:
+def turning_attitude(quaternion: Vector, spin: Vector, rate: hy.expression, across: Vector, given: Given) -> Attitude:
     """That of any body, from its `quaternion` (4,) and its `spin` (3,) along its own axes, in a frame of a `rate`.
 
-    See `turned` for a rate `across` its axis.
+    See `turned` for a rate `across` its axis. `given` are the runtime parameters.
     """
     w, x, y, z = quaternion
     axes = rotation_of(quaternion)
-    ratios = [hy.par[p] for p in (Parameter.INERTIA_X, Parameter.INERTIA_Y, Parameter.INERTIA_Z)]
-    pointing = [hy.par[p] for p in (Parameter.POINTING_X, Parameter.POINTING_Y, Parameter.POINTING_Z)]
+    ratios = [given[p] for p in (Parameter.INERTIA_X, Parameter.INERTIA_Y, Parameter.INERTIA_Z)]
+    pointing = [given[p] for p in (Parameter.POINTING_X, Parameter.POINTING_Y, Parameter.POINTING_Z)]
     turning = [a * s for a, s in zip(ratios, spin, strict=True)]  # angular momentum
     lag = [s - rate * a for s, a in zip(spin, axes[2], strict=True)]
     if across:
         lag = [s - across[0] * a - across[1] * b for s, a, b in zip(lag, axes[0], axes[1], strict=True)]
-    brake = [-hy.par[Parameter.TILT_DRAG] * s for s in spin]
+    brake = [-given[Parameter.TILT_DRAG] * s for s in spin]
 
     def rates(torque: Vector) -> list[hy.expression]:
         own = [dot(torque, [axes[i][k] for i in range(3)]) + brake[k] for k in range(3)]
@@ -184,6 +185,7 @@ def equations_of_motion(
     first: int = len(Parameter),
     driven: bool = False,
     moving: bool = False,
+    given: Given = PARAMETERS,
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
@@ -194,16 +196,18 @@ def equations_of_motion(
     memory, first : the plate's currents, if they are modelled, and the first of their runtime parameters
     driven : whether the rotor's rate changes in time
     moving : whether it is moved, too
+    given : the runtime parameters
     """
     whole, rotor = interaction_of(table), moved() if moving else DRIVEN if driven else STEADY
     variables = list(hy.make_vars(*CENTRE, *(TURNING_NAMES if whole.turning else ROUND_NAMES)))
     position, velocity, turn_states, spin_states = variables[:3], variables[3:6], variables[6:-3], variables[-3:]
-    attitude = (turning_attitude if whole.turning else round_attitude)(
-        turn_states, spin_states, rotor.rate, rotor.across
-    )
+    if whole.turning:
+        attitude = turning_attitude(turn_states, spin_states, rotor.rate, rotor.across, given)
+    else:
+        attitude = round_attitude(turn_states, spin_states, rotor.rate, rotor.across)
     moment, spin = attitude.moment, attitude.spin
     length, torque, inertia, linear = (
-        hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
+        given[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
     )
     field, gradient = table.expressions([length * p for p in position])
     strength = torque * inertia * length
@@ -224,7 +228,7 @@ def equations_of_motion(
     ]
     power = dot(push, drift) + inertia * attitude.braking
     motion = Motion(
-        position, velocity, moment, spin, drift, lag, field, gradient, rotor, attitude.axes, attitude.quaternion
+        position, velocity, moment, spin, drift, lag, field, gradient, rotor, attitude.axes, attitude.quaternion, given
     )
     parts = [effect.added(motion) for effect in whole.effects]
     states = [state for added in parts for state in added.states]
@@ -249,12 +253,12 @@ def equations_of_motion(
         power = power - rotor.rate * (y * momenta[0] - x * momenta[1])
     if driven:
         power = power - rotor.acceleration * momenta[2]
-        given = cross(position, force)[2] + inertia * turn[2]
+        drive = cross(position, force)[2] + inertia * turn[2]
         for added in parts:
             if added.motor is not None:
-                given = given + added.motor - cross(position, added.force)[2] - inertia * added.torque[2]
+                drive = drive + added.motor - cross(position, added.force)[2] - inertia * added.torque[2]
         states = [*states, *hy.make_vars("motor_momentum", "motor_work")]
-        state_rates = [*state_rates, given, rotor.rate * given]
+        state_rates = [*state_rates, drive, rotor.rate * drive]
     acceleration = subtract(add(force, axial, push), turned(velocity, rotor.rate, rotor.across))
     rates = [*drift, *acceleration, *attitude.rates(turn), *state_rates]
     return Equations([*variables, *states], rates, jacobi, power)

@@ -222,6 +222,9 @@ class FloaterShape:
 INDUCED_SHAPE = "shape of what is induced in the floater"
 
 
+EVEN = 1e-6  # By which entries of a polarizability may differ that is the same in all directions, as a cube's is
+
+
 @dataclass(frozen=True, eq=False)
 class InducedShape:
     """What the rotor's field at its centre induces in a floater beyond a sphere of its magnets' volume.
@@ -247,8 +250,14 @@ class InducedShape:
         return tuple(self.tensor.ravel().tolist())
 
     def added(self, motion: Motion) -> Added:
-        length, inertia, share = (hy.par[p] for p in (Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE))
+        which = Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE
+        length, inertia, share = (motion.given[p] for p in which)
         field, gradient, unit = motion.field, motion.gradient, share * share
+        even = float(self.tensor[0, 0])
+        if np.abs(self.tensor - even * np.eye(3)).max() <= EVEN * abs(even):
+            # as of a sphere, whatever its turn: there is no torque
+            energy = -0.5 * unit * even * dot(field, field)
+            return Added(pulled=[unit * length * even * b for b in field], energy=energy)
         if motion.axes is None:
             across, along = float(self.tensor[0, 0]), float(self.tensor[2, 2] - self.tensor[0, 0])
             lengthwise = along * dot(motion.moment, field)

@@ -35,7 +35,7 @@ from ...geometry.common import MU_0, Array, even_directions
 from ...geometry.magnets import Magnet, polarizability
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.floater import Floater
-from .effect import Added, Motion, Poses, conservative, dissipative
+from .effect import SMALLEST, ZERO, Added, Motion, Poses, conservative, dissipative
 from .state import Parameter, Scales, State, Vector, add, cross, dot, dotted, subtract
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
@@ -68,10 +68,10 @@ def fitting(degree: int) -> tuple[Array, Array]:
     return np.linalg.pinv(values), values
 
 
-def falling(size: Array) -> tuple[Array, Array]:
-    """Weights (10,) of q and q⁻³ (n,) for the size (n,) > 0, at the nodes, of what it bounds."""
+def falling(size: Array, kept: ArrayLike = True) -> tuple[Array, Array]:
+    """Weights (10,) of q and q⁻³ (n,) for the size (n,) > 0, at the nodes, of what it bounds; those not `kept` zero."""
     solve, basis = fitting(2)
-    weights = solve @ (size / size[0]) ** (-1 / FALL)
+    weights = solve @ (size / size[0]) ** (-1 / FALL) * np.asarray(kept)
     return weights, (basis @ weights) ** -FALL
 
 
@@ -92,8 +92,13 @@ class _Near:
 MUTUAL = "mutual magnetisation"
 # Degrees of u, the three of V, and xx, xy, xz, yy, yz, zz of H in a ball; V is small.
 IN_BALL = (2, *(1, 1, 1), *(2, 2, 2, 2, 2, 2))
+# The same in the smallest ball of a body that is not round: 3e-5 of the force at its surface, as much as the field errs
+IN_SMALLEST = (1, *(0, 0, 0), *(1, 1, 1, 1, 1, 1))
+# Whether q, u, V and H are odd in y where the rotor is its own mirror image, and which monomials are
+ODD_PARTS = (False, False, *(i == 1 for i in range(3)), *((a == 1) != (b == 1) for a, b in PAIRS))
+ODD_MONOMIALS = (False, *(i == 1 for i in range(3)), *((a == 1) != (b == 1) for a, b in PAIRS))
 AT_POSE = (2, *(1, 1, 1), *(0, 0, 0, 0, 0, 0))
-ALLOWED = 1e-5  # Error of the force by that of the rigid dipole
+ALLOWED, ALLOWED_IN_SMALLEST = 1e-5, 1e-4  # Error of the force by that of the rigid dipole
 WHICH = [Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE]
 STEP = 0.02  # Of the differences of `rough_force`, in floater radii
 
@@ -108,14 +113,18 @@ class Mutual(_Near):
 
     @property
     def count(self) -> int:
-        return 6 + sum(COUNT[n] for n in AT_POSE) if self.ball is None else sum(COUNT[n] for n in (2, *IN_BALL))
+        return 6 + sum(COUNT[n] for n in AT_POSE) if self.ball is None else sum(COUNT[n] for n in (2, *self._degrees))
+
+    @property
+    def _degrees(self) -> tuple[int, ...]:
+        """Of u, V and H in a ball."""
+        return IN_SMALLEST if self.ball is not None and self.ball.degree == SMALLEST else IN_BALL
 
     def added(self, motion: Motion) -> Added:
         if self.first is None:
             return conservative(self._energy, motion)
-        length, strength, share, induced = (
-            hy.par[p] for p in (Parameter.LENGTH, Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE, Parameter.INDUCED)
-        )
+        length, strength, share = (motion.given[p] for p in WHICH)
+        induced = motion.given[Parameter.INDUCED]
         flux = [share * b for b in motion.field]
         # in the unit of √energy, so that the unit of energy enters nowhere else
         away = [strength * m + induced * b for m, b in zip(motion.moment, motion.field, strict=True)]
@@ -125,10 +134,10 @@ class Mutual(_Near):
             away, start, degrees = subtract(away, centre[3:]), self.first + 6, [*AT_POSE]
         else:
             offset = self.ball.offset([length * x for x in motion.position])
-            unit, start, degrees = length * hy.par[self.ball.first + 3], self.first, [2, *IN_BALL]
+            unit, start, degrees = length * hy.par[self.ball.first + 3], self.first, [2, *self._degrees]
         basis, weights = monomials(2, offset, hy.expression(1.0)), []
-        for degree in degrees:
-            weights.append([hy.par[start + k] for k in range(COUNT[degree])])
+        for degree, kept in zip(degrees, self._kept[-len(degrees) :], strict=True):
+            weights.append([hy.par[start + k] if kept[k] else ZERO for k in range(COUNT[degree])])
             start += COUNT[degree]
         value, *rest = [polynomial(row, basis) for row in weights[-len(AT_POSE) :]]
         linear = [share * v for v in rest[:3]]
@@ -152,9 +161,15 @@ class Mutual(_Near):
                 for j in range(3)
             ],
             pulled=[(length * induced) * (a + b) for a, b in zip(induced_field, flux, strict=True)],
-            turning=[strength / hy.par[Parameter.INERTIA] * b for b in induced_field],
+            turning=[strength / motion.given[Parameter.INERTIA] * b for b in induced_field],
             energy=fall * level - 0.5 * induced * dot(motion.field, flux),
         )
+
+    @property
+    def _kept(self) -> Array:
+        """(11, 10) which weights of q, u, V and H are not zero."""
+        mirrored = self.ball is not None and self.ball.mirrored
+        return np.asarray((np.array(ODD_PARTS)[:, None] == np.array(ODD_MONOMIALS)) | (not mirrored))
 
     def _energy(self, position: Vector, moment: Vector, field: Vector) -> hy.expression:
         place = [hy.par[Parameter.LENGTH] * x for x in position]
@@ -181,15 +196,16 @@ class Mutual(_Near):
         values, slope, second = self.table.derivatives(places, np.zeros_like(places))
         parts = np.array([values, *slope[:, 3:].T, *(second[:, 3 + a, 3 + b] for a, b in PAIRS)])
         units = np.array([1.0, *[self.moment] * 3, *[self.moment**2 / 2] * len(PAIRS)])
-        quadratic, fall = falling(np.linalg.norm(units[:, None] * parts, axis=0))
+        of_size, *of_parts = self._kept
+        quadratic, fall = falling(np.linalg.norm(units[:, None] * parts, axis=0), of_size)
         numbers, missed = [quadratic], []
-        for degree, unit, part in zip(IN_BALL, units, parts, strict=True):
+        for degree, unit, part, kept in zip(self._degrees, units, parts, of_parts, strict=True):
             solve, basis = fitting(degree)
-            numbers.append(solve @ (part / fall))
+            numbers.append(solve @ (part / fall) * kept[: len(solve)])
             missed.append(unit * np.abs(fall * (basis @ numbers[-1]) - part).max())
         wrong = missed[0] + max(missed[1:4]) + max(missed[4:])
         error = 3 * wrong / (ball.radius * self.moment * float(np.linalg.norm(gradient)))
-        return np.concatenate(numbers), float(error) / ALLOWED
+        return np.concatenate(numbers), float(error) / (ALLOWED if self._degrees is IN_BALL else ALLOWED_IN_SMALLEST)
 
     def wrench(self, place: Array, direction: Array, field: Array, gradient: Array) -> tuple[Array, Array]:
         """Force (n, 3) N and torque (n, 3) N m at places and directions (n, 3), in `field` B0 and `gradient` ∇B0."""

@@ -68,6 +68,33 @@ class Parameter(IntEnum):
     MOVE_Z = auto()
 
 
+# That nothing changes during a trajectory, and those of them in which a whole number is meant where one is near
+FIXED = {
+    *(Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG, Parameter.TILT_DRAG),
+    *(Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE, Parameter.INDUCED),
+}
+OF_BODY = range(Parameter.INERTIA_X, Parameter.POINTING_Z + 1)
+SAME = 1e-12  # By which moments of inertia over their mean may differ that are taken as equal, and a moment's direction
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """The runtime parameters as expressions; where `values` are known, those that nothing changes as numbers.
+
+    In Taylor's method a product with an expression of parameters costs as much as one of two variables, a product with
+    a number a sixteenth, and one with 0 or 1 nothing. Code with numbers in it serves one floater alone.
+    """
+
+    values: Array | None = None
+
+    def __getitem__(self, which: Parameter) -> hy.expression:
+        if self.values is None or not (which in FIXED or which in OF_BODY):
+            return hy.par[which]
+        value = float(self.values[which])
+        whole = which in OF_BODY and abs(value - round(value)) < SAME
+        return hy.expression(float(round(value)) if whole else value)
+
+
 @dataclass(frozen=True, eq=False)
 class Turn:
     """The rotor's turn as scaled expressions."""

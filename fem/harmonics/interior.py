@@ -204,6 +204,12 @@ def real_basis(degree: int) -> tuple[Array, Array]:
     return np.array(members(degree)), np.where(m <= l, (-1.0) ** m * doubled[l] / factorials(degree), 0.0)
 
 
+@cache
+def odd_harmonics(degree: int) -> NDArray[np.bool_]:
+    """(K,) whether each of `members` is odd in y, or else even."""
+    return np.array([bool(part) for _, _, part in members(degree)])
+
+
 def real_weights(coefficients: Coefficients) -> Array:
     """Weights (K,), in the order of `members`, of Σ conj a_lm Υ_lm over positive and negative m."""
     (l, m, part), sizes = real_basis(len(coefficients) - 1)[0].T, real_basis(len(coefficients) - 1)[1]
@@ -254,6 +260,14 @@ class BallField:
 
     first: int  # number of the first of these parameters
     degree: int  # of the potential: 7, 8 and 9 ask for 613, 780 and 966 operations where the table of a cube has 1824
+    # whether the potential is even in y about the centre, as in the plane in which a rotor is its own mirror image:
+    # then half of the weights are zero, and are not written
+    mirrored: bool = False
+
+    @property
+    def number(self) -> int:
+        """What names its kind: the degree, negative where it is mirrored."""
+        return -self.degree if self.mirrored else self.degree
 
     @property
     def count(self) -> int:
@@ -269,13 +283,21 @@ class BallField:
         size, less = self.degree**2, (self.degree - 1) ** 2
         _, *harmonics = regular_harmonics(self.degree - 1, self.offset(position))  # the first is 1
 
-        def weighted(first: int, count: int) -> hy.expression:
-            return hy.sum([hy.par[first], *(hy.par[first + 1 + k] * h for k, h in enumerate(harmonics[: count - 1]))])
+        def weighted(first: int, kept: NDArray[np.bool_]) -> hy.expression:
+            terms = [hy.par[first + 1 + k] * h for k, h in enumerate(harmonics[: len(kept) - 1]) if kept[k + 1]]
+            return hy.sum([hy.par[first], *terms] if kept[0] else terms)
 
-        start = self.first + 4
-        field = [weighted(start + i * size, size) for i in range(3)]
-        slopes = [weighted(start + 3 * size + k * less, less) for k in range(len(UPPER))]
+        start, (of_field, of_slopes) = self.first + 4, self._kept
+        field = [weighted(start + i * size, kept) for i, kept in enumerate(of_field)]
+        slopes = [weighted(start + 3 * size + k * less, kept) for k, kept in enumerate(of_slopes)]
         return field, whole_gradient(slopes)
+
+    @property
+    def _kept(self) -> list[NDArray[np.bool_]]:
+        """Which weights of B (3, degree²) and of the gradient's entries (5, (degree - 1)²) are not zero."""
+        odd = [[i == 1 for i in range(3)], [(i == 1) != (j == 1) for i, j in UPPER]]
+        of_harmonics = (odd_harmonics(self.degree - less) for less in (1, 2))
+        return [(np.array(o)[:, None] == h) | (not self.mirrored) for o, h in zip(odd, of_harmonics, strict=True)]
 
     def fit(self, evaluate: Callable[[Array], tuple[Array, Array]], ball: Ball) -> tuple[Array, float]:
         """Values (count,) of the parameters for a field, points (n, 3) m -> B, ∇B; and the error of the expansion.
@@ -288,7 +310,10 @@ class BallField:
         incident = _by_normal_field(np.sum(field * normals, axis=1), self.degree, MORE)
         parts = [-gradient_coefficients(incident, axis) for axis in range(3)]
         slopes = [gradient_coefficients(parts[i], j) / ball.radius for i, j in UPPER]
-        weights = [np.array([real_weights(one) for one in group]) for group in (parts, slopes)]
+        weights = [
+            np.array([real_weights(one) for one in group]) * kept
+            for group, kept in zip((parts, slopes), self._kept, strict=True)
+        ]
         basis = _real_values(self.degree)
         misses = [_relative_miss(w @ basis[: w.shape[1]] - v, v) for w, v in zip(weights, known, strict=True)]
         return np.concatenate([ball.center, [1 / ball.radius], *(w.ravel() for w in weights)]), max(misses)

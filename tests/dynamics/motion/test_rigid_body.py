@@ -144,7 +144,7 @@ def test_multipoles_in_a_ball_do_what_the_body_feels():
     """Force and torque of a flight's equations against dipoles all over the body: as well as it says."""
     start = AbsoluteStart(np.array([1e-3, 0.0, -20e-3]), np.zeros(3), np.array([-0.2, 0.1, 1.0]), np.zeros(3))
     scene = replace(LEVITATING, start=start)
-    flight = Flight(scene, TABLE, 0.1)
+    flight = Flight(scene, TABLE, 0.1, in_balls=True)
     state = initial_state(scene, TABLE)[0]
     course = flight.begin(state, 0.1)
     equations = flight.equations(flight.degree(course.values))[0]
