@@ -1,6 +1,7 @@
 """Flights beside SciPy's DOP853 with magpylib's field; × real time is printed with -s."""
 
 from dataclasses import replace
+from time import process_time
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.choice import rotor_nearby
 from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.shapes import Box
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.plan import PlatePlan
@@ -23,6 +25,8 @@ LONG = 20.0
 """A flight that is so long, s, has its code optimised; what is timed is flown with such code."""
 TURNS = 2
 """Of the peer's flight."""
+ROUNDS = 5
+"""Of a sphere's and a cube's flights in turn."""
 EFFECTS = ("rigid", "mutual", "metal", "mutual and metal")
 PLATES = [("reduced", 3e-3), ("slab", 2e-4)]
 """Plate models and their accuracies."""
@@ -87,6 +91,36 @@ def test_flight_with_effects(benchmark, start, effects):
     trajectory = benchmark.pedantic(lambda: integrate(flight, start, 1.0, None), rounds=3, warmup_rounds=1)
     operations = [len(part.integrator.decomposition) for part in flight.parts.values()]
     print(f"\n{effects}: {operations} operations, {trajectory.realtime_factor:.0f} x real time")
+    benchmark.extra_info["error"] = f"energy balance {trajectory.energy_error:.0e} in 110 turns"
+    assert trajectory.ended_by == "duration"
+
+
+@pytest.mark.benchmark(group="a simulated second at 110 Hz")
+@pytest.mark.parametrize("effects", ["rigid", "mutual"], ids=["cube, rigid", "cube, mutual"])
+def test_flight_of_a_cube(benchmark, effects):
+    """A cube of the sphere's volume, as `simulate` follows it for ten seconds: beside the sphere, each in turn."""
+    edge = FREE.floater.volume ** (1 / 3)
+    cube = replace(FREE.floater, radius=edge * 3**0.5 / 2, body=Box((edge,) * 3))
+    flights = []
+    for scene in (FREE, replace(FREE, floater=cube)):
+        levitation = Levitation(scene, Models("fem", "none", interaction=effects))
+        begun = initial_state(scene, levitation.interaction, levitation.equilibria)[0]
+        flights.append((Flight(scene, levitation.interaction, 10.0), begun))
+        integrate(*flights[-1], 0.1)
+    times = np.zeros((ROUNDS, 2))
+    for row in times:
+        for k, flight in enumerate(flights):
+            before = process_time()
+            integrate(*flight, 5.0)
+            row[k] = process_time() - before
+    trajectory = benchmark.pedantic(lambda: integrate(*flights[1], 1.0), rounds=3)
+    sphere, own = times.min(axis=0) / 5.0
+    operations = [len(next(iter(flight.parts.values())).integrator.decomposition) for flight, _ in flights]
+    print(
+        f"\n{effects}: a second of the sphere takes {1e3 * sphere:.1f} ms, of the cube {1e3 * own:.1f} ms, "
+        f"{own / sphere:.2f} times as long; {operations[0]} and {operations[1]} operations, "
+        f"{trajectory.steps / FREE.frequency:.1f} steps a turn of the cube"
+    )
     benchmark.extra_info["error"] = f"energy balance {trajectory.energy_error:.0e} in 110 turns"
     assert trajectory.ended_by == "duration"
 

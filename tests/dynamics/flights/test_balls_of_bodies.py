@@ -18,7 +18,7 @@ from spinlev.dynamics.motion.equations import equations_of_motion
 from spinlev.dynamics.motion.floater_effects import InducedShape
 from spinlev.fem.harmonics.interior import Ball, BallField
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry.rotor import tilt
+from spinlev.geometry.magnets import tilt
 from spinlev.geometry.scene.contents import AbsoluteStart
 from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box, rotation_matrix
