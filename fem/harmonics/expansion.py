@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import heyoka as hy
 import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
 
 from ...geometry.common import Array, frozen_array
 from ...geometry.magnets import Magnet
@@ -26,7 +28,7 @@ from .solid import (
     gauss_legendre,
     irregular_gradient,
     irregular_values,
-    outer_totals,
+    members,
     real_terms,
     regular_derivative,
     rotated_harmonics,
@@ -162,13 +164,7 @@ class MultipoleExpansion:
 
     def sums(self, order: int) -> OuterSums:
         """The sums that `derivatives` are, of places in radii from the centre."""
-        if order not in self._known_sums:
-            self._known_sums[order] = OuterSums.of(self._slopes(order))
-        return self._known_sums[order]
-
-    @cached_property
-    def _known_sums(self) -> dict[int, OuterSums]:
-        return {}
+        return OuterSums.of(self._slopes(order))
 
     def _slopes(self, order: int) -> list[Coefficients]:
         """Coefficients, of one size, of what `derivatives` gives."""
@@ -191,9 +187,18 @@ class MultipoleExpansion:
 
 
 def summed_derivatives(expansions: Sequence[MultipoleExpansion], points: Array, order: int) -> Array:
-    """`derivatives` (n, k) of all `expansions` together at `points` (n, 3) m."""
-    places = np.array([(points - one.center) / one.radius for one in expansions])
-    return outer_totals([one.sums(order) for one in expansions], places)
+    """`derivatives` (n, k) of all `expansions` together at points (n, 3) m, or each at its own (expansions, n, 3)."""
+    sums, centers, radii, numbers = _joined(tuple(expansions), order)
+    places = points if points.ndim == 2 else points[numbers]
+    return sums.totals((places - centers[:, None]) / radii[:, None, None])
+
+
+@lru_cache(maxsize=32)  # a table is asked for by thousands of calls, of one point often
+def _joined(expansions: tuple[MultipoleExpansion, ...], order: int) -> tuple[OuterSums, Array, Array, NDArray[np.intp]]:
+    """The sums of all expansions, the centres (k, 3) m and radii (k,) m about which they are, and their numbers."""
+    sums, numbers = OuterSums.joined([one.sums(order) for one in expansions])
+    centers, radii = np.array([one.center for one in expansions]), np.array([one.radius for one in expansions])
+    return sums, centers[numbers], radii[numbers], numbers
 
 
 def turned_expressions(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:
@@ -388,3 +393,52 @@ def _with(expansion: MultipoleExpansion, parts: list[Part], number: int) -> Mult
     for _, l, m, value in mine:
         coefficients[l, m] += value
     return replace(expansion, coefficients=rotated_harmonics(coefficients, expansion.axes))
+
+
+HELD = 1e-11  # what a squared weight of a fit costs, so that those of pieces beside each other do not run wild
+
+
+class FittedExpansions:
+    """Expansions about several places with the field of sources between them, fitted to it all around these.
+
+    Parameters
+    ----------
+    centers, radii : (k, 3) m and (k,) m of the expansions
+    degree : of each, 2 at least
+    points, allowed : (n, 3) m on a surface about the sources, and (n,) T by which errors count there
+    """
+
+    def __init__(self, centers: Array, radii: Array, degree: int, points: Array, allowed: Array) -> None:
+        nothing, self.points, self._allowed = np.zeros((degree + 1, degree + 1), complex), points, allowed
+        self._empty = [MultipoleExpansion(*one, nothing) for one in zip(centers, radii.tolist(), strict=True)]
+        parts = [(l, m, 1j if part else 1.0) for l, m, part in members(degree) if l]
+        fields = np.concatenate([_fields(one, [(0, *part) for part in parts], points) for one in self._empty])
+        degrees = np.tile([part[0] for part in parts], len(centers))
+        # the highest degree last, so that the factor without it is a corner of the whole
+        order, self._fewer = np.argsort(degrees, kind="stable"), int(np.sum(degrees < degree))
+        self._parts = [(i // len(parts), *parts[i % len(parts)]) for i in order.tolist()]
+        fields /= allowed[:, None]
+        self._columns = fields.reshape(len(fields), -1)[order]  # hundreds of megabytes
+        del fields
+        self._size = np.linalg.norm(self._columns, axis=1)
+        self._columns /= self._size[:, None]
+        square = self._columns @ self._columns.T
+        square[np.diag_indices_from(square)] += HELD * len(square)
+        self._factor = scipy.linalg.cholesky(square, lower=True, overwrite_a=True)
+
+    def of(self, field: Array) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
+        """The expansions of a field (n, 3) T at the points, and what of them the highest degree does.
+
+        That is the error of one degree less, three or four times their own.
+        """
+        right = self._columns @ (field / self._allowed[:, None]).ravel()
+        whole, fewer = (
+            scipy.linalg.cho_solve((self._factor[:count, :count], True), right[:count]) / self._size[:count]
+            for count in (len(right), self._fewer)
+        )
+        step = np.concatenate([whole[: self._fewer] - fewer, whole[self._fewer :]])
+        return self._made(whole), self._made(step)
+
+    def _made(self, factors: Array) -> list[MultipoleExpansion]:
+        values = [(k, l, m, factor * value) for (k, l, m, value), factor in zip(self._parts, factors, strict=True)]
+        return [_with(one, values, k) for k, one in enumerate(self._empty)]

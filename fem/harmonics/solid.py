@@ -26,7 +26,9 @@ Member = tuple[int, int, int]  # l, m, and 0 for the real or 1 for the imaginary
 FOUR_PI = 4 * np.pi
 
 CHUNK = 4096  # points at once, so that the harmonics of all degrees fit in memory
-BLOCK = 256  # points at once of sums, so that they fit in the processor's cache
+# Points at once of sums, more of few degrees as far as their harmonics are so many numbers, and terms times points: so
+# that they fit in the processor's cache
+BLOCK, NUMBERS, TERMS = 256, 1 << 16, 1 << 14
 FACTORIALS = np.array([float(math.factorial(n)) for n in range(171)])  # all that a double can hold
 
 
@@ -121,60 +123,80 @@ def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) ->
 
 @dataclass(frozen=True, eq=False)
 class OuterSums:
-    """Sums Σ c_lm Θ_lm of k functions: the real harmonics that any of them has, and their weights."""
+    """Sums Σ c_lm Θ_lm of k functions, about one centre or several: the real harmonics they have, and their weights."""
 
-    degree: int
-    orders: tuple[NDArray[np.intp], ...]  # l and m of those with cos mφ, then of those with sin mφ
+    degrees: Array  # of each centre, falling
+    # l, m and number of the centre of those with cos mφ, then of those with sin mφ; centre by centre
+    orders: tuple[tuple[NDArray[np.intp], ...], ...]
     weights: tuple[Array, Array]  # (count, k) of each kind
 
     @classmethod
     def of(cls, coefficients: Sequence[Coefficients]) -> Self:
-        """Of arrays c of one size."""
+        """Of arrays c of one size, about one centre."""
         stacked = np.stack(coefficients, axis=-1)
         m = np.arange(len(stacked))
         sizes = (np.sqrt(factorials(len(stacked) - 1)) * np.where(m, 2.0, 1.0))[..., None]
         parts = stacked.real * sizes, np.where(m[:, None], -stacked.imag, 0.0) * sizes
-        l, m, u, v = (index for part in parts for index in np.nonzero(part.any(axis=2)))
-        return cls(len(stacked) - 1, (l, m, u, v), (parts[0][l, m], parts[1][u, v]))
+        orders = tuple(np.nonzero(part.any(axis=2)) for part in parts)
+        return cls(
+            np.array([len(stacked) - 1]),
+            tuple((l, m, np.zeros_like(l)) for l, m in orders),
+            (parts[0][orders[0]], parts[1][orders[1]]),
+        )
 
+    @classmethod
+    def joined(cls, sums: Sequence[Self]) -> tuple[Self, NDArray[np.intp]]:
+        """Of several centres together, and their numbers (sums,) in the order in which it has them."""
+        order = np.argsort([-one.degrees[0] for one in sums], kind="stable")
+        chosen = [sums[k] for k in order]
+        orders = [
+            (*(np.concatenate([one.orders[kind][i] for one in chosen]) for i in (0, 1)),
+             np.repeat(np.arange(len(chosen)), [len(one.weights[kind]) for one in chosen]))
+            for kind in (0, 1)
+        ]  # fmt: skip
+        weights = [np.concatenate([one.weights[kind] for one in chosen]) for kind in (0, 1)]
+        return cls(np.array([one.degrees[0] for one in chosen]), tuple(orders), (weights[0], weights[1])), order
 
-def outer_totals(sums: Sequence[OuterSums], places: Array) -> Array:
-    """Totals (n, k) of sums each of which has its own place of each point: (sums, n, 3).
+    def totals(self, places: Array) -> Array:
+        """Totals (n, k) of all centres, from each of which every point has its place: (centres, n, 3).
 
-    At few points many sums share the steps of the recurrences, of which 27 expansions would else ask for 600.
-    """
-    order = np.argsort([-one.degree for one in sums], kind="stable")
-    together = max(1, BLOCK // max(places.shape[1], 1))
-    result = np.zeros((places.shape[1], sums[0].weights[0].shape[1]))
-    for first in range(0, len(sums), together):
-        chosen = order[first : first + together]
-        for start in range(0, len(result), BLOCK):
-            here = slice(start, start + BLOCK)
-            result[here] += _totals([sums[k] for k in chosen], places[chosen, here])
-    return result
+        At few points many centres share the steps of the recurrences, of which 27 expansions would else ask for 600.
+        """
+        block = max(BLOCK, NUMBERS // int(self.degrees[0] + 1) ** 2)
+        together = max(1, block // max(places.shape[1], 1))
+        result = np.zeros((places.shape[1], self.weights[0].shape[1]))
+        for first in range(0, len(places), together):
+            for start in range(0, len(result), block):
+                here = slice(start, start + block)
+                result[here] += self._part(first, places[first : first + together, here])
+        return result
 
-
-def _totals(sums: Sequence[OuterSums], places: Array) -> Array:
-    """`outer_totals` of sums with falling degrees at points that fit in the cache together."""
-    count, points = places.shape[1], places.reshape(-1, 3)
-    square = np.einsum("na,na->n", points, points)
-    x, y, z = points.T / square
-    ends = [count * sum(one.degree >= l for one in sums) for l in range(sums[0].degree + 1)]
-    zonal, power = _zonal(ends, z, 1 / square), np.empty((len(ends), len(points)), complex)
-    power[0], across = 1 / np.sqrt(square), x + 1j * y
-    for order, end in enumerate(ends[1:], 1):
-        np.multiply(power[order - 1, :end], -np.sqrt(1 - 0.5 / order) * across[:end], out=power[order, :end])
-    total = np.zeros((count, sums[0].weights[0].shape[1]))
-    for k, one in enumerate(sums):
-        (l, m, u, v), (even, odd), here = one.orders, one.weights, slice(k * count, (k + 1) * count)
-        total += (zonal[l, m, here] * power.real[m, here]).T @ even
-        total += (zonal[u, v, here] * power.imag[v, here]).T @ odd
-    return total
+    def _part(self, first: int, places: Array) -> Array:
+        """`totals` of the centres from a `first` one on, at points that fit in the cache together."""
+        (centers, count), points = places.shape[:2], places.reshape(-1, 3)
+        degrees = self.degrees[first : first + centers]
+        square = np.einsum("na,na->n", points, points)
+        x, y, z = points.T / square
+        ends = [count * int(np.sum(degrees >= l)) for l in range(degrees[0] + 1)]
+        zonal, power = _zonal(ends, z, 1 / square), np.empty((len(ends), len(points)), complex)
+        power[0], across = 1 / np.sqrt(square), x + 1j * y
+        for order, end in enumerate(ends[1:], 1):
+            np.multiply(power[order - 1, :end], -np.sqrt(1 - 0.5 / order) * across[:end], out=power[order, :end])
+        total = np.zeros((count, self.weights[0].shape[1]))
+        shape, step = (centers, count), max(1, TERMS // count)
+        for (l, m, k), weights, part in zip(self.orders, self.weights, (power.real, power.imag), strict=True):
+            begin, end = np.searchsorted(k, (first, first + centers))
+            heights, across = zonal.reshape(*zonal.shape[:2], *shape), part.reshape(len(ends), *shape)
+            for start in range(begin, end, step):
+                here = slice(start, min(start + step, end))
+                values = heights[l[here], m[here], k[here] - first] * across[m[here], k[here] - first]
+                total += values.T @ weights[here]
+        return total
 
 
 def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
     """Σ c_lm Θ_lm (n, k) at points (n, 3), for k arrays c of one size."""
-    return outer_totals([OuterSums.of(coefficients)], points[None])
+    return OuterSums.of(coefficients).totals(points[None])
 
 
 def _zonal(ends: Sequence[int], z: Array, square: Array) -> Array:

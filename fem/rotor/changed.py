@@ -17,7 +17,8 @@ from .models import (
     DEGREE,
     Accuracy,
     Rotor,
-    charged_expansions,
+    charged_expansion,
+    converging,
     error_points,
     extrapolated_tail,
     nonzero,
@@ -79,7 +80,8 @@ def follows(table: RotorTable, rotor: Rotor) -> bool:
 @lru_cache(maxsize=8)
 def _bear_charges(rotor: Rotor) -> bool:
     accuracy = Accuracy()
-    return not without_charges(rotor, accuracy, error_points(rotor, accuracy.clearance(rotor))[0])
+    points = error_points(rotor, accuracy.clearance(rotor))[0]
+    return not without_charges(rotor, accuracy, points) and all(converging(rotor, accuracy, points))
 
 
 def _numbers(rotor: Rotor) -> list[tuple[Any, ...]]:
@@ -111,12 +113,12 @@ def _closed(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:
 @lru_cache(maxsize=8)  # of the magnets that others differ from it is asked for again and again
 def _with_charges(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:
     carriers = tuple(carrier(magnet) for magnet in rotor)
-    charges = (
-        charged_expansions(SurfaceCharges(rotor, STEADY_NODES), carriers, STEADY_DEGREE)
-        if any(m.contrast for m in rotor)
-        else []
-    )
-    return tuple(one for one in carriers if one.polarization.any()), tuple(charges)
+    found = []
+    if any(m.contrast for m in rotor):
+        surfaces = SurfaceCharges(rotor, STEADY_NODES)
+        charges = surfaces.beyond(carriers)
+        found = [charged_expansion(surfaces, k, charges, STEADY_DEGREE) for k in range(len(surfaces.magnets))]
+    return tuple(one for one in carriers if one.polarization.any()), tuple(found)
 
 
 def magnified(rotor: Rotor, other: Rotor) -> tuple[float, float] | None:

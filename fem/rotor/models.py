@@ -20,9 +20,17 @@ from ...geometry.solids import Part, places_off
 from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from ..elements.surface import SurfaceCharges, bears_charges, gap
-from ..harmonics.expansion import MOST, MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
+from ..harmonics.expansion import (
+    MOST,
+    FittedExpansions,
+    MultipoleExpansion,
+    summed_derivatives,
+    trimmed_expansions,
+    uniform_moments,
+    without_noise,
+)
 from ..harmonics.solid import FOUR_PI, weighted_sums
-from .table import KNOWN, RotorTable
+from .table import CHARGES, KNOWN, PIECES, RotorTable
 
 # Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
@@ -286,6 +294,13 @@ FITTED = 40  # coefficients up to which a fit of them takes less than the charge
 SOME = 5  # every so many places are looked at from step to step
 
 
+# Beside a magnet where its moments do not converge: distances between expansions on its surface, by that at which the
+# field is to hold; their degree and the most coefficients of all; places by coefficients of a fit, and other directions
+# in which it is looked at; and what it may miss of the tolerance
+SPACINGS, BESIDE_DEGREE, MOST_FITTED, ROWS, OTHERS, MISSED = (1.0, 0.8, 0.65, 0.5, 0.4), 2, 4000, 0.6, 500, 0.2
+CANDIDATES = 5  # by which nodes are denser than the expansions that take some of them as centres
+
+
 def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
     """Why charges on their surfaces do not describe the magnets; empty where they do.
 
@@ -303,10 +318,68 @@ def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
     for first, second in combinations([magnet.body for magnet in permeable], 2):
         if not (isinstance(first, Box) and isinstance(second, Box)) and gap(first, second) < CONTACT:
             return "two of them, of which one is round, touch"
-    if permeable and min(_ratios(permeable, points)) < _least_ratio(magnets, accuracy.rtol):
-        # pieces of it would do, but of charges on half a face moments are poor, and sums of pieces are charged
-        return f"one is so long or flat that its moments do not converge {accuracy.clearance(magnets) * 1e3:.3g} mm off"
+    clearance = accuracy.clearance(magnets)
+    for magnet, whole in zip(permeable, converging(magnets, accuracy, points), strict=True):
+        if not whole and 8 * magnet.body.area / (SPACINGS[0] * clearance) ** 2 > MOST_FITTED:
+            return f"one is so large that too many pieces would make up its field {clearance * 1e3:.3g} mm off"
     return ""
+
+
+def _spread_over(magnet: Magnet, spacing: float) -> Array:
+    """Places (k, 3) m all over a magnet's surface, no nearer to each other than a spacing, m."""
+    count = int(np.ceil(CANDIDATES * float(magnet.body.size.max()) / spacing / 2))
+    nodes = SurfaceCharges([magnet], count)
+    places, _ = nodes.refined(0, np.zeros(len(nodes.areas)))
+    chosen, farthest, apart = list[int](), 0, np.full(len(places), np.inf)
+    while apart[farthest] > spacing:
+        chosen.append(farthest)
+        apart = np.minimum(apart, np.linalg.norm(places - places[farthest], axis=1))
+        farthest = int(np.argmax(apart))
+    return np.asarray(places[chosen])
+
+
+def _fitted_beside(
+    magnets: Rotor, accuracy: Accuracy, surfaces: SurfaceCharges, number: int, charges: Array
+) -> tuple[FittedExpansions, float]:
+    """Expansions on one of the `surfaces`' magnets, as many as its `charges` (n,) T need, and what they may miss.
+
+    They are fitted to the field at the clearance from the magnet, and so are as exact outside. That is known from other
+    places, in units of what the highest degree does.
+    """
+    magnet, clearance, mine = surfaces.magnets[number], accuracy.clearance(magnets), surfaces.owner == number
+    # seen from the centre all of it but the hole of a ring
+    off = surfaces.places[mine] + clearance * surfaces.normals[mine]
+    off = off[magnet.body.distance(off) >= clearance * (1 - 1e-6)]
+
+    def at(directions: Array, more: Array) -> tuple[Array, Array, Array]:
+        points = np.concatenate([places_off(magnet.body, directions, clearance), more])
+        scale = typical_field(magnets, points)
+        allowed = accuracy.rtol * np.minimum(scale, 2 * np.median(scale))
+        return points, allowed, surfaces.field_beside(number, charges, points)
+
+    others = np.random.default_rng(3).normal(size=(OTHERS, 3))
+    elsewhere, allowed, wanted = at(others / np.linalg.norm(others, axis=1)[:, None], off[1::2])
+    found = None
+    for spacing in SPACINGS:
+        centers = _spread_over(magnet, spacing * clearance)
+        count = len(centers) * ((BESIDE_DEGREE + 1) ** 2 - 1)
+        if found and count > MOST_FITTED:
+            break
+        points, weights, field = at(even_directions(max(int(ROWS * count), NEAR)), off[::2])
+        fit = FittedExpansions(centers, np.full(len(centers), clearance / 3), BESIDE_DEGREE, points, weights)
+        own, step = (summed_derivatives(parts, elsewhere, 1) for parts in fit.of(field))
+        missed, most = (np.max(np.linalg.norm(b, axis=1) / allowed) for b in (own - wanted, step))
+        found = fit, float(2 * missed / most)
+        if missed <= MISSED:
+            break
+    assert found
+    return found
+
+
+def converging(magnets: Rotor, accuracy: Accuracy, points: Array) -> list[bool]:
+    """Of each permeable magnet, whether its moments converge at all `points` (n, 3) m, as those of compact ones do."""
+    least = _least_ratio(magnets, accuracy.rtol)
+    return [ratio >= least for ratio in _ratios([magnet for magnet in magnets if magnet.contrast], points)]
 
 
 def _ratios(magnets: Sequence[Magnet], points: Array) -> list[float]:
@@ -340,13 +413,13 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
 
     Parameters
     ----------
-    magnets : compact cuboids, cylinders, rings and spheres, m and T in the rotor's frame
+    magnets : cuboids, cylinders, rings and spheres, m and T in the rotor's frame
     accuracy : asked for
     watch : called with the progress
 
     Raises
     ------
-    InputError : a magnet has two permeabilities, is a part from a file, or is not compact; or round ones touch
+    InputError : a magnet has two permeabilities, is a part from a file, or is far too large; or round ones touch
     """
     start = time.perf_counter()
     points, scale = error_points(magnets, accuracy.clearance(magnets))
@@ -356,20 +429,33 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
             f"{reason}. Choose --model fem."
         )
     carriers, permeable = tuple(carrier(magnet) for magnet in magnets), [m for m in magnets if m.contrast]
-    ratios = _ratios(permeable, points)
-    degree = _degree(permeable, ratios, accuracy.rtol / 10)
+    converge = converging(magnets, accuracy, points)
+    compact = [magnet for magnet, converges in zip(permeable, converge, strict=True) if converges]
+    ratios = _ratios(compact, points)
+    degree = _degree(compact, ratios, accuracy.rtol / 10)
 
-    whole, steps, before, count = list[MultipoleExpansion](), list[MultipoleExpansion](), np.inf, 0
-    surfaces: SurfaceCharges | None = None
-    for k, more in enumerate(NODES if permeable else ()):
+    whole, steps, tail, pieces, before, count = *(list[MultipoleExpansion]() for _ in range(4)), np.inf, 0
+    surfaces, fits = None, list[tuple[FittedExpansions, float] | None]()
+    # the fewest nodes do not show what pieces of a magnet need
+    for k, more in enumerate(NODES[len(compact) < len(permeable) :] if permeable else ()):
         if k > 1 and surfaces and surfaces.numbers_at(more) > LARGEST:
             break
         count, surfaces = more, SurfaceCharges(magnets, more)
-        coarse, whole = whole, charged_expansions(surfaces, carriers, degree)
+        charges = surfaces.beyond(carriers)
+        fits = fits or [
+            None if converges else _fitted_beside(magnets, accuracy, surfaces, number, charges)
+            for number, converges in enumerate(converge)
+        ]
+        single = [charged_expansion(surfaces, i, charges, degree) for i, one in enumerate(fits) if not one]
+        tail = extrapolated_tail(single, min(ratios, default=CONVERGENCE))
+        coarse, whole, pieces = whole, single, []
+        for number, (fit, share) in ((i, one) for i, one in enumerate(fits) if one):
+            own, last = fit.of(surfaces.field_beside(number, charges, fit.points))
+            whole, pieces = whole + own, pieces + [replace(e, coefficients=share * e.coefficients) for e in last]
         if not k:
             continue
         step = [replace(b, coefficients=b.coefficients - a.coefficients) for a, b in zip(coarse, whole, strict=True)]
-        missed = sum(part.evaluate(points[::SOME])[0] for part in step)
+        missed = summed_derivatives(step, points[::SOME], 1)
         size = float(np.max(np.linalg.norm(missed, axis=1) / scale[::SOME]))
         rate = float(np.clip(size / before, FASTEST_RATE, SLOWEST_RATE)) if np.isfinite(before) else FIRST_RATE
         left, before = RATE_SAFETY * rate / (1 - rate), size
@@ -377,8 +463,9 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
         watch("charges on the surfaces", k / len(NODES))
         if left * size <= accuracy.rtol / 4:
             break
-    tail = extrapolated_tail(whole, min(ratios, default=CONVERGENCE))
-    known = {cause: nonzero(parts) for cause, parts in (("discretisation", steps), ("tail", tail)) if nonzero(parts)}
+    alone = len(tail)
+    causes = {"discretisation": steps[:alone], "tail": tail, PIECES: pieces, CHARGES: steps[alone:]}
+    known = {cause: parts for cause, some in causes.items() if (parts := nonzero(some))}
     polarized = tuple(one for one in carriers if one.polarization.any())
     table = RotorTable("surface", magnets, polarized, tuple(whole), known)
     table = _trimmed(table, accuracy, (points, scale), BETWEEN / 20, 1.0, FITTED)
@@ -386,16 +473,14 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     return replace(table, provenance={"nodes": count, "seconds": time.perf_counter() - start})
 
 
-def charged_expansions(surfaces: SurfaceCharges, carriers: Rotor, degree: int) -> list[MultipoleExpansion]:
-    """Expansions of the charges on permeable magnets beside the polarised `carriers`, up to a degree."""
-    beyond, found = surfaces.beyond(carriers), list[MultipoleExpansion]()
-    for k, body in enumerate(magnet.body for magnet in surfaces.magnets):
-        (places, amounts), radius = surfaces.refined(k, beyond), body.circumradius
-        weights = amounts[:, None] / (FOUR_PI * radius**2)
-        (sums,) = weighted_sums(degree, (places - body.center) / radius, weights)
-        sums[0] = 0.0  # a magnet has no charge
-        found.append(MultipoleExpansion(body.center, radius, without_noise(np.conj(sums), 1e-15)))
-    return found
+def charged_expansion(surfaces: SurfaceCharges, number: int, charges: Array, degree: int) -> MultipoleExpansion:
+    """Expansion, up to a degree, of `charges` (n,) T on one of the surfaces' magnets, about its centre."""
+    body = surfaces.magnets[number].body
+    (places, amounts), radius = surfaces.refined(number, charges), body.circumradius
+    weights = amounts[:, None] / (FOUR_PI * radius**2)
+    (sums,) = weighted_sums(degree, (places - body.center) / radius, weights)
+    sums[0] = 0.0  # a magnet has no charge
+    return MultipoleExpansion(body.center, radius, without_noise(np.conj(sums), 1e-15))
 
 
 def _warn_beyond(table: RotorTable, accuracy: Accuracy, points: Array, scale: Array) -> float:
