@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ...geometry.common import MU_0, Array, InputError, Watch, even_directions, unwatched
 from ...geometry.cutting import CONVERGENCE, cells_of, cut_magnets
@@ -295,10 +296,12 @@ SOME = 5  # every so many places are looked at from step to step
 
 
 # Beside a magnet where its moments do not converge: distances between expansions on its surface, by that at which the
-# field is to hold; their degree and the most coefficients of all; places by coefficients of a fit, and other directions
-# in which it is looked at; and what it may miss of the tolerance
-SPACINGS, BESIDE_DEGREE, MOST_FITTED, ROWS, OTHERS, MISSED = (1.0, 0.8, 0.65, 0.5, 0.4), 2, 4000, 0.6, 500, 0.2
-CANDIDATES = 5  # by which nodes are denser than the expansions that take some of them as centres
+# field is to hold; their degree and the most coefficients of all; nodes by their number, at least; points by
+# coefficients of a fit, and others at which it is looked at; and what it may miss of the tolerance
+SPACINGS, BESIDE_DEGREE, MOST_FITTED = (1.0, 0.8, 0.65, 0.5, 0.4), 2, 4000
+DENSER, ROWS, OTHERS, MISSED = 12, 0.7, 1000, 0.2
+# Nodes beside each other whose normals are mixed; and how much nearer than the clearance that may lead
+BESIDE_EACH_OTHER, NEARER = 16, 0.9
 
 
 def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
@@ -320,22 +323,39 @@ def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
             return "two of them, of which one is round, touch"
     clearance = accuracy.clearance(magnets)
     for magnet, whole in zip(permeable, converging(magnets, accuracy, points), strict=True):
-        if not whole and 8 * magnet.body.area / (SPACINGS[0] * clearance) ** 2 > MOST_FITTED:
+        if whole:
+            continue
+        if 8 * magnet.body.area / (SPACINGS[0] * clearance) ** 2 > MOST_FITTED:
             return f"one is so large that too many pieces would make up its field {clearance * 1e3:.3g} mm off"
+        if len(SurfaceCharges([magnet], NODES[1]).places) ** 2 > LARGEST:
+            return "one is so long or flat that its charges would take too much memory"
     return ""
 
 
-def _spread_over(magnet: Magnet, spacing: float) -> Array:
-    """Places (k, 3) m all over a magnet's surface, no nearer to each other than a spacing, m."""
-    count = int(np.ceil(CANDIDATES * float(magnet.body.size.max()) / spacing / 2))
-    nodes = SurfaceCharges([magnet], count)
-    places, _ = nodes.refined(0, np.zeros(len(nodes.areas)))
-    chosen, farthest, apart = list[int](), 0, np.full(len(places), np.inf)
-    while apart[farthest] > spacing:
+def _spread(points: Array, spacing: float, most: int) -> Array:
+    """Some of the points (n, 3) m, all over where they are: no nearer to each other than a spacing (m), or the `most`."""
+    chosen, farthest, apart = list[int](), 0, np.full(len(points), np.inf)
+    while apart[farthest] > spacing and len(chosen) < most:
         chosen.append(farthest)
-        apart = np.minimum(apart, np.linalg.norm(places - places[farthest], axis=1))
+        apart = np.minimum(apart, np.linalg.norm(points - points[farthest], axis=1))
         farthest = int(np.argmax(apart))
-    return np.asarray(places[chosen])
+    return np.asarray(points[chosen])
+
+
+def _all_around(nodes: SurfaceCharges, clearance: float, seed: int) -> Array:
+    """Points (n, 3) m at the clearance (m) from a magnet with `nodes`, about edges and corners and in holes, too."""
+    generator, near = np.random.default_rng(seed), cKDTree(nodes.places).query(nodes.places, BESIDE_EACH_OTHER)[1]
+    count = np.arange(len(near))
+    # about an edge or a corner lie nodes of several faces
+    shares = generator.dirichlet(np.ones(3), len(near))
+    normals = [
+        nodes.normals,
+        *(nodes.normals[near[count, generator.integers(near.shape[1], size=len(near))]] for _ in "ab"),
+    ]
+    away = np.einsum("nk,kna->na", shares, normals)
+    away /= np.maximum(np.linalg.norm(away, axis=1), np.finfo(float).tiny)[:, None]
+    points = nodes.places + clearance * away
+    return np.asarray(points[nodes.magnets[0].body.distance(points) >= NEARER * clearance])
 
 
 def _fitted_beside(
@@ -346,26 +366,28 @@ def _fitted_beside(
     They are fitted to the field at the clearance from the magnet, and so are as exact outside. That is known from other
     places, in units of what the highest degree does.
     """
-    magnet, clearance, mine = surfaces.magnets[number], accuracy.clearance(magnets), surfaces.owner == number
-    # seen from the centre all of it but the hole of a ring
-    off = surfaces.places[mine] + clearance * surfaces.normals[mine]
-    off = off[magnet.body.distance(off) >= clearance * (1 - 1e-6)]
+    magnet, clearance = surfaces.magnets[number], accuracy.clearance(magnets)
+    most = DENSER * magnet.body.area / (SPACINGS[-1] * clearance) ** 2
+    nodes = SurfaceCharges([magnet], int(np.ceil(4 * np.sqrt(most / len(SurfaceCharges([magnet], 4).places)))))
+    around = _all_around(nodes, clearance, 3)
 
-    def at(directions: Array, more: Array) -> tuple[Array, Array, Array]:
-        points = np.concatenate([places_off(magnet.body, directions, clearance), more])
+    def at(points: Array) -> tuple[Array, Array]:
+        """What is allowed at points, and the field."""
         scale = typical_field(magnets, points)
         allowed = accuracy.rtol * np.minimum(scale, 2 * np.median(scale))
-        return points, allowed, surfaces.field_beside(number, charges, points)
+        return allowed, surfaces.field_beside(number, charges, points)
 
-    others = np.random.default_rng(3).normal(size=(OTHERS, 3))
-    elsewhere, allowed, wanted = at(others / np.linalg.norm(others, axis=1)[:, None], off[1::2])
+    elsewhere = _all_around(nodes, clearance, 4)
+    elsewhere = elsewhere[:: 1 + len(elsewhere) // OTHERS]
+    allowed, wanted = at(elsewhere)
     found = None
     for spacing in SPACINGS:
-        centers = _spread_over(magnet, spacing * clearance)
+        centers = _spread(nodes.places, spacing * clearance, len(nodes.places))
         count = len(centers) * ((BESIDE_DEGREE + 1) ** 2 - 1)
         if found and count > MOST_FITTED:
             break
-        points, weights, field = at(even_directions(max(int(ROWS * count), NEAR)), off[::2])
+        points = _spread(around, 0.0, max(int(ROWS * count), NEAR))
+        weights, field = at(points)
         fit = FittedExpansions(centers, np.full(len(centers), clearance / 3), BESIDE_DEGREE, points, weights)
         own, step = (summed_derivatives(parts, elsewhere, 1) for parts in fit.of(field))
         missed, most = (np.max(np.linalg.norm(b, axis=1) / allowed) for b in (own - wanted, step))
