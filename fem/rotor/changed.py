@@ -13,16 +13,14 @@ from ..closed_forms.moments import carrier
 from ..elements.surface import SurfaceCharges
 from ..harmonics.expansion import MultipoleExpansion, uniform_moments
 from ..harmonics.solid import rotated_harmonics
+from .charges import charged_expansion, converging, without_charges
 from .models import (
     DEGREE,
     Accuracy,
     Rotor,
-    charged_expansion,
-    converging,
     error_points,
     extrapolated_tail,
     nonzero,
-    without_charges,
 )
 from .table import RotorTable
 

@@ -11,6 +11,7 @@ from ...geometry.cutting import united
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box
 from ..elements.surface import smooth
+from .charges import surface_table, without_charges
 from .models import (
     Accuracy,
     cuboid_table,
@@ -19,8 +20,6 @@ from .models import (
     fem_table,
     moment_error,
     moments_table,
-    surface_table,
-    without_charges,
 )
 from .table import ROTOR, RotorTable, alike
 

@@ -6,32 +6,26 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ...geometry.common import MU_0, Array, InputError, Watch, even_directions, unwatched
 from ...geometry.cutting import CONVERGENCE, cells_of, cut_magnets
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.overlap import closing_shifts
-from ...geometry.shapes import Box, Sphere
+from ...geometry.shapes import Sphere
 from ...geometry.solids import Part, places_off
 from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
-from ..elements.surface import SurfaceCharges, bears_charges, gap
 from ..harmonics.expansion import (
     MOST,
-    FittedExpansions,
     MultipoleExpansion,
-    summed_derivatives,
     trimmed_expansions,
     uniform_moments,
     without_noise,
 )
-from ..harmonics.solid import FOUR_PI, weighted_sums
-from .table import CHARGES, KNOWN, PIECES, RotorTable
+from .table import KNOWN, RotorTable
 
 # Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
@@ -235,7 +229,7 @@ def fem_table(
     """
     accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
     clearance = accuracy.clearance(magnets)
-    cut = cut_magnets(magnets, clearance, _least_ratio(magnets, accuracy.rtol))
+    cut = cut_magnets(magnets, clearance, least_ratio(magnets, accuracy.rtol))
     pieces = [piece for whole in cut for piece in whole]
     points, scale = error_points(magnets, clearance)
     cells = [cells_of(piece.body, clearance) for piece in pieces]
@@ -243,7 +237,7 @@ def fem_table(
     ratios = [
         float(np.min(np.linalg.norm(points[:, None] - own.centers, axis=2).min(axis=0) / own.radii)) for own in cells
     ]
-    degree = _degree(pieces, ratios, accuracy.rtol)
+    degree = enough_degree(pieces, ratios, accuracy.rtol)
     carriers = tuple(carrier(magnet) for magnet in magnets)
     closed, unsure = closed_part(cut, magnets, carriers, degree, cells)
 
@@ -266,8 +260,8 @@ def fem_table(
     }
     polarized = tuple(one for one in carriers if one.polarization.any())
     table = RotorTable("fem", magnets, polarized, tuple(whole), {k: parts for k, parts in doubts.items() if parts})
-    table = _trimmed(table, accuracy, (points, scale), BETWEEN / 20, 1.0)
-    reached = _warn_beyond(table, accuracy, points, scale)
+    table = trimmed_table(table, accuracy, (points, scale), BETWEEN / 20, 1.0)
+    reached = warn_beyond(table, accuracy, points, scale)
     mesh = solution.mesh
     made: dict[str, str | float] = {
         "solver": "ngsolve " + importlib.metadata.version("ngsolve"),
@@ -283,131 +277,6 @@ def fem_table(
         "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
     return replace(table, provenance=made)
-
-
-NODES = (4, 6, 8, 10, 12, 14, 16, 20, 24)  # along an edge of a face, from coarse to fine
-# Ratio of two steps of these that is assumed at first, and between which one is believed: a geometric series is left
-FIRST_RATE, FASTEST_RATE, SLOWEST_RATE = 0.3, 0.25, 0.75
-RATE_SAFETY = 2.0
-CONTACT = 0.02  # gap, in edges, below which round bodies count as touching
-LARGEST = 6e7  # numbers of the matrices that are kept, at most
-FITTED = 40  # coefficients up to which a fit of them takes less than the charges
-SOME = 5  # every so many places are looked at from step to step
-
-
-# Beside a magnet where its moments do not converge: distances between expansions on its surface, by that at which the
-# field is to hold; their degree and the most coefficients of all; nodes by their number, at least; points by
-# coefficients of a fit, and others at which it is looked at; and what it may miss of the tolerance
-SPACINGS, BESIDE_DEGREE, MOST_FITTED = (1.0, 0.8, 0.65, 0.5, 0.4), 2, 4000
-DENSER, ROWS, OTHERS, MISSED = 12, 0.7, 1000, 0.2
-# Nodes beside each other whose normals are mixed; and how much nearer than the clearance that may lead
-BESIDE_EACH_OTHER, NEARER = 16, 0.9
-
-
-def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
-    """Why charges on their surfaces do not describe the magnets; empty where they do.
-
-    Parameters
-    ----------
-    magnets : of the rotor
-    accuracy : asked of the table
-    points : (n, 3) m at which it is to hold, as of `error_points`
-    """
-    permeable = [magnet for magnet in magnets if magnet.contrast]
-    if any(isinstance(magnet.body, Part) for magnet in permeable):
-        return "one is a part from a STEP file"
-    if not all(bears_charges(magnet) for magnet in permeable):
-        return "one has two permeabilities"
-    for first, second in combinations([magnet.body for magnet in permeable], 2):
-        if not (isinstance(first, Box) and isinstance(second, Box)) and gap(first, second) < CONTACT:
-            return "two of them, of which one is round, touch"
-    clearance = accuracy.clearance(magnets)
-    for magnet, whole in zip(permeable, converging(magnets, accuracy, points), strict=True):
-        if whole:
-            continue
-        if 8 * magnet.body.area / (SPACINGS[0] * clearance) ** 2 > MOST_FITTED:
-            return f"one is so large that too many pieces would make up its field {clearance * 1e3:.3g} mm off"
-        if len(SurfaceCharges([magnet], NODES[1]).places) ** 2 > LARGEST:
-            return "one is so long or flat that its charges would take too much memory"
-    return ""
-
-
-def _spread(points: Array, spacing: float, most: int) -> Array:
-    """Some of the points (n, 3) m, all over where they are: no nearer to each other than a spacing (m), or the `most`."""
-    chosen, farthest, apart = list[int](), 0, np.full(len(points), np.inf)
-    while apart[farthest] > spacing and len(chosen) < most:
-        chosen.append(farthest)
-        apart = np.minimum(apart, np.linalg.norm(points - points[farthest], axis=1))
-        farthest = int(np.argmax(apart))
-    return np.asarray(points[chosen])
-
-
-def _all_around(nodes: SurfaceCharges, clearance: float, seed: int) -> Array:
-    """Points (n, 3) m at the clearance (m) from a magnet with `nodes`, about edges and corners and in holes, too."""
-    generator, near = np.random.default_rng(seed), cKDTree(nodes.places).query(nodes.places, BESIDE_EACH_OTHER)[1]
-    count = np.arange(len(near))
-    # about an edge or a corner lie nodes of several faces
-    shares = generator.dirichlet(np.ones(3), len(near))
-    normals = [
-        nodes.normals,
-        *(nodes.normals[near[count, generator.integers(near.shape[1], size=len(near))]] for _ in "ab"),
-    ]
-    away = np.einsum("nk,kna->na", shares, normals)
-    away /= np.maximum(np.linalg.norm(away, axis=1), np.finfo(float).tiny)[:, None]
-    points = nodes.places + clearance * away
-    return np.asarray(points[nodes.magnets[0].body.distance(points) >= NEARER * clearance])
-
-
-def _fitted_beside(
-    magnets: Rotor, accuracy: Accuracy, surfaces: SurfaceCharges, number: int, charges: Array
-) -> tuple[FittedExpansions, float]:
-    """Expansions on one of the `surfaces`' magnets, as many as its `charges` (n,) T need, and what they may miss.
-
-    They are fitted to the field at the clearance from the magnet, and so are as exact outside. That is known from other
-    places, in units of what the highest degree does.
-    """
-    magnet, clearance = surfaces.magnets[number], accuracy.clearance(magnets)
-    most = DENSER * magnet.body.area / (SPACINGS[-1] * clearance) ** 2
-    nodes = SurfaceCharges([magnet], int(np.ceil(4 * np.sqrt(most / len(SurfaceCharges([magnet], 4).places)))))
-    around = _all_around(nodes, clearance, 3)
-
-    def at(points: Array) -> tuple[Array, Array]:
-        """What is allowed at points, and the field."""
-        scale = typical_field(magnets, points)
-        allowed = accuracy.rtol * np.minimum(scale, 2 * np.median(scale))
-        return allowed, surfaces.field_beside(number, charges, points)
-
-    elsewhere = _all_around(nodes, clearance, 4)
-    elsewhere = elsewhere[:: 1 + len(elsewhere) // OTHERS]
-    allowed, wanted = at(elsewhere)
-    found = None
-    for spacing in SPACINGS:
-        centers = _spread(nodes.places, spacing * clearance, len(nodes.places))
-        count = len(centers) * ((BESIDE_DEGREE + 1) ** 2 - 1)
-        if found and count > MOST_FITTED:
-            break
-        points = _spread(around, 0.0, max(int(ROWS * count), NEAR))
-        weights, field = at(points)
-        fit = FittedExpansions(centers, np.full(len(centers), clearance / 3), BESIDE_DEGREE, points, weights)
-        own, step = (summed_derivatives(parts, elsewhere, 1) for parts in fit.of(field))
-        missed, most = (np.max(np.linalg.norm(b, axis=1) / allowed) for b in (own - wanted, step))
-        found = fit, float(2 * missed / most)
-        if missed <= MISSED:
-            break
-    assert found
-    return found
-
-
-def converging(magnets: Rotor, accuracy: Accuracy, points: Array) -> list[bool]:
-    """Of each permeable magnet, whether its moments converge at all `points` (n, 3) m, as those of compact ones do."""
-    least = _least_ratio(magnets, accuracy.rtol)
-    return [ratio >= least for ratio in _ratios([magnet for magnet in magnets if magnet.contrast], points)]
-
-
-def _ratios(magnets: Sequence[Magnet], points: Array) -> list[float]:
-    """Least distance of points (n, 3) m from each magnet's centre, in circumradii."""
-    bodies = [magnet.body for magnet in magnets]
-    return [float(np.linalg.norm(points - body.center, axis=1).min()) / body.circumradius for body in bodies]
 
 
 def moment_error(magnets: Rotor, points: Array, scale: Array) -> float:
@@ -427,85 +296,7 @@ def moment_error(magnets: Rotor, points: Array, scale: Array) -> float:
     return float(np.max(np.linalg.norm(missing, axis=1) / scale))
 
 
-def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) -> RotorTable:
-    """Field of magnets of one recoil permeability each: closed forms, and expansions of the charges on their surfaces.
-
-    Nodes are added until the estimated error meets the accuracy. If no number of `NODES` that memory allows does so, as
-    where faces that nearly touch lie across each other, the last table is returned with an `AccuracyWarning`.
-
-    Parameters
-    ----------
-    magnets : cuboids, cylinders, rings and spheres, m and T in the rotor's frame
-    accuracy : asked for
-    watch : called with the progress
-
-    Raises
-    ------
-    InputError : a magnet has two permeabilities, is a part from a file, or is far too large; or round ones touch
-    """
-    start = time.perf_counter()
-    points, scale = error_points(magnets, accuracy.clearance(magnets))
-    if reason := without_charges(magnets, accuracy, points):
-        raise InputError(
-            f'Input rotor must have magnets that charges on their surfaces describe, for the model "surface"; instead '
-            f"{reason}. Choose --model fem."
-        )
-    carriers, permeable = tuple(carrier(magnet) for magnet in magnets), [m for m in magnets if m.contrast]
-    converge = converging(magnets, accuracy, points)
-    compact = [magnet for magnet, converges in zip(permeable, converge, strict=True) if converges]
-    ratios = _ratios(compact, points)
-    degree = _degree(compact, ratios, accuracy.rtol / 10)
-
-    whole, steps, tail, pieces, before, count = *(list[MultipoleExpansion]() for _ in range(4)), np.inf, 0
-    surfaces, fits = None, list[tuple[FittedExpansions, float] | None]()
-    # the fewest nodes do not show what pieces of a magnet need
-    for k, more in enumerate(NODES[len(compact) < len(permeable) :] if permeable else ()):
-        if k > 1 and surfaces and surfaces.numbers_at(more) > LARGEST:
-            break
-        count, surfaces = more, SurfaceCharges(magnets, more)
-        charges = surfaces.beyond(carriers)
-        fits = fits or [
-            None if converges else _fitted_beside(magnets, accuracy, surfaces, number, charges)
-            for number, converges in enumerate(converge)
-        ]
-        single = [charged_expansion(surfaces, i, charges, degree) for i, one in enumerate(fits) if not one]
-        tail = extrapolated_tail(single, min(ratios, default=CONVERGENCE))
-        coarse, whole, pieces = whole, single, []
-        for number, (fit, share) in ((i, one) for i, one in enumerate(fits) if one):
-            own, last = fit.of(surfaces.field_beside(number, charges, fit.points))
-            whole, pieces = whole + own, pieces + [replace(e, coefficients=share * e.coefficients) for e in last]
-        if not k:
-            continue
-        step = [replace(b, coefficients=b.coefficients - a.coefficients) for a, b in zip(coarse, whole, strict=True)]
-        missed = summed_derivatives(step, points[::SOME], 1)
-        size = float(np.max(np.linalg.norm(missed, axis=1) / scale[::SOME]))
-        rate = float(np.clip(size / before, FASTEST_RATE, SLOWEST_RATE)) if np.isfinite(before) else FIRST_RATE
-        left, before = RATE_SAFETY * rate / (1 - rate), size
-        steps = [replace(part, coefficients=left * part.coefficients) for part in step]
-        watch("charges on the surfaces", k / len(NODES))
-        if left * size <= accuracy.rtol / 4:
-            break
-    alone = len(tail)
-    causes = {"discretisation": steps[:alone], "tail": tail, PIECES: pieces, CHARGES: steps[alone:]}
-    known = {cause: parts for cause, some in causes.items() if (parts := nonzero(some))}
-    polarized = tuple(one for one in carriers if one.polarization.any())
-    table = RotorTable("surface", magnets, polarized, tuple(whole), known)
-    table = _trimmed(table, accuracy, (points, scale), BETWEEN / 20, 1.0, FITTED)
-    _warn_beyond(table, accuracy, points, scale)
-    return replace(table, provenance={"nodes": count, "seconds": time.perf_counter() - start})
-
-
-def charged_expansion(surfaces: SurfaceCharges, number: int, charges: Array, degree: int) -> MultipoleExpansion:
-    """Expansion, up to a degree, of `charges` (n,) T on one of the surfaces' magnets, about its centre."""
-    body = surfaces.magnets[number].body
-    (places, amounts), radius = surfaces.refined(number, charges), body.circumradius
-    weights = amounts[:, None] / (FOUR_PI * radius**2)
-    (sums,) = weighted_sums(degree, (places - body.center) / radius, weights)
-    sums[0] = 0.0  # a magnet has no charge
-    return MultipoleExpansion(body.center, radius, without_noise(np.conj(sums), 1e-15))
-
-
-def _warn_beyond(table: RotorTable, accuracy: Accuracy, points: Array, scale: Array) -> float:
+def warn_beyond(table: RotorTable, accuracy: Accuracy, points: Array, scale: Array) -> float:
     """Estimated error of a table at points (n, 3) m by their `scale` (n,) T; warns where it is more than was asked."""
     reached = float(np.max(table.absolute_error(points)[0] / scale))
     if reached > accuracy.rtol:
@@ -531,7 +322,7 @@ def _guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array
     return points, typical_field(magnets, points)
 
 
-def _trimmed(
+def trimmed_table(
     table: RotorTable,
     accuracy: Accuracy,
     looked_at: tuple[Array, Array],
@@ -559,13 +350,13 @@ def _trimmed(
     return replace(table, expansions=nonzero(kept), doubts={**table.doubts, **({KNOWN: known} if known else {})})
 
 
-def _least_ratio(magnets: Sequence[Magnet], rtol: float) -> float:
+def least_ratio(magnets: Sequence[Magnet], rtol: float) -> float:
     """Least distance from the centre of a box that stays whole, in circumradii, so that `HIGHEST_DEGREE` will do."""
     share = max(magnet.contrast for magnet in magnets)
     return float(np.clip((share / rtol) ** (WHOLE / (HIGHEST_DEGREE - BEFORE)), LEAST, CONVERGENCE)) if share else LEAST
 
 
-def _degree(pieces: Sequence[Magnet], ratios: Sequence[float], rtol: float) -> int:
+def enough_degree(pieces: Sequence[Magnet], ratios: Sequence[float], rtol: float) -> int:
     """Degree at which what the permeability adds has surely fallen below the tolerance; 5 to `HIGHEST_DEGREE`."""
     needed = 5.0
     for piece, ratio in zip(pieces, ratios, strict=True):
@@ -619,4 +410,6 @@ def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
     """
     if not table.expansions:
         return table
-    return _trimmed(table, accuracy, error_points(table.magnets, accuracy.clearance(table.magnets)), AT_LEAST, AT_LEAST)
+    return trimmed_table(
+        table, accuracy, error_points(table.magnets, accuracy.clearance(table.magnets)), AT_LEAST, AT_LEAST
+    )

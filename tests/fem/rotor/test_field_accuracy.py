@@ -232,7 +232,7 @@ def test_a_box_stays_whole_where_its_moments_suffice(monkeypatch):
     cube = (Magnet(Box((0.0118,) * 3, (0.0, 0.0, 0.0)), (1.2, 0.0, 0.5), 1.05),)
     nearest, rtol = 0.00635, 1e-4
     whole = fem_table(cube, Accuracy(rtol, nearest))
-    monkeypatch.setattr("spinlev.fem.rotor.models._least_ratio", lambda magnets, rtol: CONVERGENCE)
+    monkeypatch.setattr("spinlev.fem.rotor.models.least_ratio", lambda magnets, rtol: CONVERGENCE)
     cut = fem_table(cube, Accuracy(rtol / 3, nearest))
     counts = [sum(np.count_nonzero(part.coefficients) for part in table.expansions) for table in (whole, cut)]
     assert (len(whole.expansions), len(cut.expansions)) == (1, 8)
