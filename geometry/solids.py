@@ -120,8 +120,7 @@ class Part(Body):
                 ends = sorted(map(tuple, (corners[k].tolist(), corners[(k + 1) % 3].tolist())))
                 sides.setdefault(tuple(ends), []).append((t, k))
         sharp = [met[0] for met in sides.values() if len(met) == 2 and normals[met[0][0]] @ normals[met[1][0]] < SMOOTH]
-        found = [self.triangles[t][[k, (k + 1) % 3]] for t, k in sharp]
-        return np.array(found).reshape(-1, 2, 3)
+        return np.array([self.triangles[t][[k, (k + 1) % 3]] for t, k in sharp]).reshape(-1, 2, 3)
 
     def edge_distance(self, points: ArrayLike) -> Array:
         local = self.to_body(points).reshape(-1, 3)

@@ -162,8 +162,7 @@ class _Problem:
     def objective(self, z: Array) -> float:
         if self.search.looked_at - self.kept > (PATIENCE if self.best else MISSING):
             raise _SettledError
-        value = self.values(z, self.name)
-        if value is None:
+        if (value := self.values(z, self.name)) is None:
             return FAILED
         self.keep(z)
         return float(-z[-1] if self.raised else -self.sense * value[0])
@@ -175,8 +174,7 @@ class _Problem:
 
     def excess(self, z: Array, name: str, end: float, sign: int, equal: bool) -> Array:
         """By how much a limit is met."""
-        value = self.values(z, name, sign)
-        if value is None:
+        if (value := self.values(z, name, sign)) is None:
             return np.full(self._count(name) if sign > 0 else 1, FAILED if equal else -FAILED)
         return sign * (value - end / self.sizes[name])
 

@@ -260,16 +260,14 @@ class Levitation:
         with stages("Equilibria") as watch:
             watch("compiling the equations of motion", 0.0)
             found = self._searched(interaction, self.equations_key, watch, self.rates)
-        place = most_like_levitation(found.equilibria)
-        if place is not None:
+        if (place := most_like_levitation(found.equilibria)) is not None:
             check_way(self.scene, place.position)
         return found
 
     def survey_in(self, model: str) -> Survey:
         """All equilibria in the rotor's field alone by a model: without plate and without all that it brings about."""
         models = replace(self.models, model=cast(FieldModel, model), interaction="rigid")
-        key = equations_key(self.scene, models)
-        return self._searched(self.field(model), f"alone {key}", unwatched)
+        return self._searched(self.field(model), f"alone {equations_key(self.scene, models)}", unwatched)
 
     def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
         """All equilibria in a table, from the cache if they were searched for before."""
@@ -316,8 +314,7 @@ class Levitation:
         ------
         EquilibriumError : there is none
         """
-        chosen = _first(self.equilibria)
-        if chosen is None:
+        if (chosen := _first(self.equilibria)) is None:
             with_spin = f"with body spin {self.spin:g}" if self.scene.frequency else "for any spin"
             raise EquilibriumError(f"At {self.scene.frequency:g} Hz the floater has no equilibrium {with_spin}.")
         return chosen
@@ -330,8 +327,7 @@ class Levitation:
         """
         if self.absolute or self.scene.gravity[:2].any() or self.scene.other_coils:
             return ()
-        chosen = _first(self.without_plate.equilibria)
-        if chosen is None:
+        if (chosen := _first(self.without_plate.equilibria)) is None:
             return ()
         mean = self.mean
         if not mean.scene.floater.mean or chosen.kind == AVERAGED:
@@ -387,8 +383,7 @@ class Levitation:
         plan = plate_plan(scene, self.models, place if self._nearest is None else self._nearest)
         if plan.model == "none" or scene.plate is None or place is None:
             return None
-        far = self._foreseen() if plan.model == "reduced" else None
-        if far is not None:
+        if (far := self._foreseen() if plan.model == "reduced" else None) is not None:
             plan = far_plan(plan, self.models, far)
             if plan.model == "slab":
                 return far
@@ -428,8 +423,7 @@ class Levitation:
             raise KeyboardInterrupt from None  # it is not the simulation that was stopped
         except SpinlevError:
             return None  # the plate is no slab for it
-        found = slab.wider
-        if found is None:
+        if (found := slab.wider) is None:
             return None
         way = _seen(found.plate, simulated, PLACES)
         worst = way[int(np.argmax([edge_error(found.plate, place) for place in way]))]
@@ -448,8 +442,7 @@ class Levitation:
         """Where the floater levitates, (3,) m: rotor's frame, or the laboratory's if it does not turn with it."""
         if isinstance(self.scene.start, AbsoluteStart):
             return self.scene.start.position
-        chosen = _first(known)
-        if chosen is None:
+        if (chosen := _first(known)) is None:
             return None
         return chosen.laboratory_position if np.any(self.scene.gravity[:2]) else chosen.position
 
@@ -532,8 +525,7 @@ class Levitation:
 
     def live_flight(self) -> LiveFlight:
         """A live simulation, from where the scene says. Raises what `flight` raises."""
-        memory = self.plate
-        if memory is not None:
+        if (memory := self.plate) is not None:
             begins = initial_state(self.scene, self.table, self._known_for_flight, memory)[0].position
             if not memory.table.in_range(memory.plate.box.to_body(begins))[0]:
                 self._followed(begins, 0.0)

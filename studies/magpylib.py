@@ -71,8 +71,7 @@ def from_magpylib(
     >>> from_magpylib(cube)["magnets"][0]["center_mm"]
     [2.0, 0.0, 0.0]
     """
-    sources = list(_sources(collection))
-    if not sources:
+    if not (sources := list(_sources(collection))):
         raise InputError("Input collection must hold at least one magnet; instead it is empty.")
     parts = Path(folder) if folder else cache_folder() / "parts"
     found = _bored(_joined([_magnet(source) for source in sources]))

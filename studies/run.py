@@ -125,8 +125,7 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
     ------
     InputError : no plate in the scene, a frequency or tolerance out of range, or a place in the plate
     """
-    plate = scene.plate
-    if plate is None:
+    if (plate := scene.plate) is None:
         raise InputError("Input scene must have a [plate]; instead received none.")
     if not (np.isfinite(frequency) and frequency >= 0):
         raise InputError(f"Input --frequency-hz must be finite and not negative; instead received {frequency}.")
@@ -221,8 +220,7 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
     if scene.carried_by_coils:
         return coils_job(scene, duration, requested.plate_rtol, out)
     request = {"scene": scene_digest(scene), "duration_s": duration, **vars(requested)}
-    identity = to_json({**request, "program": program_digest()})
-    checkpoint = Checkpoint(out / "checkpoint.npz", identity)
+    checkpoint = Checkpoint(out / "checkpoint.npz", to_json({**request, "program": program_digest()}))
     if not resume:
         checkpoint.remove()
     elif checkpoint.read() is None:

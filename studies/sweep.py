@@ -61,8 +61,7 @@ def swept(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> 
     OSError : `out` cannot be written
     """
     journal = Journal(study, points, out)
-    finished = journal.finished()
-    if finished:
+    if finished := journal.finished():
         note(f"{len(finished)} of {len(points)} points are there from an earlier run.")
     failed: dict[int, str] = {}
     missing = frozenset(range(len(points))) - frozenset(finished)
@@ -125,8 +124,7 @@ class Journal:
     def finished(self) -> dict[int, xr.Dataset]:
         """The points that an earlier run of the same sweep has finished."""
         ours, found = self.files(), {}
-        others = len(list(self.folder.glob("*.json"))) - len(ours)
-        if others:
+        if others := len(list(self.folder.glob("*.json"))) - len(ours):
             note(
                 f"{self.folder} also holds {others} points of another sweep, of files that were replaced, or of "
                 "another version of the program; they are not used. Delete them when you need them no more."
@@ -281,8 +279,7 @@ def _on_scheduler(
                 found = None
             future.release()
             if found is None:  # of a worker that has come since
-                of_us = _workers_of_us(client, address)
-                if not of_us:
+                if not (of_us := _workers_of_us(client, address)):
                     raise _lost(address)
                 batches.append(batch)
             yield from ((batch, attempt) for attempt in found or ())

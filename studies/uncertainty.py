@@ -42,8 +42,7 @@ def error_bars(
             )
     if isinstance(draws, bool) or not isinstance(draws, int) or not 0 <= draws <= 100_000:
         raise InputError(f"Input draws must be a number from 0 to 100000; instead received {shown(draws)}.")
-    known = levitation.equilibria
-    if not known:
+    if not (known := levitation.equilibria):
         raise EquilibriumError(f"At {levitation.scene.frequency:g} Hz the floater has no equilibrium.")
     wide = np.array([float(tolerances[key]) for key in keys])
     # a Latin hypercube: each number's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239)

@@ -75,8 +75,7 @@ def spoken_time(seconds: float) -> str:
 
 def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out: Sequence[LeftOut] = ()) -> str:
     """Levitation distance and stability in a `levitation`, by its `equilibria` and what was `left_out`."""
-    useful = worth_a_row(equilibria)
-    if not useful:
+    if not (useful := worth_a_row(equilibria)):
         why = "there is no equilibrium"
         if equilibria:
             why = "the field model is too rough to tell where an equilibrium is"
@@ -177,8 +176,7 @@ def left_out_words(levitation: Levitation, left_out: Sequence[LeftOut]) -> list[
     cause = "the plate's response" if levitation.plate is not None else "gravity across the axis"
     said = []
     for body, where in ((IN_PLATE, "plate"), (IN_ROTOR, "rotor")):
-        depths = [_distance(one.known) for one in left_out if one.why == body]
-        if depths:
+        if depths := [_distance(one.known) for one in left_out if one.why == body]:
             count = "a solution" if len(depths) == 1 else f"{len(depths)} solutions"
             said.append(f"Left out: {count} at {', '.join(depths)} mm, where the floater would overlap the {where}.")
     for one in left_out:

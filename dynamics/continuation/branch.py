@@ -152,8 +152,7 @@ def follow_branch(
     ------
     EquilibriumError : there is no equilibrium near `start`
     """
-    first = family.solution(start[[0, 1, 2, 6, 7, 8]], parameter)
-    if first is None:
+    if (first := family.solution(start[[0, 1, 2, 6, 7, 8]], parameter)) is None:
         raise EquilibriumError(
             f"Input start must be near an equilibrium; instead Newton's method found none at {parameter:.6g}."
         )
@@ -173,10 +172,8 @@ def follow_branch(
         marked = _marked(family, unknowns, points[-1], point, *step)
         if any(mark.kind == FOLD and beyond(mark.parameter) is not None for mark in marked):
             return SHORTER  # past the end and on round a fold: the point at the end would be missed
-        border = beyond(point.parameter)
-        if border is not None:
-            landed = family.solution(places[0, :6], border)
-            if landed is not None:
+        if (border := beyond(point.parameter)) is not None:
+            if (landed := family.solution(places[0, :6], border)) is not None:
                 point = family.at(landed, directions(family, landed[None], tangents)[0], border)
             marked = _marked(family, unknowns, points[-1], point, *step)
         points.extend([*marked, point])

@@ -81,8 +81,7 @@ def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: fl
     points = follow_branch(
         family, start, highest, SLOWEST, steps, lambda p: rotor_gap(scene, p.position, p.state[6:9]) < 0
     )
-    folds = [k for k, point in enumerate(points) if point.kind == FOLD]
-    if not folds:
+    if not (folds := [k for k, point in enumerate(points) if point.kind == FOLD]):
         raise EquilibriumError(f"The levitating branch has no fold between {SLOWEST:g} and {highest:g} Hz.")
     end = folds[1] + 1 if len(folds) > 1 else len(points)
     return Branch(scene, rates, tuple(points[folds[0] :: -1]), tuple(points[folds[0] : end]))
@@ -160,8 +159,7 @@ def reference_state(scene: Scene) -> tuple[Array, float]:
     Raises EquilibriumError where there is none up to `HIGHEST`.
     """
     table = rotor_table(scene.rotor, "dipole")
-    found = levitating_ranges(scene, table, Rates(with_effects(scene, table)))
-    if not found:
+    if not (found := levitating_ranges(scene, table, Rates(with_effects(scene, table)))):
         raise EquilibriumError("Point dipoles levitate stably at none of the frequencies that are looked at.")
     lowest = found[0]
     middle = lowest.near((lowest.low.parameter + lowest.high.parameter) / 2)
@@ -203,8 +201,7 @@ def branch_through(scene: Scene, rates: Rates, start: Array, frequency: float, s
     """
     walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates, spin), start, frequency)
     below = walk(LOWEST if frequency > LOWEST else frequency / WIDEST)
-    above = walk(HIGHEST if frequency < HIGHEST else frequency * WIDEST)
-    return [*below[:0:-1], *above]
+    return [*below[:0:-1], *walk(HIGHEST if frequency < HIGHEST else frequency * WIDEST)]
 
 
 def stable_ranges(points: Sequence[BranchPoint]) -> list[StableRange]:
@@ -228,8 +225,7 @@ def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> 
     On the branch through the equilibrium of `scene` and `rates` near `start` (12,) there. Raises EquilibriumError where
     there is none.
     """
-    found = stable_ranges(branch_through(scene, rates, start, frequency))
-    if not found:
+    if not (found := stable_ranges(branch_through(scene, rates, start, frequency))):
         raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
     return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter))
 

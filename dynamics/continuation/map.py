@@ -273,8 +273,7 @@ def surveys(
         check_turning(scene)
     values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
     values[:, Parameter.MEASURE] = measures
-    ranges = [SearchRange(scene) for scene in scenes]
-    grid = Grid(rates, values, spin, ranges, np.arange(len(scenes)), places)
+    grid = Grid(rates, values, spin, [SearchRange(scene) for scene in scenes], np.arange(len(scenes)), places)
     nodes = grid.coarse(SPACING if places.shape[1] > 1 else 2 * SPACING)
     point, position, moment = filled(grid, nodes)
     poses, found = np.concatenate([position, moment], axis=1), []

@@ -203,8 +203,7 @@ def drift(
     torque = SlowTorque.of(scene, rates, stokes)
     family = Family(rates, spins(scene))
     if start is None:
-        known = find_equilibria(scene, table, spin, rates=rates)
-        if not known:
+        if not (known := find_equilibria(scene, table, spin, rates=rates)):
             raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")
         start = min(known, key=lambda equilibrium: equilibrium.growth_per_s).state
     state = Scales.of(scene).pack(start)
@@ -283,8 +282,7 @@ def lasting_frequencies(
 
     ends = branch[0].parameter, branch[-1].parameter
     grid = [float(at) for at in np.linspace(*ends, POINTS + 2)[1:-1]]
-    first = next((at for at in grid if not ended(at)[0]), None)
-    if first is None:
+    if (first := next((at for at in grid if not ended(at)[0]), None)) is None:
         return Lasting()
     low = edge(first, max((at for at in grid if at < first), default=ends[0]))[0]
     gone = next((at for at in grid if at > first and ended(at)[0]), None)

@@ -454,8 +454,7 @@ def _moved(before: Array, after: Array) -> float:
 
 def overlap(scene: Scene, known: Equilibrium) -> str:
     """Where in a turn the floater of an equilibrium would overlap the plate or the rotor, which; else nothing."""
-    turn = known.turn
-    if turn is None:
+    if (turn := known.turn) is None:
         axes = known.state.axes
         vectors = (np.tile(vector, (INSTANTS, 1)) for vector in known.state.vectors)
         turn = replace(State(*vectors), axes=None if axes is None else np.tile(axes, (INSTANTS, 1, 1)))

@@ -135,8 +135,7 @@ def survey(
     equations = rates or Rates(with_effects(scene, table))
     top = _own_spin(scene) * scales.time * scales.spin_ratio
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio, top)
-    found = remembered(lambda: _search(scene, table, balance, farthest, watch), "")
-    return survey_of(scene, balance, found)
+    return survey_of(scene, balance, remembered(lambda: _search(scene, table, balance, farthest, watch), ""))
 
 
 def _survey_of_any_body(

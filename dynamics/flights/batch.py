@@ -62,8 +62,7 @@ class _Passenger(Course):
 
     def onward(self) -> bool:
         """Begin the next leg; False where there is none."""
-        leg = next(self._legs, None)
-        if leg is not None:
+        if (leg := next(self._legs, None)) is not None:
             self.end = self.set_leg(leg)
         return leg is not None
 
@@ -198,8 +197,7 @@ class SimdBatch:
         for slot, one in active.items():
             if one.recorder:
                 due[slot] = one.recorder.due(one.time[0], float(now[slot]), float(ends[slot]))
-        most = max(len(times) for times in due.values())
-        if not most:
+        if not (most := max(len(times) for times in due.values())):
             return
         grid = np.tile(now, (most, 1))
         for slot, times in due.items():
@@ -259,8 +257,7 @@ def ensemble(
     """
     _check(scene, starts, duration)
     pieces = [slice(first, first + together) for first in range(0, len(starts.position), together)]
-    parts = mapped(partial(_ended, scene, table, duration), [starts[p] for p in pieces])
-    return Endings.joined(list(parts))
+    return Endings.joined(list(mapped(partial(_ended, scene, table, duration), [starts[p] for p in pieces])))
 
 
 def _check(scene: Scene, starts: State, duration: float) -> None:

@@ -297,8 +297,7 @@ class JointFlight:
         largest, whole = float(np.abs(terms).max()), abs(float(terms.sum()))
         scale = whole if whole > 1e-3 * largest else largest  # they may nearly cancel
         recorder = Recorder(self._balanced(now, row)[0], self.flights[0].interval(self.duration), MOST_SAMPLES)
-        kept = checkpoint.read() if checkpoint else None
-        if kept is not None:
+        if (kept := checkpoint.read() if checkpoint else None) is not None:
             self._restore(kept, recorder)
         begun, written = self.time[0] * scales.time, perf_counter()
         try:
@@ -338,8 +337,7 @@ class JointFlight:
         self.steps, self.ended = self.steps + piece.steps, (DURATION, ())
         if piece.event is not None:
             self.ended = part.meanings[piece.event]
-        touching = self._touching(times * scales.time, states)
-        if touching is not None:
+        if (touching := self._touching(times * scales.time, states)) is not None:
             at, which = touching
             self.ended, times, states = (CONTACT, which), times[: at + 1], states[: at + 1]
         return times, states

@@ -173,8 +173,7 @@ class Interaction:
     def relative_error(self, points: ArrayLike) -> tuple[Array, Array]:
         """Estimated relative errors (n,) of B and its gradient, with what the effects' own errors are worth in them."""
         errors = self._table.relative_error(points)
-        unsure = [effect for effect in self.effects if isinstance(effect, Unsure)]
-        if not unsure:
+        if not (unsure := [effect for effect in self.effects if isinstance(effect, Unsure)]):
             return errors
         field, gradient = self._table.evaluate(points)
         sizes = np.linalg.norm(field, axis=1), np.linalg.norm(gradient, axis=(1, 2))

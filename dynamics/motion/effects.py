@@ -110,8 +110,7 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     mutual = {effect.name for effect in whole.effects} & {MUTUAL, INDUCED_SHAPE} == {MUTUAL}
     if mutual and not scene.floater.is_sphere:
         effects.append(InducedShape.of(scene.floater))
-    pieces = pieces_of(scene.rotor, scene.conductors)
-    if pieces:
+    if pieces := pieces_of(scene.rotor, scene.conductors):
         check_metal(pieces, scene.fastest, scene.floater.radius)
     if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))

@@ -58,8 +58,7 @@ def _wave(h: Array, k: Array) -> Array:
         return np.asarray(closed)
     square = np.sin(ANGLES) ** 2
     factors = square * (1 - square) * (np.pi / 2 / len(ANGLES))
-    summed = (factors / (1 - h[near, None] * square) / np.sqrt(1 - k[near, None] * square)).sum(axis=1)
-    closed[near] = summed
+    closed[near] = (factors / (1 - h[near, None] * square) / np.sqrt(1 - k[near, None] * square)).sum(axis=1)
     return np.asarray(closed)
 
 

@@ -237,8 +237,7 @@ def _segments(body: Cylinder, polarization: Array) -> Array:
         angle = 2 * np.pi * (np.arange(count) + 0.5) / count
         x, y, z = share * radius / (2 * count) * np.asarray(polarization)
         cos, sin = np.cos(angle), np.sin(angle)
-        same = (np.full(count, number) for number in (body.height, radius, z))
-        length, radii, current = same
+        length, radii, current = (np.full(count, number) for number in (body.height, radius, z))
         found.append(np.column_stack([length, radii, cos, sin, x * cos + y * sin, current]))
     return np.concatenate(found)
 

@@ -244,8 +244,7 @@ def solve_rotor(
     size = degree
     if formulation == "direct":
         spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
-    nothing = [np.zeros((size + 1, size + 1), complex)] * len(spheres)
-    coefficients = tuple(total or nothing)
+    coefficients = tuple(total or [np.zeros((size + 1, size + 1), complex)] * len(spheres))
     return RotorSolution(coefficients, spheres, mesh, system.unknowns, layers, symmetry, tuple(solutions))
 
 

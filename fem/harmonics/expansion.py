@@ -343,8 +343,7 @@ def _fewest(
     too_few, enough, factors = 0, len(parts), np.ones(len(parts))
     while enough - too_few > 1:
         count = (enough + too_few) // 2
-        found = _fitted(fields[:count], total)
-        if found is None:
+        if (found := _fitted(fields[:count], total)) is None:
             too_few = count
         else:
             factors, enough = found, count

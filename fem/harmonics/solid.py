@@ -269,8 +269,7 @@ def tensors(values: Array) -> list[Array]:
     start = 0
     while start < values.shape[1]:
         degree = len(found) + 1
-        part = values[:, start : start + 2 * degree + 1] @ _spread(degree)
-        found.append(part.reshape(-1, *(3,) * degree))
+        found.append((values[:, start : start + 2 * degree + 1] @ _spread(degree)).reshape(-1, *(3,) * degree))
         start += 2 * degree + 1
     return found
 

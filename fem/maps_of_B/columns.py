@@ -135,8 +135,7 @@ class Column:
         Raises FieldMapError: no unit, or one that is none of length or of B.
         """
         kind = "length" if self.name in AXES else "field"
-        said = getattr(reading, f"{kind}_unit") or self.unit or usual
-        if said is None:
+        if (said := getattr(reading, f"{kind}_unit") or self.unit or usual) is None:
             example = f"{self.name}_{'mm' if kind == 'length' else 'mT'}"
             raise FieldMapError(
                 f"Input column {self.title} must have a unit, as in the title {example} or netCDF's attribute units; "
@@ -160,8 +159,7 @@ def column_of(title: str) -> Column | None:
     text = " ".join(title.strip().strip("\"'").split())
     if text.casefold() in (MASK, GHOSTS):
         return Column(text, text.casefold(), None)
-    match = TITLE.fullmatch(text)
-    if match is None:
+    if (match := TITLE.fullmatch(text)) is None:
         return None
     found = {key: (value or "").lower() for key, value in match.groupdict().items()}
     unit = (match["bracket"] or match["bare"] or "").strip() or None
@@ -231,8 +229,7 @@ def _without(title: str, text: str) -> str | None:
     """A title without a word that it must have, or a number: `50` is not in `f=500`, `mf` not in `mfnc.Bx`."""
     word = re.escape(" ".join(text.split())).replace(r"\ ", r"\s*").replace("=", r"\s*=\s*")
     pattern = rf"(?<![a-z0-9])(?<!\d[.,]){word}(?![a-z0-9]|[.,]\d)"
-    found = re.search(pattern, title, re.IGNORECASE)
-    if found is None:
+    if (found := re.search(pattern, title, re.IGNORECASE)) is None:
         return None
     return re.sub(r"[ _.:-]+(?=[ _]?[\[({]|$)", "", (title[: found.start()] + title[found.end() :]).strip(" _.:-"))
 

@@ -352,8 +352,7 @@ def _basis(field_map: FieldMap, centers: Array, radii: Array, max_degree: int) -
     seen, needed = field_map.observations, 2 * smallest.count(1)
     if seen < needed:
         raise FieldMapError(f"Input field must hold at least {needed} observed components; instead received {seen}.")
-    fitting = [d for d in range(1, max_degree + 1) if 2 * smallest.count(d) <= seen]
-    return replace(smallest, degree=max(fitting))
+    return replace(smallest, degree=max(d for d in range(1, max_degree + 1) if 2 * smallest.count(d) <= seen))
 
 
 def _left_out(

@@ -109,8 +109,7 @@ def _at_poles(magnets: Sequence[Magnet], distance: float) -> list[Array]:
     """Places (3,) m at a distance (m) from where the magnets' remanence points, where no other magnet is nearer."""
     places = []
     for magnet in magnets:
-        size = float(np.linalg.norm(magnet.polarization))
-        if size:
+        if size := float(np.linalg.norm(magnet.polarization)):
             (place,) = places_off(magnet.body, magnet.polarization_in_rotor[None] / size, distance)
             if min(float(other.body.distance(place)) for other in magnets) > distance * (1 - 1e-6):
                 places.append(place)

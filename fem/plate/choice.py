@@ -58,8 +58,7 @@ def resolve_plate_model(
     else a coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite
     elements.
     """
-    plate = scene.plate
-    if plate is None:
+    if (plate := scene.plate) is None:
         return PlateChoice("none", "the scene has no plate")
     if place is None:
         return PlateChoice("none", "there is no equilibrium around which to make a table")

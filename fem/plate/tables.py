@@ -115,8 +115,7 @@ def _reduction(
         solution = solve(plate, boxes, outer, rtol, rule, others)
         error = solution.space_error
     watch("reduced plate model", 0.5)
-    missed = max(error, solution.space_error)
-    return from_elements(plate, solution, region, frequencies, rtol, others, missed)
+    return from_elements(plate, solution, region, frequencies, rtol, others, max(error, solution.space_error))
 
 
 def slab_and_rotor_table(

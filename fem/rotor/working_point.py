@@ -60,8 +60,7 @@ class EasyField:
 
     def __init__(self, magnets: Sequence[Magnet], floater: Magnet | None = None) -> None:
         self.magnets, self.floater = tuple(magnets), floater
-        bodies = self.magnets if floater is None else (*self.magnets, floater)
-        self.elements = NearElements(bodies)
+        self.elements = NearElements(self.magnets if floater is None else (*self.magnets, floater))
 
     def at(self, number: int, points: Array) -> tuple[Array, Array]:
         """μ0 H · e and its estimated error (n,) T at points (n, 3) m in a magnet (counted from 0), off the edges."""
@@ -132,8 +131,7 @@ def working_points(field: EasyField) -> tuple[WorkingPoint | None, ...]:
 def _working_point(field: EasyField, number: int) -> WorkingPoint:
     magnet = field.magnets[number]
     clear = CLEAR * float(np.cbrt(magnet.body.volume))
-    batches = [_spread_inside(magnet, seed) for seed in range(BATCHES)]
-    points = np.concatenate(batches)
+    points = np.concatenate([_spread_inside(magnet, seed) for seed in range(BATCHES)])
     free = _edge_distance(field.magnets, points) >= clear
     values, error = np.empty(len(points)), np.empty(len(points))
     for chosen in (free, ~free):  # places at edges, which converge slowly, do not drive the order of all

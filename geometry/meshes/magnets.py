@@ -101,8 +101,7 @@ def mesh_magnets(
     MeshError, ComputationError : a part from a file cannot be meshed, takes too long or too much memory
     """
     settings = settings or MeshSettings()
-    magnets = tuple(magnets)
-    if not magnets:
+    if not (magnets := tuple(magnets)):
         raise ValueError("Input magnets must hold at least one magnet; instead received none.")
     for i, j, depth in overlapping_magnets(magnets):
         raise ValueError(f"Input magnets must not overlap; instead magnets {i} and {j} do, {depth * 1e3:.3g} mm deep.")

@@ -75,8 +75,7 @@ class Plate:
             f"{body.described_size} at {millimetres(body.center)}, {metal:.3g} S/m"
             for body, metal in zip(self.body.placed, self.each or [self.conductivity], strict=True)
         )
-        down = self.lowering
-        if down is None:
+        if (down := self.lowering) is None:
             return text
         return f"{text}, lowered by {down.distance * 1e3:g} mm at {down.speed * 1e3:g} mm/s from {down.start:g} s on"
 
@@ -285,8 +284,7 @@ class Scene:
     def each(self) -> "tuple[Scene, ...]":
         """The scene of each floater alone."""
         first = replace(self, companions=()) if self.companions else self
-        alone = (replace(first, floater=c.floater, drag=c.drag, start=c.start) for c in self.companions)
-        return first, *alone
+        return first, *(replace(first, floater=c.floater, drag=c.drag, start=c.start) for c in self.companions)
 
     @property
     def fastest(self) -> float:

@@ -181,8 +181,7 @@ def force_curve(point: Point) -> xr.Dataset:
         rows = np.array([_along_curve(shared.elsewhere(frequency=float(f)), grid) for f in frequencies])
     marks = np.array([_balance_points(grid, row[0] + row[1], row[3]) for row in rows])
     frequency = variable(ONE, frequencies, "Hz", "frequency of the rotor")
-    distance = variable(("distance",), grid, "m", "distance along the axis")
-    axes = {"frequency": frequency, "distance": distance}
+    axes = {"frequency": frequency, "distance": variable(("distance",), grid, "m", "distance along the axis")}
     return recorded(point, FORCE_COLUMNS, (*rows.swapaxes(0, 1), *marks.T), axes)
 
 

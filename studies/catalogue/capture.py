@@ -282,8 +282,7 @@ def place_figure(result: xr.Dataset) -> Figure:
         shades = top.pcolormesh(1e3 * side, 1e3 * height, mean.T, vmin=0, vmax=100, cmap="viridis")
         top.grid(False)
         titled(top, f"{label}\n{float(one['rotor_frequency']):.0f} Hz")
-        ends = 1e3 * height[[-1, 0]]
-        top.set(xlabel="lateral offset (mm)", ylim=ends)
+        top.set(xlabel="lateral offset (mm)", ylim=1e3 * height[[-1, 0]])
         lean = np.digitize(np.degrees(one["lean"].values), edges) - 1
         _shares(bottom, (edges[1:] + edges[:-1]) / 2, [hits[lean == k] for k in range(BINS)], PALETTE[0], "")
         bottom.set(xlabel="initial polar angle (°)", ylim=(-2, 102))

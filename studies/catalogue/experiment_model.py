@@ -383,8 +383,7 @@ def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[F
     """Trajectories of all rotors, for unknowns (n,) by name; those of one kind are simulated in one call."""
     found: dict[Flight, Course] = {}
     for kind, surrogate in models.surrogates.items():
-        own = [flight for flight in flights if flight[0] == kind]
-        if own:
+        if own := [flight for flight in flights if flight[0] == kind]:
             requested = zip(*(models.conditions(values, flight) for flight in own), strict=True)
             together = simulated(surrogate, *map(np.concatenate, requested))
             parts = {name: np.split(each, len(own)) for name, each in together.items()}

@@ -106,8 +106,7 @@ def nominal(configuration: str, measure: float, model: FieldModel = "cuboid") ->
     values = {name: known.nominal for name, known in PARAMETERS.items()} | {"measure": measure}
     scene = scene_of(configuration, values)
     levitation = article.levitation_of(scene, model)
-    found = levitating_ranges(scene, levitation.table, levitation.rates)
-    if not found:
+    if not (found := levitating_ranges(scene, levitation.table, levitation.rates)):
         raise EquilibriumError("The rotor levitates stably at no frequency.")
     stable = found[0]
     grid = article.within(stable, FRACTIONS)

@@ -101,8 +101,7 @@ def without_plate(
     frequency = FREQUENCY if part is None else float(article.within(stable, part))
     near = at_frequency(alone.scene, alone.rates, stable.near(frequency), frequency).distance
     levitation = alone.elsewhere(frequency=frequency, **(article.losses(alone.scene) if complete else {}))
-    found = article.equilibrium_at(levitation, near)
-    if found is None:
+    if (found := article.equilibrium_at(levitation, near)) is None:
         raise EquilibriumError("There is no stable levitation without the plate.")
     return levitation, found
 
@@ -139,8 +138,7 @@ def plate_damping(point: Point) -> xr.Dataset:
     alone, start = without_plate(case.configuration, case.measure, case.part, case.complete)
     row: dict[str, Any] = {name: point[name] for name in ("value", "sweep", "configuration")}
     row |= {"growth_without": [mode.growth_per_s for mode in start.modes], "rotor_frequency": alone.scene.frequency}
-    found = article.over_plate(alone, start, case.plate(start.position), case.model, RTOL)
-    if found:
+    if found := article.over_plate(alone, start, case.plate(start.position), case.model, RTOL):
         beside, there, error = found
         assert beside.plate is not None
         row |= {

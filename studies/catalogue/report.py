@@ -78,8 +78,7 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
 
     if not os.path.isdir(folder):  # unlike Path.is_dir never raises
         raise InputError(f"Input DIR must be a folder with results; instead received {folder}.")
-    paths = sorted(folder.glob("*.nc"))
-    if not paths:
+    if not (paths := sorted(folder.glob("*.nc"))):
         raise InputError(f"Input DIR must have results (*.nc) in it; instead {folder} has none.")
     parts = []
     for path in paths:

@@ -222,6 +222,5 @@ def flight_of(result: xr.Dataset, source: str) -> tuple[Scene, State]:
         down = np.array([0.0, 0.0, float(plate.lowering.depth(result["time"].values[-1]))])
         scene = replace(scene, plate=replace(plate, body=moved(plate.body, plate.body.center - down), lowering=None))
     vectors = (result[name].values for name in ("position", "velocity", "moment", "spin"))
-    axes = result["body_axes"].values if "body_axes" in result else None
-    laboratory = replace(State(*vectors), axes=axes)
+    laboratory = replace(State(*vectors), axes=result["body_axes"].values if "body_axes" in result else None)
     return scene, laboratory.to_rotor(scene.angle(result["time"].values))

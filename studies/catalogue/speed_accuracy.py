@@ -106,8 +106,7 @@ def _gridded(step_mm: float, magnets: Magnets) -> tuple[FieldTable, int]:
     radius = np.linalg.norm(grid, axis=1)
     points = grid[(radius >= 0.013) & (radius <= 0.04)]
     exact = RotorTable("cuboid", magnets, magnets).evaluate(points)[0]
-    table = fit_field_map(FieldMap(points, exact), centers=np.zeros(3), radius=INNER_SPHERE)
-    return table, 3 * len(points)
+    return fit_field_map(FieldMap(points, exact), centers=np.zeros(3), radius=INNER_SPHERE), 3 * len(points)
 
 
 def methods(quick: bool) -> dict[str, Method]:

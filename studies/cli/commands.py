@@ -245,8 +245,7 @@ def simulate(
         from ...geometry.scene.files import driven
 
         loaded = driven(loaded, [step[1]], str(scene), frequency_hz=step[0])
-    duration = float(loaded.knots[0, -1]) if duration_s is None else duration_s
-    if not duration:
+    if not (duration := float(loaded.knots[0, -1]) if duration_s is None else duration_s):
         raise InputError("Input --duration-s must be given, or --ramp, or [[drive]] in the scene; instead none is.")
     from ...fem.cache import owned
     from ..run import simulate_job

@@ -29,8 +29,7 @@ def main(modules: Sequence[str] = MODULES) -> int:
             return 1
     if lent:
         print(f"NOTE: NGSolve uses the libquadmath that came with {lent.resolve().parent.name.removesuffix('.libs')}.")
-    without = unavailable()
-    if without:
+    if without := unavailable():
         print(f"NOTE: {without}")
     return 0
 

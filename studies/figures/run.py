@@ -230,8 +230,7 @@ def _smooth(parameter: Array, *curves: Array) -> tuple[Array, ...]:
 @styled
 def working_point_figure(found: xr.Dataset) -> Figure:
     """A row per magnet: a section along the easy axis through the lowest place, and the field over the volume."""
-    count = found.sizes["magnet"]
-    figure, axes = panels(count, 2, 2.9)
+    figure, axes = panels(found.sizes["magnet"], 2, 2.9)
     for k, (section, volume) in enumerate(axes):
         one = found.isel(magnet=k)
         u, v, knee = 1e3 * one["along"].values, 1e3 * one["across"].values, float(one["knee"])

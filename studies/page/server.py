@@ -191,8 +191,7 @@ class _Gate(Application):
         """Nothing: an address has the token."""
 
     def find_handler(self, request: HTTPServerRequest, **arguments: Any) -> Any:
-        status = self._refusal(request)
-        if status:
+        if status := self._refusal(request):
             return self.get_handler_delegate(request, _Refused, {"status": status})
         if request.path in PAGES:
             connection: Any = request.connection

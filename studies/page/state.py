@@ -92,8 +92,7 @@ class PageState:
         except ValueError:
             raise InputError(f"Input spin must be a number; instead received {shown(chosen['spin'])}.") from None
         check_spin("spin", spin)
-        given = {key: value for key, value in asked.items() if key not in CHOICES}
-        if not given:
+        if not (given := {key: value for key, value in asked.items() if key not in CHOICES}):
             return replace(self, **{**chosen, "spin": spin})
         tables = {key.partition(".")[0] for key in given}
         whole = tables >= {"frequency_hz", "rotor", "floater"}
@@ -112,8 +111,7 @@ class PageState:
         except UnicodeDecodeError:
             raise SceneError(name, ["Input scene must be a readable UTF-8 text; instead it is not."]) from None
         known = self.first or self.scene
-        new = first_state(parse_scene(text, name, known=known), name)
-        return replace(new, first=known)
+        return replace(first_state(parse_scene(text, name, known=known), name), first=known)
 
 
 def first_state(scene: Scene, source: str = "scene") -> PageState:
