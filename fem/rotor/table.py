@@ -16,6 +16,7 @@ from ..cache import TableKind
 from ..closed_forms.uniform import UniformField, squared_distance
 from ..harmonics.expansion import MultipoleExpansion, summed_derivatives, without_noise
 from ..harmonics.expressions import FieldExpressions
+from ..harmonics.interior import Ball, dipole_sources
 from ..harmonics.solid import rotated_harmonics, tensors
 
 DEEP = 0.1  # of the radius of a doubt's sources: its terms are evaluated no nearer to its centre
@@ -67,7 +68,8 @@ class DerivedField(Protocol):
         """See `RotorTable.derivatives`."""
 
 
-FEW, LOW = 1500, 6  # Moments up to which a search takes them all, and the highest degree of those that it begins with
+# Moments up to which a search takes them all, the highest degree of those that it begins with, and places of expansions
+FEW, LOW, MANY_PLACES = 1500, 6, 100
 # Doubts that are what a model leaves out, with its sign, and no mere size of an error
 LEFT_OUT = ("shape", "permeability")
 
@@ -137,10 +139,24 @@ class RotorTable:
 
     @cached_property
     def rough(self) -> "RotorTable":
-        """The field for a search's first steps: where it has very many moments, those of low degree alone."""
-        if sum(np.count_nonzero(part.coefficients) for part in self.expansions) <= FEW:
-            return self
-        lowest = [replace(part, coefficients=part.coefficients[: LOW + 1, : LOW + 1]) for part in self.expansions]
+        """The field for a search's first steps: where it has very many moments, those of low degree alone.
+
+        Of expansions about very many places the dipole of each magnet.
+        """
+        if len(self.expansions) <= MANY_PLACES:
+            if sum(np.count_nonzero(part.coefficients) for part in self.expansions) <= FEW:
+                return self
+            lowest = [replace(part, coefficients=part.coefficients[: LOW + 1, : LOW + 1]) for part in self.expansions]
+        else:
+            centers = np.array([part.center for part in self.expansions])
+            owner = np.argmin([magnet.body.distance(centers) for magnet in self.magnets], axis=0)
+            balls = [Ball(magnet.body.center, magnet.body.circumradius) for magnet in self.magnets]
+            moments = [sum((e.moment for e, k in zip(self.expansions, owner, strict=True) if k == number), np.zeros(3))
+                       for number in range(len(balls))]  # fmt: skip
+            lowest = [
+                MultipoleExpansion(ball.center, ball.radius, dipole_sources(moment, ball, 1))
+                for ball, moment in zip(balls, moments, strict=True)
+            ]
         return replace(self, expansions=tuple(lowest), doubts={})
 
     @cached_property

@@ -199,13 +199,16 @@ def test_starts_thinned_on_the_way_find_what_all_find(name, free, monkeypatch):
 def test_a_search_that_begins_with_few_moments_finds_the_same(monkeypatch):
     scene, found = SCENES["tilt"], []
     moments = tuple(uniform_moments(magnet, 14) for magnet in scene.rotor)
-    for few in (10_000, 0):
+    for few, places in ((10_000, 100), (0, 100), (10_000, 0)):  # the last: the dipole alone
         monkeypatch.setattr(tables, "FEW", few)
+        monkeypatch.setattr(tables, "MANY_PLACES", places)
         table = RotorTable("moments", scene.rotor, (), moments)
-        assert (table.rough is table) == (few > 0)
+        assert (table.rough is table) == (few > 0 and places > 0)
+        np.testing.assert_allclose(table.rough.moment, table.moment, rtol=1e-12, atol=1e-15)
         found.append(np.array([one.position for one in survey(scene, table).equilibria]))
     assert len(found[0]) == 3
-    np.testing.assert_allclose(found[1], found[0], atol=1e-10)
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], atol=1e-10)
 
 
 @pytest.mark.parametrize(("name", "frequency", "spin", "distance"), PUBLISHED)
