@@ -7,7 +7,7 @@ import magpylib
 from loguru import logger
 from magpylib_material_response.demag import apply_demag
 from magpylib_material_response.meshing import mesh_Cuboid
-from problems import CUBES, EDGE, RECOIL, REMANENCE, points_below, turned
+from problems import CUBES, EDGE, RECOIL, REMANENCE, points_below, turns
 from said import measure, say
 from scipy.spatial.transform import Rotation
 
@@ -19,12 +19,12 @@ points = points_below()
 def field():
     """B at the points."""
     cubes = []
-    for center, axis in CUBES[case]:
+    for (center, axis), turn in zip(CUBES[case], turns(case), strict=True):
         cube = magpylib.magnet.Cuboid(
             polarization=[REMANENCE * a for a in axis],
             dimension=[EDGE] * 3,
             position=center,
-            orientation=Rotation.from_rotvec([0, -turned(case), 0]),
+            orientation=Rotation.from_rotvec(turn),
         )
         cube.susceptibility = RECOIL - 1
         cubes.append(mesh_Cuboid(cube, (n, n, n)))

@@ -5,22 +5,24 @@ from importlib.metadata import version
 
 import numpy as np
 from magtense.magstatics import Tiles, get_H_field, iterate_magnetization
-from problems import CUBES, EDGE, MU_0, RECOIL, REMANENCE, points_below, turned
+from problems import CUBES, EDGE, MU_0, RECOIL, REMANENCE, matrices, points_below, turns
 from said import measure, say
 
 case, n = sys.argv[1], int(sys.argv[2])
-points, angle = np.asfortranarray(points_below()), turned(case)
+points = np.asfortranarray(points_below())
 centres, axes = (np.array(one) for one in zip(*CUBES[case], strict=True))
-axes = axes @ np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+axes = np.einsum("nij,nj->ni", matrices(case), axes)
 
 
 def field():
     """B at the points."""
     cubes = len(centres)
-    tiles = Tiles(n=cubes, tile_type=2, size=[EDGE] * 3, offset=centres, rot=[[0.0, -angle, 0.0]] * cubes,
+    tiles = Tiles(n=cubes, tile_type=2, size=[EDGE] * 3, offset=centres, rot=turns(case).tolist(),
                   M_rem=REMANENCE / MU_0, easy_axis=axes, mu_r_ea=RECOIL, mu_r_oa=RECOIL)  # fmt: skip
-    for across in (tiles.u_oa1, tiles.u_oa2):  # they are not of length one where the easy axis is oblique
-        across /= np.linalg.norm(across, axis=1)[:, None]
+    # of its own the transverse axes are not of length one where the easy axis is oblique, and none where it is y
+    first = np.cross(axes, np.eye(3)[np.argmin(np.abs(axes), axis=1)])
+    tiles.u_oa1[:] = first / np.linalg.norm(first, axis=1)[:, None]
+    tiles.u_oa2[:] = np.cross(axes, tiles.u_oa1)
     tiles.refine_prism(list(range(cubes)), [n, n, n])
     tiles.M_rem = REMANENCE / MU_0  # refining leaves the remanence of new tiles at zero
     iterate_magnetization(tiles, max_error=1e-8)

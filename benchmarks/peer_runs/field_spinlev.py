@@ -8,26 +8,24 @@ import sys
 from importlib.metadata import version
 
 import numpy as np
-from problems import CUBES, EDGE, RECOIL, REMANENCE, points_below, turned
+from problems import CUBES, EDGE, RECOIL, REMANENCE, matrices, points_below
 from said import measure, say
 
 from spinlev.fem.closed_forms.moments import carrier
 from spinlev.fem.closed_forms.uniform import remanent_field
 from spinlev.fem.elements.surface import SurfaceCharges
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry import Box, Magnet, tilt
+from spinlev.geometry import Box, Magnet
 
 case, resolution = sys.argv[1], float(sys.argv[2])
 points = points_below()
+bodies, way = matrices(case), np.eye(3)
+if "turned" in sys.argv:
+    bodies, way = np.eye(3)[None], bodies[0]
 rotor = tuple(
-    Magnet(Box((EDGE,) * 3, np.array(center)), REMANENCE * np.array(axis), RECOIL) for center, axis in CUBES[case]
+    Magnet(Box((EDGE,) * 3, np.array(center), turn), REMANENCE * np.array(axis), RECOIL)
+    for (center, axis), turn in zip(CUBES[case], bodies, strict=True)
 )
-way = np.eye(3)
-if case == "tilted" and "turned" in sys.argv:
-    angle = turned(case)
-    way = np.array([[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0], [np.sin(angle), 0, np.cos(angle)]])
-elif case == "tilted":
-    rotor = tilt(turned(case), EDGE, REMANENCE, RECOIL)
 
 
 def field():

@@ -13,11 +13,33 @@ CUBES = {
     "tilted": [((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))],
 }
 """Centres and axes of magnetisation, the axes in the frame of the body."""
+RING, RING_RADIUS = 2 * np.pi * np.arange(8) / 8, 0.022
+CUBES["ring of 8"] = [
+    ((RING_RADIUS * np.cos(t), RING_RADIUS * np.sin(t), 0.0), (np.cos(t), np.sin(t), 0.0)) for t in RING.tolist()
+]
+"""A Halbach ring: each cube is turned by its place's angle, its magnetisation by twice that."""
 
 
 def turned(case):
     """Angle (rad) about y that takes the x axis towards z."""
     return TILT if case == "tilted" else 0.0
+
+
+def turns(case):
+    """Rotation vectors (n, 3) of the cubes, rad; about one axis each."""
+    if case == "ring of 8":
+        return np.outer(RING, [0.0, 0.0, 1.0])
+    return np.tile([0.0, -turned(case), 0.0], (len(CUBES[case]), 1))
+
+
+def matrices(case):
+    """The same as matrices (n, 3, 3)."""
+    found = []
+    for vector in turns(case):
+        angle = np.linalg.norm(vector)
+        k = np.cross(np.eye(3), vector / angle if angle else vector)
+        found.append(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k)
+    return np.array(found)
 
 
 def points_below(count=24):
