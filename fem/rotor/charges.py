@@ -123,21 +123,21 @@ def _fitted_beside(
     around, elsewhere = (_all_around(nodes, clearance, seed) for seed in (3, 4))
     elsewhere = elsewhere[:: 1 + len(elsewhere) // OTHERS]
     allowed, wanted = at(elsewhere)
-    best = list[tuple[FittedExpansions, float]]()
+    tried = list[tuple[float, FittedExpansions, float]]()
     for spacing in SPACINGS:
         centers = _spread(nodes.places, spacing * clearance, len(nodes.places))
         count = len(centers) * MOMENTS
-        if best and count > MOST_FITTED:
+        if tried and count > MOST_FITTED:
             break
         points = _spread(around, 0.0, max(int(ROWS * count), NEAR))
         weights, field = at(points)
         fit = FittedExpansions(centers, np.full(len(centers), clearance / 3), BESIDE_DEGREE, points, weights)
         own, step = (summed_derivatives(parts, elsewhere, 1) for parts in fit.of(field))
         missed, most = (float(np.max(np.linalg.norm(b, axis=1) / allowed)) for b in (own - wanted, step))
-        best.append((fit, SAFETY * missed / most))
+        tried.append((missed, fit, SAFETY * missed / most if most else 0.0))
         if missed <= MISSED:
             break
-    return best[-1]
+    return min(tried, key=lambda one: one[0])[1:]
 
 
 def converging(magnets: Rotor, accuracy: Accuracy, points: Array) -> list[bool]:
