@@ -53,7 +53,7 @@ FORMATS = {
     "rotor-losses": 2,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 5,
+    "equilibria": 6,
     "experiment": 2,
     "code": 1,
 }

@@ -183,7 +183,7 @@ def field_key(scene: Scene, model: str, rtol: float) -> str:
 def equations_key(scene: Scene, models: Models) -> str:
     """All that decides a scene's tables and equations of motion without plate; what it leaves out are parameters."""
     floater = scene.floater
-    shape = "" if floater.is_sphere else key_of("equilibria", floater.magnets, floater.round)
+    shape = "" if floater.is_sphere else key_of("equilibria", floater.magnets, floater.round, floater.mean)
     return " ".join(
         (
             field_key(scene, models.model, models.rtol),

@@ -31,7 +31,7 @@ from .curves import FARTHEST, SearchRange, fixed_points
 from .equilibrium import AVERAGED, LOCKED, Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey, eigenmodes, modes
 from .orbits import ForcedMotion, overlap
 
-BEYOND = 0.1  # Part of a floater's weight that its multipoles may leave out; beyond, they do not tell an equilibrium
+BEYOND = 0.1  # Part of a floater's weight that multipoles on its axis may leave out; beyond, its whole body tells
 TURNS = 16  # about the moment from which each frequency-locked one is looked for
 STEPS = 60  # of Newton's method at most
 REACH = 0.2  # longest of its steps, in radii and rad
@@ -159,13 +159,9 @@ def _survey_of_any_body(
     if scene.floater.turns_freely:
         about = Balance(quick, values, spin * ratio, _own_spin(scene) * scales.time * ratio)
         seeds = remembered(lambda: _search(round_scene, exactly, about, farthest, watch), AVERAGED)
-        exact = replace(about, rates=Rates(exactly))
-        place, moment, step = solve(exact, seeds.points[:, :3], seeds.points[:, 3:], EVERY)
-        points = np.column_stack([place, moment])[step < CONVERGED_STEP]  # two may have become one
-        points = points[np.sort(np.unique(np.round(points / DUPLICATE_DISTANCE), axis=0, return_index=True)[1])]
+        exact, points = _by_whole_body(scene, table, about, seeds.points)
         here, doubts = field_doubts(table, points[:, :3] * scales.length)
-        free = [rotor_gap(scene, p[:3] * scales.length, scene.floater.axes(p[3:])) > 0 for p in points[here]]
-        points, doubts = points[here][free], doubts[free]
+        points = points[here]
         known = survey_of(round_scene, exact, FixedPoints.at(exact, points, doubts, seeds.curves))
         found, curves = [replace(one, kind=AVERAGED) for one in known.equilibria], known.curves
     if scene.frequency and not np.any(scene.gravity[:2]):
@@ -211,7 +207,12 @@ def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, 
     curves, where = fixed_points(balance, SearchRange(scene, farthest), watch)
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
     if not (scene.floater.is_sphere or scene.floater.mean):
-        known, doubts = _of_shape(scene, table, known, doubts, where)
+        free, errors = _of_shape(scene, table, known, doubts, where)
+        if free is None:
+            balance, where = _by_whole_body(scene, table, balance, where)
+            known, doubts = field_doubts(table, where[:, :3] * scales.length)
+        else:
+            known, doubts = free, errors
     weight = scene.floater.mass * float(scene.gravity[2])
     unit = scene.floater.mass * scales.length / scales.time**2
     forces = [ForceCurve(c.points[:, :3] * scales.length, c.points[:, 3:], c.force * unit - weight) for c in curves]
@@ -220,8 +221,8 @@ def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, 
 
 def _of_shape(
     scene: Scene, table: FieldTable, known: NDArray[np.bool_], doubts: Array, where: Array
-) -> tuple[NDArray[np.bool_], Array]:
-    """Places where a floater that is no sphere is free of the rotor and its multipoles tell the force, and doubts."""
+) -> tuple[NDArray[np.bool_] | None, Array]:
+    """Places where a floater that is no sphere is free of the rotor, and doubts; None where multipoles will not do."""
     # The search knows the largest sphere in it alone; what the multipoles leave out is added to the doubts.
     floater, length = scene.floater, Scales.of(scene).length
     (shape,) = (effect for effect in with_effects(scene, table).effects if isinstance(effect, FloaterShape))
@@ -233,9 +234,26 @@ def _of_shape(
         with suppress(RangeError):  # part of the floater is where a series of the rotor's field does not converge
             if rotor_gap(scene, place, moment) > 0:
                 missed = shape.missed(table, place[None], moment[None])[0]
-                kept[k] = missed[1] * floater.moment < BEYOND * floater.mass * unit
-                more += [np.concatenate([doubt[:2] + missed, doubt[2:]])] if kept[k] else []
+                if missed[1] * floater.moment > BEYOND * floater.mass * unit:
+                    return None, doubts
+                kept[k] = True
+                more += [np.concatenate([doubt[:2] + missed, doubt[2:]])]
     return kept, np.reshape(more, (-1, doubts.shape[1]))
+
+
+def _by_whole_body(scene: Scene, table: FieldTable, balance: Balance, where: Array) -> tuple[Balance, Array]:
+    """Balance of a floater by as many dipoles all over it as its force takes, and the points (n, 6) where it vanishes.
+
+    From those of its multipoles, `where`; which overlap the rotor are left out.
+    """
+    round_scene, exactly, _ = mean_over_turns(scene, table)
+    scales = Scales.of(round_scene)
+    exact = replace(balance, rates=Rates(exactly), values=parameters(round_scene, scales, frozen_spin=True))
+    place, moment, step = solve(exact, where[:, :3], where[:, 3:], EVERY)
+    points = np.column_stack([place, moment])[step < CONVERGED_STEP]  # two may have become one
+    points = points[np.sort(np.unique(np.round(points / DUPLICATE_DISTANCE), axis=0, return_index=True)[1])]
+    free = [rotor_gap(scene, p[:3] * scales.length, scene.floater.axes(p[3:])) > 0 for p in points]
+    return exact, points[np.array(free, bool)]
 
 
 def survey_of(scene: Scene, balance: Balance, known: FixedPoints) -> Survey:
