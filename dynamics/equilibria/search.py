@@ -17,6 +17,7 @@ from ...fem.cache import TableKind
 from ...fem.rotor.table import ROUND_OFF, FieldTable, RangeError, RotorTable
 from ...geometry.common import Array, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
+from ..motion.body_shape import BodyShape
 from ..motion.coils import BesideCoils
 from ..motion.effect import Interaction
 from ..motion.effects import mean_over_turns, with_effects
@@ -244,7 +245,7 @@ def _of_shape(
 def _by_whole_body(scene: Scene, table: FieldTable, balance: Balance, where: Array) -> tuple[Balance, Array]:
     """Balance of a floater by as many dipoles all over it as its force takes, and the points (n, 6) where it vanishes.
 
-    From those of its multipoles, `where`; which overlap the rotor are left out.
+    From those of its multipoles, `where`; which overlap the rotor are left out, or reach where its field is not known.
     """
     round_scene, exactly, _ = mean_over_turns(scene, table)
     scales = Scales.of(round_scene)
@@ -252,8 +253,15 @@ def _by_whole_body(scene: Scene, table: FieldTable, balance: Balance, where: Arr
     place, moment, step = solve(exact, where[:, :3], where[:, 3:], EVERY)
     points = np.column_stack([place, moment])[step < CONVERGED_STEP]  # two may have become one
     points = points[np.sort(np.unique(np.round(points / DUPLICATE_DISTANCE), axis=0, return_index=True)[1])]
-    free = [rotor_gap(scene, p[:3] * scales.length, scene.floater.axes(p[3:])) > 0 for p in points]
-    return exact, points[np.array(free, bool)]
+    (body,) = (effect for effect in exactly.effects if isinstance(effect, BodyShape))
+
+    def free(place: Array, moment: Array) -> bool:
+        """Whether the floater is, of the rotor, and all of it where the rotor's field is known."""
+        sources = body.sources.turned(round_scene.floater.axes(moment))
+        inside = table.in_range(place + np.concatenate([sources.places, sources.corners])).all()
+        return bool(inside) and rotor_gap(scene, place, scene.floater.axes(moment)) > 0
+
+    return exact, points[np.array([free(p[:3] * scales.length, p[3:]) for p in points], bool)]
 
 
 def survey_of(scene: Scene, balance: Balance, known: FixedPoints) -> Survey:
