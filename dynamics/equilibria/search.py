@@ -160,7 +160,7 @@ def _survey_of_any_body(
     if scene.floater.turns_freely:
         about = Balance(quick, values, spin * ratio, _own_spin(scene) * scales.time * ratio)
         seeds = remembered(lambda: _search(round_scene, exactly, about, farthest, watch), AVERAGED)
-        exact, points = _by_whole_body(scene, table, about, seeds.points)
+        exact, points = _by_whole_body(scene, table, about, seeds.points, farthest)
         here, doubts = field_doubts(table, points[:, :3] * scales.length)
         points = points[here]
         known = survey_of(round_scene, exact, FixedPoints.at(exact, points, doubts, seeds.curves))
@@ -210,7 +210,7 @@ def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, 
     if not (scene.floater.is_sphere or scene.floater.mean):
         free, errors = _of_shape(scene, table, known, doubts, where)
         if free is None:
-            balance, where = _by_whole_body(scene, table, balance, where)
+            balance, where = _by_whole_body(scene, table, balance, where, farthest)
             known, doubts = field_doubts(table, where[:, :3] * scales.length)
         else:
             known, doubts = free, errors
@@ -242,7 +242,9 @@ def _of_shape(
     return kept, np.reshape(more, (-1, doubts.shape[1]))
 
 
-def _by_whole_body(scene: Scene, table: FieldTable, balance: Balance, where: Array) -> tuple[Balance, Array]:
+def _by_whole_body(
+    scene: Scene, table: FieldTable, balance: Balance, where: Array, farthest: float
+) -> tuple[Balance, Array]:
     """Balance of a floater by as many dipoles all over it as its force takes, and the points (n, 6) where it vanishes.
 
     From those of its multipoles, `where`; which overlap the rotor are left out, or reach where its field is not known.
@@ -251,7 +253,8 @@ def _by_whole_body(scene: Scene, table: FieldTable, balance: Balance, where: Arr
     scales = Scales.of(round_scene)
     exact = replace(balance, rates=Rates(exactly), values=parameters(round_scene, scales, frozen_spin=True))
     place, moment, step = solve(exact, where[:, :3], where[:, 3:], EVERY)
-    points = np.column_stack([place, moment])[step < CONVERGED_STEP]  # two may have become one
+    found = (step < CONVERGED_STEP) & SearchRange(scene, farthest).holds(place)
+    points = np.column_stack([place, moment])[found]  # two may have become one
     points = points[np.sort(np.unique(np.round(points / DUPLICATE_DISTANCE), axis=0, return_index=True)[1])]
     (body,) = (effect for effect in exactly.effects if isinstance(effect, BodyShape))
 
