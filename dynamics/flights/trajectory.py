@@ -168,9 +168,9 @@ def flight_kind(flight: Trajectory) -> str:
 
     By the mean distance, and from the size of the oscillation in the rotor's frame about its trend, in twenty
     parts of the time.  Lost or in contact: "lost at once", with no levitation; an "oscillating loss" if the oscillation
-    grew more than the mean distance changed, in all of the time or in its last part; else a "linear fall".  Levitating
-    at the end: "growing oscillation" if it became more than twice as large, or "drifting" if the distance goes on
-    changing steadily in the second half, both by 0.02 mm at least; else "stable".
+    grew more than the mean distance changed until it was largest, in all of the time or in its last part; else a
+    "linear fall".  Levitating at the end: "growing oscillation" if it became more than twice as large, or "drifting" if
+    the distance goes on changing steadily in the second half, both by 0.02 mm at least; else "stable".
     """
     if flight.left_plate_table:
         return NOT_FOLLOWED
@@ -190,14 +190,15 @@ def flight_kind(flight: Trajectory) -> str:
 
 
 def _swings(flight: Trajectory, samples: Indices) -> bool:
-    """Whether the oscillation grew more than the mean distance changed among samples (n,), but for the last of them.
+    """Whether the oscillation grew more than the mean distance changed until it was largest, among samples (n,).
 
-    Where there are too few it is not known, and said not to.
+    The last of them do not count. Where there are too few it is not known, and said not to.
     """
     if len(samples) < FEWEST * WINDOWS:
         return False
     means, sizes = (trend[:-1] for trend in _trends(flight, samples))
-    return bool(sizes.max() - sizes[0] > abs(means[-1] - means[0]))
+    largest = int(np.argmax(sizes))  # soon afterwards it may fall
+    return bool(sizes[largest] - sizes[0] > max(VISIBLE, abs(means[largest] - means[0])))
 
 
 def _trends(flight: Trajectory, samples: Indices) -> tuple[Array, Array]:
