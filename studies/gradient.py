@@ -15,8 +15,10 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.continuation.branch import BranchPoint
 from ..dynamics.continuation.frequencies import BORDER, CONTACT, stable_ranges
+from ..dynamics.equilibria.balance import Balance
 from ..dynamics.equilibria.derivatives import Implicit, Nearby, Tangent
 from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, LOCKED, Equilibrium, EquilibriumError
+from ..dynamics.motion.equations import parameters
 from ..dynamics.motion.events import rotor_gap
 from ..dynamics.motion.rotor_effects import Mutual
 from ..dynamics.motion.state import Scales, State
@@ -54,6 +56,7 @@ END_FOUND = 1e-6  # Relative error of derivatives of ends, by how exactly they a
 # 100 are off by, in scenes by which it was chosen (two) and others (nine)
 TABLED = 10.0
 OF_MODES = ("growth", "mode_growth", "mode_frequency", "plate_damping")
+BALANCED = 1e-6  # what is left of scaled balances at an equilibrium of the equations, at most
 AT_FOLD = "at a fold an equilibrium has no derivatives"
 
 
@@ -90,7 +93,7 @@ class Gradient:
 
         There is none by a key, or no equations, where it is not known: see `reasons`.
         """
-        base = NearbyScenes(self.levitation, self.scene, known.kind == AVERAGED, known.currents is not None)
+        base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), known.currents is not None)
         if known.kind == LOCKED:
             self.reasons[LOCKED] = (
                 "derivatives of frequency-locked equilibria of a body that is not round are not known"
@@ -114,6 +117,20 @@ class Gradient:
                 bare = [replace(one, setting=replace(one.setting, plate=None)) for one in nearby]
                 found[key] = replace(found[key], without=fixed.by(bare))
         return found, implicit, base
+
+    def _by_mean(self, known: Equilibrium) -> bool:
+        """Whether an equilibrium is one of the floater's mean, which has dipoles all over the body.
+
+        So it is of a round floater where those on its axis will not do.
+        """
+        scene = self.levitation.scene
+        if known.kind == AVERAGED or not scene.floater.round or scene.floater.is_sphere:
+            return known.kind == AVERAGED
+        fixed, scales = known.without or known, Scales.of(scene)
+        spin = self.levitation.spin * scales.spin_ratio
+        balance = Balance(self.levitation.rates, parameters(scene, scales, frozen_spin=True), spin)
+        values, _ = balance(fixed.position[None] / scales.length, fixed.state.moment[None])
+        return bool(np.abs(values).max() > BALANCED)
 
     def end_by(self, point: BranchPoint, key: str) -> tuple[float, float]:
         """Derivative of the frequency of a range's end, at which the scene is, by a number, and its estimated error."""
@@ -255,7 +272,7 @@ class Gradient:
             )
             return np.nan, lost, lost
         there = min(beyond, key=lambda e: e.distance)
-        base = NearbyScenes(self.levitation, self.scene, known.kind == AVERAGED, False)
+        base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), False)
         ends = [Implicit(e, base.setting) for e in (there, here)]
         first, last = (base.setting.jacobi(State(*(v[None] for v in e.state.vectors))) for e in (there, here))
         found = []
