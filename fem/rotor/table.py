@@ -23,7 +23,7 @@ DEEP = 0.1  # of the radius of a doubt's sources: its terms are evaluated no nea
 BLUR = 0.5  # share of the root mean square of a doubt that is added to its field
 ROUND_OFF = 1e-13  # of a field and its gradient, relative
 KNOWN = "truncation"  # what is cut off an expansion is known exactly
-# Of expansions all over a magnet, in which large parts cancel: their errors' fields alone count, with a factor of safety
+# Of expansions all over a magnet, in which large parts cancel: of their errors the field alone counts, with a factor
 PIECES, CHARGES = "pieces", "charges of pieces"
 
 
