@@ -457,7 +457,7 @@ def simulate(
     table: FieldTable,
     duration: float,
     equilibria: Sequence[Equilibrium] | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     compact: bool | None = None,
     progress: Callable[[float], None] | None = None,
     memory: PlateMemory | None = None,
@@ -471,7 +471,7 @@ def simulate(
     Parameters
     ----------
     equilibria : of this scene, if they are already known
-    tolerance, compact : see `Flight`
+    tolerance, compact : see `Flight`; None: `TOLERANCE`, or `PLATE_TOLERANCE` with a plate's currents
     progress : called with the finished part, 0 to 1, a few times a second
     memory : the plate's currents; left out, the plate is only an obstacle
     checkpoint : where the trajectory is kept while it lasts; it goes on from there if there is something
@@ -479,8 +479,8 @@ def simulate(
     if not duration > 0:
         raise StartError(f"Input duration must be positive; instead received {duration} s.")
     start, currents = initial_state(scene, table, equilibria, memory)
-    if memory is not None:
-        tolerance = max(tolerance, PLATE_TOLERANCE)
+    if tolerance is None:
+        tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
     flight = Flight(scene, table, duration, tolerance, compact, memory)
     return integrate(flight, start, duration, progress, currents, checkpoint)
 

@@ -93,7 +93,10 @@ def test_multipliers_with_currents_in_the_rotor_are_the_growth_of_a_kicked_fligh
 
 @pytest.mark.slow
 def test_the_ledger_closes_with_every_loss(shaken, memory):
-    """Mutual magnetisation, both currents, real air and a sinking plate, after a kick: 1e-10 of the energy."""
+    """Mutual magnetisation, both currents, real air and a sinking plate, after a kick: 1e-11 of the energy.
+
+    With steps of 1e-12, as over plates by default, it is the steps' error: 1.3e-10, and 1.2e-11 with those of 1e-13.
+    """
     answers = Mutual(cached_mutual_table(BARE, PERMEABLE, print)[0], PERMEABLE.moment)
     whole = Interaction(FIELD, (answers, CURRENTS))
     plate = replace(PLATE, lowering=Lowering(0.1, 0.02, 0.002))
@@ -107,8 +110,8 @@ def test_the_ledger_closes_with_every_loss(shaken, memory):
     )
     names = {effect.name for effect in with_effects(scene, whole).effects}
     assert names == {MUTUAL, ROTOR_CURRENTS, FLOATER_CURRENTS, REAL_AIR}
-    flight = simulate(scene, whole, 0.3, memory=replace(memory, plate=plate))
+    flight = simulate(scene, whole, 0.3, tolerance=1e-14, memory=replace(memory, plate=plate))
     assert flight.ended_by == "duration"
     assert np.ptp(flight.lab.position[:, 2]) > 1e-4
     print(f"\n0.3 s with every loss: ledger {flight.energy_error:.1e}")
-    assert flight.energy_error < 1e-10
+    assert flight.energy_error < 1e-11
