@@ -32,7 +32,7 @@ from ..fem.mutual.table import MutualTable
 from ..fem.plate.choice import PlateAround, plate_around, rotor_nearby, wider_region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
-from ..fem.rotor.changed import changed_table, follows
+from ..fem.rotor.changed import ChangedTable, changed_table, follows
 from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rotor_table
 from ..fem.rotor.models import AccuracyError
 from ..fem.rotor.table import FieldTable, RotorTable
@@ -273,7 +273,8 @@ class Levitation:
         """All equilibria in a table, from the cache if they were searched for before."""
 
         def remembered(search: Callable[[], FixedPoints], kind: str) -> FixedPoints:
-            if self.scene.field_map:  # no number in a key stands for how a map is fitted
+            # no number in a key stands for how a map is fitted, or what magnets a field followed to these
+            if self.scene.field_map or isinstance(interaction_of(table).field, ChangedTable):
                 return search()
             found, known = cached_points(self.still, f"{equations} {kind}".strip(), self.spin, search, note)
             if known:
