@@ -32,7 +32,7 @@ UNREPEATABLE = (
     "cpu",
 )
 """Words in the names of numbers that are measured, or round-off, and differ from run to run."""
-ROUNDED = {"growth_error": 1e-4, "field_changes": 1e-6}
+ROUNDED = {"growth_error": 1e-4, "field_changes": 1e-6, "truth_error": 1e-6}
 """Tolerance, by a word in their names, of estimates that are differences of near numbers."""
 ZERO = {"spin": 1e-12}
 """Differences that are none, rad/s or Hz, likewise: spin rates of 1e-13 are zeros."""
