@@ -10,7 +10,6 @@ from ..dynamics.equilibria.equilibrium import (
     FOLD,
     IN_PLATE,
     IN_ROTOR,
-    LOCKED,
     MODE_NAMES,
     NOT_CONVERGED,
     PAST_TABLE,
@@ -163,11 +162,6 @@ def equilibria_words(levitation: Levitation, survey: Survey) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     table = ["  ".join(["", *map(str.rjust, row[:-1], widths), row[-1]]).rstrip() for row in rows]
     said = left_out_words(levitation, left_out)
-    if levitation.plate is not None and any(e.kind == LOCKED and e.currents is None for e in found):
-        said.append(
-            "Frequency-locked equilibria are those without the plate: with its currents they are periodic motions, "
-            "which are searched for of bodies that are round about their moment alone."
-        )
     return [headline(levitation, found, left_out), *table, *said]
 
 

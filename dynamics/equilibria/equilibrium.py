@@ -1,7 +1,7 @@
 """A synchronous equilibrium with its modes, the curve on which it lies, and the survey of all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.common import Array, ComputationError, html_table, millimetres
-from ..motion.state import State, polar_angle
+from ..motion.state import State, left_product, polar_angle
 from .balance import tangent_basis
 
 INSTANTS = 129  # Of a turn, at which quantities in the laboratory are looked at; odd
@@ -143,6 +143,19 @@ class Mode:
     frequency_hz: float  # in the rotor's frame; 0 where it does not oscillate
 
 
+def turning_tangents(state: Array) -> tuple[Array, Array]:
+    """Twelve directions (13, 12) at a scaled state (13,) of a body, its turn about the rotor's axes, and projections.
+
+    See `tangent_spaces` for a round one.
+    """
+    tangents, projections = np.zeros((13, 12)), np.zeros((12, 13))
+    tangents[:6, :6] = projections[:6, :6] = np.eye(6)
+    tangents[10:, 9:] = projections[9:, 10:] = np.eye(3)
+    by_turn = 0.5 * np.stack(left_product(list(np.eye(3)), list(state[6:10, None] * np.ones(3))))
+    tangents[6:10, 6:9], projections[6:9, 6:10] = by_turn, 4 * by_turn.T
+    return tangents, projections
+
+
 def named_modes(modes: Modes, time: float) -> tuple[Mode, ...]:
     """The floater's five modes, the axial one first; `time` is the unit of time of the eigenvalues, s.
 
@@ -216,7 +229,7 @@ class Equilibrium:
         """The state at t = 0."""
         if self.turn is None:
             return self.state
-        return State(*(vector[0] for vector in self.turn.vectors))
+        return self.turn[0]
 
     @property
     def position(self) -> Array:
@@ -230,7 +243,8 @@ class Equilibrium:
         if self.turn is None:
             turn = State(*(np.tile(vector, (INSTANTS, 1)) for vector in self.state.vectors))
         else:
-            turn = State(*(resampled(vectors, INSTANTS) for vectors in self.turn.vectors))
+            axes = None if self.turn.axes is None else resampled(self.turn.axes, INSTANTS)
+            turn = replace(State(*(resampled(vectors, INSTANTS) for vectors in self.turn.vectors)), axes=axes)
         return turn if self.steady_frame else turn.to_lab(angles)
 
     @property

@@ -5,7 +5,8 @@ interpolation, so that the error falls geometrically with N.  The plate's states
 multiple h of the rotor's frequency p̃ = λ/(λ + ih) s̃.  Newton's method with exact derivatives (harmonic balance in the
 time domain: J. P. Boyd, Chebyshev and Fourier Spectral Methods, 2001, ch. 6 and 15).
 
-The equations keep |m̂| and the body spin s = Ω·m̂/ω; both are prescribed beside them.
+The equations keep |m̂| and the body spin s = Ω·m̂/ω; both are prescribed beside them.  Of a body that is not round they
+keep the length of its quaternion alone: how it turns about its moment the motion itself decides.
 """
 
 from collections.abc import Callable
@@ -35,6 +36,7 @@ from .equilibrium import (
     left_eigenvectors,
     resampled,
     tangent_spaces,
+    turning_tangents,
 )
 from .path import DIFFERENCE, END, ON, Steps, directions, follow
 
@@ -55,27 +57,27 @@ INSTANTS = 16  # Of a turn, at which a steady motion is looked at in the laborat
 class Orbit:
     """One turn of a periodic motion, scaled, along the rotor's axes."""
 
-    states: Array  # (n, 12) of the floater at n equidistant instants, the first at t = 0
+    states: Array  # (n, m) of the floater at n equidistant instants, the first at t = 0: m is 12, or 13 of `Scales`
     plate: Array  # (n, k) states of the plate
-    derivatives: Array  # (n, 12 + k, 12 + k) of all rates by all states
+    derivatives: Array  # (n, m + k, m + k) of all rates by all states
     error: float  # estimate, from the highest harmonics and the last step of Newton's method
 
     @property
     def mean(self) -> Array:
-        """(12,) mean state; its moment is made a unit vector again."""
+        """(m,) mean state; its moment is made a unit vector again, or its quaternion."""
         state = self.states.mean(axis=0)
-        state[6:9] /= np.linalg.norm(state[6:9])
+        state[6:-3] /= np.linalg.norm(state[6:-3])
         return np.asarray(state)
 
 
 def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce | None, guess: Array) -> Orbit | None:
-    """The orbit near a `guess`, a scaled state (12,) or an odd number n of them; None where Newton's method finds none.
+    """The orbit near a `guess`, a scaled state (m,) or an odd number n of them; None where Newton's method finds none.
 
     By `rates` in the rotor's field with `values`, the drag along the moment left out and gravity in any direction, with
     body `spin` s, and with the currents of a `plate` if they are modelled.
     """
     count = FEWEST
-    states = np.broadcast_to(guess, (count, 12)) if guess.ndim == 1 else resampled(guess, count)
+    states = np.broadcast_to(guess, (count, len(guess))) if guess.ndim == 1 else resampled(guess, count)
     while True:
         found = _orbit_near(rates, values, spin, plate, states)
         if found is None or _tail(found.states) < TAIL or count >= MOST:
@@ -85,7 +87,7 @@ def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce |
 
 
 def _orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | None, states: Array) -> Orbit | None:
-    """The orbit near a turn (n, 12) of states, at as many instants; see `periodic_orbit`."""
+    """The orbit near a turn (n, m) of states, at as many instants; see `periodic_orbit`."""
     problem = OrbitProblem(rates, values, plate, len(states))
     states, size = states.copy(), np.inf
     for _ in range(25):
@@ -108,12 +110,19 @@ def _orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | No
 
 
 def _tail(states: Array) -> float:
-    """Size of the highest harmonics of a turn (n, 12): what more instants would add."""
+    """Size of the highest harmonics of a turn (n, m): what more instants would add."""
     return float((np.abs(np.fft.rfft(states, axis=0)) / len(states))[-2:].max())
 
 
 def conserved(states: Array, spin: float) -> tuple[Array, Array]:
-    """Derivatives (2, 12 n) and values (2,) of |m̂|²/2 - 1/2 and Ω·m̂ - s at the first instant."""
+    """Derivatives (2, 12 n) and values (2,) of |m̂|²/2 - 1/2 and Ω·m̂ - s at the first instant.
+
+    Of a body that is not round that of its quaternion alone.
+    """
+    if states.shape[1] > 12:
+        rows, quaternion = np.zeros((1, states.size)), states[0, 6:10]
+        rows[0, 6:10] = quaternion
+        return rows, np.array([(quaternion @ quaternion - 1) / 2])
     moment, turning = states[0, 6:9], states[0, 9:]
     rows = np.zeros((2, states.size))
     rows[0, 6:9], rows[1, 6:9], rows[1, 9:12] = moment, turning, moment
@@ -128,29 +137,30 @@ class Pencil:
     """
 
     change: Array  # (n, n) derivative by scaled time
-    slopes: Array  # (n, 12, 12) of the floater's rates, the plate's currents as they are
+    slopes: Array  # (n, m, m) of the floater's rates, the plate's currents as they are
     plate: PlateForce | None = None
     drive: PlateCoupling | None = None
 
     def matrix(self, shift: complex) -> NDArray[Any]:
-        """T (12 n, 12 n) at λ = `shift` per unit of scaled time."""
-        n = len(self.change)
-        found = np.einsum("ab,xy->axby", self.change + shift * np.eye(n), np.eye(12))
+        """T (m n, m n) at λ = `shift` per unit of scaled time."""
+        n, size, _ = self.slopes.shape
+        found = np.einsum("ab,xy->axby", self.change + shift * np.eye(n), np.eye(size))
         found[np.arange(n), :, np.arange(n)] -= self.slopes
         if self.plate is not None and self.drive is not None:
             answer = self.plate.remembered(n, shift) - np.eye(n)
             parts = self.drive.fields, answer, self.drive.by_state
-            found[:, ACCELERATED] -= np.einsum("aix,iab,biy->axby", *parts, optimize=True)
-        return np.asarray(found.reshape(12 * n, 12 * n))
+            found[:, accelerated(size)] -= np.einsum("aix,iab,biy->axby", *parts, optimize=True)
+        return np.asarray(found.reshape(size * n, size * n))
 
     def applied(self, vector: NDArray[Any], shift: complex) -> NDArray[Any]:
-        """T(λ) v (12 n,) of a vector (12 n,), without the matrix."""
-        motion = vector.reshape(-1, 12)
+        """T(λ) v (m n,) of a vector (m n,), without the matrix."""
+        count, size, _ = self.slopes.shape
+        motion = vector.reshape(count, size)
         found = self.change @ motion + shift * motion - np.einsum("axy,ay->ax", self.slopes, motion)
         if self.plate is not None and self.drive is not None:
             signals = np.einsum("biy,by->bi", self.drive.by_state, motion)
-            currents = np.einsum("iab,bi->ai", self.plate.remembered(len(motion), shift), signals) - signals
-            found[:, ACCELERATED] -= np.einsum("aix,ai->ax", self.drive.fields, currents)
+            currents = np.einsum("iab,bi->ai", self.plate.remembered(count, shift), signals) - signals
+            found[:, accelerated(size)] -= np.einsum("aix,ai->ax", self.drive.fields, currents)
         return np.asarray(found.ravel())
 
 
@@ -169,12 +179,12 @@ class OrbitProblem:
         return 2 * np.pi * np.arange(self.count) / self.count
 
     def __call__(self, states: Array) -> tuple[Array, Array]:
-        """Residual (12 n,) and its derivatives (12 n, 12 n)."""
+        """Residual (m n,) and its derivatives (m n, m n)."""
         residual, pencil = self.linear(states)
         return residual, pencil.matrix(0.0)
 
     def linear(self, states: Array) -> tuple[Array, Pencil]:
-        """Residual (12 n,), and the equations of small deviations about these states (n, 12)."""
+        """Residual (m n,), and the equations of small deviations about these states (n, m)."""
         n, change = self.count, differentiation(self.count)
         rates, slopes = self._floater(states)
         residual = change @ states - rates
@@ -183,27 +193,29 @@ class OrbitProblem:
         # The plate pulls with what its states have relaxed to, less the signals themselves: F (M - 1) s(x).
         drive = self.plate(self.times, states)
         currents = np.einsum("iab,bi->ai", self.plate.remembered(n), drive.signals) - drive.signals
-        residual[:, ACCELERATED] -= np.einsum("aix,ai->ax", drive.fields, currents)
+        rows = accelerated(states.shape[1])
+        residual[:, rows] -= np.einsum("aix,ai->ax", drive.fields, currents)
         # F changes at the same instant alone, the currents with the signals of all instants.
-        slopes[:, ACCELERATED] += np.einsum("akyx,ak->axy", drive.pull, self.plate.strengths(currents))
+        slopes[:, rows] += np.einsum("akyx,ak->axy", drive.pull, self.plate.strengths(currents))
         return residual.ravel(), Pencil(change, slopes, self.plate, drive)
 
     def whole(self, states: Array) -> tuple[Array, Array]:
-        """States of the plate (n, k), and derivatives of all rates by all states (n, 12 + k, 12 + k)."""
+        """States of the plate (n, k), and derivatives of all rates by all states (n, m + k, m + k)."""
         slopes = self._floater(states)[1]
         if self.plate is None:
             return np.zeros((self.count, 0)), slopes
         drive, decay = self.plate(self.times, states), self.plate.rates
         memory = np.einsum("iab,bi->ai", self.plate.remembered(self.count), drive.signals)
-        size = 12 + len(decay)
+        own = states.shape[1]
+        size, rows = own + len(decay), accelerated(own)
         full = np.zeros((self.count, size, size))
-        full[:, :12, :12] = slopes
+        full[:, :own, :own] = slopes
         strengths = self.plate.strengths(memory - drive.signals)
-        full[:, ACCELERATED, :12] += np.einsum("akyx,ak->axy", drive.pull, strengths)
-        full[:, ACCELERATED, :12] -= np.einsum("aix,aiy->axy", drive.fields, drive.by_state)
-        full[:, ACCELERATED, 12:] = drive.fields.swapaxes(1, 2)
-        full[:, 12:, :12] = decay[:, None] * drive.by_state
-        full[:, 12:, 12:] = -np.diag(decay)
+        full[:, rows, :own] += np.einsum("akyx,ak->axy", drive.pull, strengths)
+        full[:, rows, :own] -= np.einsum("aix,aiy->axy", drive.fields, drive.by_state)
+        full[:, rows, own:] = drive.fields.swapaxes(1, 2)
+        full[:, own:, :own] = decay[:, None] * drive.by_state
+        full[:, own:, own:] = -np.diag(decay)
         return memory, full
 
     def _floater(self, states: Array) -> tuple[Array, Array]:
@@ -213,7 +225,9 @@ class OrbitProblem:
         return rates, slopes
 
 
-ACCELERATED = np.array([3, 4, 5, 9, 10, 11])  # Places of velocity and spin in the state
+def accelerated(size: int) -> Indices:
+    """(6,) places of velocity and spin in a state of this size."""
+    return np.array([3, 4, 5, size - 3, size - 2, size - 1])
 
 
 def differentiation(count: int) -> Array:
@@ -243,23 +257,22 @@ WEIGHTS = np.array([5, 8, 5]) / 18
 
 
 def floquet_modes(orbit: Orbit) -> Modes:
-    """Modes of an orbit that keep |m̂| and the body spin: growth and frequencies over a turn.
+    """Modes of an orbit that keep what the equations keep, as |m̂| and body spin: growth and frequencies over a turn.
 
     A multiplier ρ leaves a frequency open to whole multiples of the rotor's; each mode is given at the one that is
     strongest in its motion along the rotor's axes.  The error is that of the steps (twice as long for comparison) and
-    of round-off.  Of the plate's own modes, which only decay, the ten of the floater are distinguished by their shapes.
+    of round-off.  Of the plate's own modes, which only decay, the floater's are distinguished by their shapes.
     """
-    size = orbit.derivatives.shape[1]
-    tangent, projection = np.zeros((size, size - 2)), np.zeros((size - 2, size))
-    tangent[:12, :10], projection[:10, :12] = (found[0] for found in tangent_spaces(orbit.states[:1]))
-    tangent[12:, 10:] = projection[10:, 12:] = np.eye(size - 12)
-    coarse, steps = _propagated(orbit.derivatives, STEPS)[-1], 2 * STEPS
+    size, own_size = orbit.derivatives.shape[1], orbit.states.shape[1]
+    tangent, projection = (scipy.linalg.block_diag(part, np.eye(size - own_size)) for part in _kept(orbit.states[0]))
+    free = tangent.shape[1] - (size - own_size)
+    coarse, steps = _propagated(orbit.derivatives, own_size, STEPS)[-1], 2 * STEPS
     while True:
-        matrices = _propagated(orbit.derivatives, steps)
+        matrices = _propagated(orbit.derivatives, own_size, steps)
         turn = projection @ matrices[-1] @ tangent
         multipliers, right = np.linalg.eig(turn)
         left = left_eigenvectors(right)
-        own = np.argsort(-np.linalg.norm(right[:10], axis=0))[:10]
+        own = np.argsort(-np.linalg.norm(right[:free], axis=0))[:free]
         stepped = SHARE * np.abs(np.einsum("ij,ji->i", left @ (turn - projection @ coarse @ tangent), right))
         if stepped[own].max() < ENOUGH or steps >= MOST_STEPS:
             break
@@ -269,11 +282,19 @@ def floquet_modes(orbit: Orbit) -> Modes:
     rates = np.log(multipliers[own].astype(complex)) / (2 * np.pi)
     errors = (stepped + rounded)[own] / (2 * np.pi * np.abs(multipliers[own]))
     shapes = tangent @ right[:, own]
-    return Modes(rates + 1j * _turns(matrices, shapes, rates), errors, shapes[:12])
+    return Modes(rates + 1j * _turns(matrices[:, :own_size], shapes, rates), errors, shapes[:own_size])
 
 
-def _propagated(derivatives: Array, steps: int) -> Array:
-    """Propagator of deviations (steps + 1, s, s) after every step of a turn.
+def _kept(state: Array) -> tuple[Array, Array]:
+    """Directions (m, k) of a state (m,) that keep what the equations keep, and projections (k, m) on them."""
+    if len(state) > 12:
+        return turning_tangents(state)
+    tangents, projections = tangent_spaces(state[None])
+    return tangents[0], projections[0]
+
+
+def _propagated(derivatives: Array, own_size: int, steps: int) -> Array:
+    """Propagator of deviations (steps + 1, s, s) after every step of a turn, of the floater's states and the plate's.
 
     The plate's states, each of which decays by itself, are eliminated from the equations of a step's stages: what is
     solved for are the floater's slopes alone.
@@ -284,19 +305,20 @@ def _propagated(derivatives: Array, steps: int) -> Array:
     spectrum[1:] *= 2
     instants = step * (np.arange(steps)[:, None] + NODES)
     slopes = np.tensordot(np.exp(1j * instants[..., None] * np.arange(len(spectrum))), spectrum, 1).real
-    own, fields, driven = slopes[..., :12, :12], slopes[..., :12, 12:], slopes[..., 12:, :12]
-    decay = -np.diagonal(slopes[0, 0, 12:, 12:])
+    m = own_size
+    own, fields, driven = slopes[..., :m, :m], slopes[..., :m, m:], slopes[..., m:, :m]
+    decay = -np.diagonal(slopes[0, 0, m:, m:])
     damped = np.linalg.inv(np.eye(3) + step * decay[:, None, None] * COLLOCATION)
     lag = step * COLLOCATION @ damped
-    lagging = [(fields * lag[:, :, k].T[:, None]).reshape(steps, 36, size - 12) @ driven[:, k] for k in range(3)]
-    pull = np.stack(lagging, axis=-2).reshape(steps, 3, 12, 3, 12)
+    lagging = [(fields * lag[:, :, k].T[:, None]).reshape(steps, 3 * m, size - m) @ driven[:, k] for k in range(3)]
+    pull = np.stack(lagging, axis=-2).reshape(steps, 3, m, 3, m)
     pull[:, range(3), :, range(3)] += own.swapaxes(0, 1)
     kept = fields * (1 - decay[:, None] * lag.sum(axis=2)).T[:, None]
-    system = np.eye(36) - step * np.einsum("njxky,km->njxmy", pull, COLLOCATION).reshape(steps, 36, 36)
-    right = np.concatenate([pull.sum(axis=3), kept], axis=-1).reshape(steps, 36, size)
-    stages = np.linalg.solve(system, right).reshape(steps, 3, 12, size)
-    signals = driven @ (np.eye(12, size) + step * np.einsum("km,nmxs->nkxs", COLLOCATION, stages))
-    signals -= np.eye(size)[12:] * decay[:, None]
+    system = np.eye(3 * m) - step * np.einsum("njxky,kl->njxly", pull, COLLOCATION).reshape(steps, 3 * m, 3 * m)
+    right = np.concatenate([pull.sum(axis=3), kept], axis=-1).reshape(steps, 3 * m, size)
+    stages = np.linalg.solve(system, right).reshape(steps, 3, m, size)
+    signals = driven @ (np.eye(m, size) + step * np.einsum("kl,nlxs->nkxs", COLLOCATION, stages))
+    signals -= np.eye(size)[m:] * decay[:, None]
     moved = step * np.einsum("j,njxs->nxs", WEIGHTS, stages)
     relaxed = step * sum(signals[:, k] * (WEIGHTS @ damped)[:, k, None] for k in range(3))
     found = [np.eye(size)]
@@ -309,7 +331,7 @@ def _turns(matrices: Array, shapes: Array, rates: Array) -> Array:
     """The multiple of the rotor's frequency that is strongest in the periodic part of each mode."""
     steps = len(matrices) - 1
     times = 2 * np.pi * np.arange(steps) / steps
-    motion = (matrices[:-1] @ shapes)[:, :12] * np.exp(-np.outer(times, rates))[:, None]
+    motion = (matrices[:-1] @ shapes) * np.exp(-np.outer(times, rates))[:, None]
     strength = np.sum(np.abs(np.fft.fft(motion, axis=0)) ** 2, axis=1)
     return np.asarray(np.fft.fftfreq(steps, 1 / steps)[np.argmax(strength, axis=0)])
 
@@ -324,9 +346,9 @@ class OrbitCurve:
     spin: float  # body spin s
 
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
-        """Residual (1, 12 n) at one point (1, 12 n + 1), and its derivatives (1, 12 n, 12 n + 1).
+        """Residual (1, m n) at one point (1, m n + 1), and its derivatives (1, m n, m n + 1).
 
-        The equations of an orbit keep |m̂| and the spin, so that two of the 12 n + 2 follow from the others; of their
+        What the equations of an orbit keep is prescribed beside them, so that as many follow from the others; of their
         singular value decomposition as many are taken as there are unknowns but one.
         """
         states, parameter = self.states(points[0, :-1]), float(points[0, -1])
@@ -334,7 +356,7 @@ class OrbitCurve:
         residual, slope = problem(states)
         ends = [self._at(states, parameter + s * DIFFERENCE)(states)[0] for s in (1, -1)]
         rows, aims = conserved(states, self.spin * abs(problem.values[Parameter.RATE]))
-        column = np.append((ends[0] - ends[1]) / (2 * DIFFERENCE), [0.0, 0.0])
+        column = np.append((ends[0] - ends[1]) / (2 * DIFFERENCE), 0.0 * aims)
         every = np.column_stack([np.vstack([slope, rows]) * np.sqrt(len(states)), column])
         if not np.isfinite(every).all():
             return np.full((1, states.size), np.nan), np.full((1, states.size, states.size + 1), np.nan)
@@ -345,10 +367,9 @@ class OrbitCurve:
         """The points: that moments have length one is among the equations."""
         return points
 
-    @staticmethod
-    def states(unknowns: Array) -> Array:
-        """States (n, 12) of unknowns (12 n,)."""
-        states = unknowns.reshape(-1, 12)
+    def states(self, unknowns: Array) -> Array:
+        """States (n, m) of unknowns (m n,)."""
+        states = unknowns.reshape(-1, 13 if self.rates.turning else 12)
         return np.asarray(states * np.sqrt(len(states)))
 
     def _at(self, states: Array, parameter: float) -> OrbitProblem:
@@ -361,7 +382,7 @@ class ForcedMotion:
 
     scene: Scene  # gravity may have any direction
     rates: Rates  # compiled equations in the rotor's field
-    values: Array  # their parameters, with the drag along the moment left out
+    values: Array  # their parameters; of a round body with the drag along the moment left out
     memory: PlateMemory | None  # the plate's currents, if they are modelled
 
     def reaches(self, known: Equilibrium) -> bool:
@@ -373,8 +394,10 @@ class ForcedMotion:
     def equilibrium(self, known: Equilibrium) -> Equilibrium | LeftOut:
         """Periodic motion that a fixed point, or one in tilted gravity without plate, becomes; or why it is none."""
         scales, fixed = Scales.of(self.scene), known.without or known
-        begun = known.state if known.turn is None else known.turn
-        orbit, why, part = self._followed(scales.pack(begun), known.spin, known.turn is None)
+        start = scales.pack(known.state if known.turn is None else known.turn)
+        if known.turn is not None and self.rates.turning:  # of a turn there are two quaternions
+            start[:, 6:10] *= np.sign(start[:, 6:10] @ start[0, 6:10])[:, None]
+        orbit, why, part = self._followed(start, known.spin, known.turn is None)
         if orbit is None:
             return LeftOut(known, why, part)
         turn, motion, wrong = scales.unpack(orbit.states), floquet_modes(orbit), 0.0
@@ -382,21 +405,25 @@ class ForcedMotion:
             places = known.position if known.turn is None else resampled(known.turn.position, len(orbit.states))
             moved = np.linalg.norm(orbit.states[:, :3] * scales.length - places, axis=1).max()
             wrong = self.memory.error * float(moved)
+        spin = fixed.spin
+        if self.rates.turning:
+            spin = float(np.mean(np.sum(turn.spin * turn.moment, axis=1))) / self.scene.angular_velocity
         found = Equilibrium(
             state=scales.unpack(orbit.mean),
-            spin=fixed.spin,
+            spin=spin,
             residual=orbit.error,
             position_error=known.position_error + wrong + orbit.error * scales.length,
             **motion.in_seconds(scales.time),
             turn=turn,
             currents=orbit.plate / self.values[Parameter.PLATE_SHARE] if self.memory else None,
             without=fixed,
+            kind=known.kind,
         )
         why = overlap(self.scene, found) or ("" if self.reaches(found) else PAST_TABLE)
         return LeftOut(found, why) if why else found
 
     def _followed(self, start: Array, spin: float, tilts: bool) -> tuple[Orbit | None, str, float]:
-        """The orbit that a state (12,), or a turn (n, 12) of them, becomes while the plate grows to its full size.
+        """The orbit that a state (m,), or a turn (n, m) of them, becomes while the plate grows to its full size.
 
         Gravity across the axis grows with it where the start is without (`tilts`).  Where there is none, why, and up
         to which part of the way there is one.
@@ -427,7 +454,7 @@ class ForcedMotion:
 
 
 def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None, str, float]:
-    """States of an orbit at the whole of the way, by arc length from those (n, 12) at a part of it that is done.
+    """States of an orbit at the whole of the way, by arc length from those (n, m) at a part of it that is done.
 
     Where there is none, why, and up to which part there is one: a curve that turns back is one of a fold.
     """
@@ -447,7 +474,7 @@ def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None
 
 
 def _moved(before: Array, after: Array) -> float:
-    """Distance of the means of an orbit (n, 12) and of another one, or a state (12,), in floater radii."""
+    """Distance of the means of an orbit (n, m) and of another one, or a state (m,), in floater radii."""
     start = before if before.ndim == 1 else before.mean(axis=0)
     return float(np.linalg.norm((after.mean(axis=0) - start)[:3]))
 

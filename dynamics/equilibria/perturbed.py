@@ -1,6 +1,7 @@
 """Equilibria under more than the field of their table: where they move to, growth rates, and a plate's mean action."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,8 @@ def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) ->
         raise ValueError("Input equilibrium must have been found with the plate's currents; instead received none.")
     scales, floater, count = Scales.of(scene), scene.floater, len(equilibrium.currents)
     times = 2 * np.pi * np.arange(count) / count
-    coupling = PlateForce(memory, parameters(scene, scales, frozen_spin=True))(times, scales.pack(equilibrium.turn))
+    states = replace(scales, pointing=None).pack(equilibrium.turn)  # the plate knows the moment alone
+    coupling = PlateForce(memory, parameters(scene, scales, frozen_spin=True))(times, states)
     root_energy = np.sqrt(floater.mass) * scales.length / scales.time
     currents = equilibrium.currents / root_energy - coupling.signals
     push = np.einsum("aix,ai->ax", coupling.fields, currents) / scales.time**2

@@ -29,7 +29,18 @@ from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, left_product, matrices_of, quaternions_of
 from .balance import CONVERGED_STEP, DUPLICATE_DISTANCE, EVERY, Balance, place_error, solve, tangent_basis
 from .curves import FARTHEST, SearchRange, fixed_points
-from .equilibrium import AVERAGED, LOCKED, Equilibrium, EquilibriumError, ForceCurve, LeftOut, Survey, eigenmodes, modes
+from .equilibrium import (
+    AVERAGED,
+    LOCKED,
+    Equilibrium,
+    EquilibriumError,
+    ForceCurve,
+    LeftOut,
+    Survey,
+    eigenmodes,
+    modes,
+    turning_tangents,
+)
 from .orbits import ForcedMotion, overlap
 
 BEYOND = 0.1  # Part of a floater's weight that multipoles on its axis may leave out; beyond, its whole body tells
@@ -157,6 +168,7 @@ def _survey_of_any_body(
     values, quick = parameters(round_scene, scales, frozen_spin=True), Rates(roughly)
     found: list[Equilibrium] = []
     curves: tuple[ForceCurve, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
     if scene.floater.turns_freely:
         about = Balance(quick, values, spin * ratio, _own_spin(scene) * scales.time * ratio)
         seeds = remembered(lambda: _search(round_scene, exactly, about, farthest, watch), AVERAGED)
@@ -164,23 +176,30 @@ def _survey_of_any_body(
         here, doubts = field_doubts(table, points[:, :3] * scales.length)
         points = points[here]
         known = survey_of(round_scene, exact, FixedPoints.at(exact, points, doubts, seeds.curves))
-        found, curves = [replace(one, kind=AVERAGED) for one in known.equilibria], known.curves
-    if scene.frequency and not np.any(scene.gravity[:2]):
+        found, curves, left_out = (
+            [replace(one, kind=AVERAGED) for one in known.equilibria],
+            known.curves,
+            known.left_out,
+        )
+    if scene.frequency:
         still = Balance(quick, values, ratio, still=True)
         seeds = remembered(lambda: _search(round_scene, exactly, still, farthest, watch), LOCKED)
-        found += _locked(scene, with_effects(scene, table), seeds, farthest, rates)
-        curves = curves or seeds.curves
-    return _survey(found, curves)
+        rates = rates or Rates(with_effects(scene, table))
+        locked = _survey(_locked(scene, with_effects(scene, table), seeds, farthest, rates), curves or seeds.curves)
+        if np.any(scene.gravity[:2]):
+            alone = replace(scene, plate=None)
+            locked = _forced(ForcedMotion(alone, rates, parameters(scene, Scales.of(scene)), None), locked)
+        left_out += locked.left_out
+        found, curves = [*found, *locked.equilibria], locked.curves
+    return _survey(found, curves, left_out)
 
 
-def _locked(
-    scene: Scene, table: Interaction, seeds: FixedPoints, farthest: float, rates: Rates | None
-) -> list[Equilibrium]:
-    """Frequency-locked equilibria near those of the body's mean, `seeds`."""
+def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, farthest: float, rates: Rates) -> list[Equilibrium]:
+    """Frequency-locked equilibria near those of the body's mean, `seeds`, gravity along the axis."""
     scales, floater = Scales.of(scene), scene.floater
     if not len(seeds.points):
         return []
-    rates, values = rates or Rates(table), parameters(scene, scales)
+    values = parameters(scene, scales)
     angles = 2 * np.pi * np.arange(TURNS) / TURNS
     axes = list[Array]()
     for moment in seeds.points[:, 3:]:
@@ -318,16 +337,15 @@ def with_plate(
     scene, table, rates : as for the survey `known` without the plate's currents
     memory : these currents
     """
-    known = free_of_bodies(scene, known)
+    known, means = free_of_bodies(scene, known), tuple[Equilibrium, ...]()
     if not scene.floater.round:
         round_scene, exactly, _ = mean_over_turns(scene, table)
-        means = [e for e in known.equilibria if e.kind == AVERAGED]
-        over = with_plate(round_scene, exactly, replace(known, equilibria=tuple(means)), memory)
-        # frequency-locked ones are reported without the plate
-        rest = [e for e in known.equilibria if e.kind != AVERAGED]
-        return _survey([*(replace(e, kind=AVERAGED) for e in over.equilibria), *rest], known.curves, over.left_out)
+        apart = {kind: tuple(e for e in known.equilibria if e.kind == kind) for kind in (AVERAGED, LOCKED)}
+        over = with_plate(round_scene, exactly, replace(known, equilibria=apart[AVERAGED]), memory)
+        means, known = over.equilibria, replace(over, equilibria=apart[LOCKED])
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
-    return _forced(ForcedMotion(scene, rates or Rates(with_effects(scene, table)), values, memory), known)
+    found = _forced(ForcedMotion(scene, rates or Rates(with_effects(scene, table)), values, memory), known)
+    return _survey([*means, *found.equilibria], found.curves, found.left_out)
 
 
 def _forced(problem: ForcedMotion, known: Survey) -> Survey:
@@ -452,11 +470,7 @@ def locked_equilibrium(
     state = np.concatenate([position, velocity, quaternion, rate * axes[2]])
     value, slope = (part[0] for part in rates.locked_balance(position[None], quaternion[None], values))
     jacobian = rates(state[None], values)[1][0]
-    tangents, projections = np.zeros((13, 12)), np.zeros((12, 13))
-    tangents[:6, :6] = projections[:6, :6] = np.eye(6)
-    tangents[10:, 9:] = projections[9:, 10:] = np.eye(3)
-    by_turn = 0.5 * np.stack(left_product(list(np.eye(3)), list(quaternion[:, None] * np.ones(3))))
-    tangents[6:10, 6:9], projections[6:9, 6:10] = by_turn, 4 * by_turn.T
+    tangents, projections = turning_tangents(state)
     found = eigenmodes(projections @ jacobian @ tangents, tangents)
     gravity = abs(float(values[Parameter.GRAVITY_Z]))
     unpacked = scales.unpack(state)

@@ -513,8 +513,7 @@ def initial_state(
         if memory is not None:
             scales = Scales.of(scene)
             plate = PlateForce(memory, parameters(scene, scales))
-            pointing = replace(scales, pointing=None).pack(state)  # the plate knows the moment alone
-            currents = plate.settled(pointing) / plate.values[Parameter.PLATE_SHARE]
+            currents = plate.settled(scales.pack(state)) / plate.values[Parameter.PLATE_SHARE]
     else:
         known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
         chosen = starting_point(known)

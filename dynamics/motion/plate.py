@@ -41,6 +41,7 @@ from ...geometry.scene.contents import Plate
 from .effect import Added
 from .state import (
     DRIVEN,
+    OF_BODY,
     STEADY,
     Parameter,
     Turn,
@@ -50,6 +51,7 @@ from .state import (
     cross,
     dot,
     dotted,
+    matrices_of,
     subtract,
     turned,
     turned_about_z,
@@ -248,9 +250,9 @@ class PlateCoupling:
     """Plate and floater at n instants, scaled, along the rotor's axes."""
 
     signals: Array  # (n, states) s̃, the rotor's share included
-    by_state: Array  # (n, states, 12) their derivatives by the floater's state
+    by_state: Array  # (n, states, m) their derivatives by the floater's state
     fields: Array  # (n, states, 6) acceleration of position and of spin by a unit current of each state
-    pull: Array  # (n, k, 12, 6) derivative of the multipoles' accelerations by the floater's state
+    pull: Array  # (n, k, m, 6) derivative of the multipoles' accelerations by the floater's state
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +267,12 @@ class PlateForce:
         return np.asarray(self.memory.table.rates * self.values[Parameter.TIME])
 
     def __call__(self, times: Array, states: Array) -> PlateCoupling:
-        """How plate and floater act on each other at scaled times (n,) in scaled states (n, 12)."""
+        """How plate and floater act on each other at scaled times (n,) in scaled states (n, m), m = 12.
+
+        Of a body that is not round m = 13, and accelerations of spin are along its own axes, as in its equations.
+        """
+        if states.shape[1] > 12:
+            return self._on_body(times, states)
         multipoles, weights, box = self.memory.table.multipoles, self.memory.table.weights, self.memory.plate.box
         chosen = Parameter.PLATE_MOMENT, Parameter.INERTIA, Parameter.LENGTH
         strength, inertia, length = (float(self.values[p]) for p in chosen)
@@ -297,6 +304,26 @@ class PlateForce:
             pull,
         )
 
+    def _on_body(self, times: Array, states: Array) -> PlateCoupling:
+        """That of a round body with the same place and moment, by the turn of a body in states (n, 13)."""
+        ratios, pointing = np.split(self.values[list(OF_BODY)], 2)
+        quaternion = states[:, 6:10]
+        axes = matrices_of(quaternion)
+        # they are of second degree in the quaternion, so that a difference is the derivative
+        slopes = [(matrices_of(quaternion + e) - matrices_of(quaternion - e)) / 2 for e in np.eye(4)]
+        turned, moment = np.stack(slopes, axis=1), axes @ pointing
+        found = self(times, np.concatenate([states[:, :6], moment, states[:, 10:]], axis=1))
+        chain = np.zeros((len(states), 12, 13))  # of a round body's state by this one's
+        chain[:, :3, :3], chain[:, 6:9, 6:10] = np.eye(3), (turned @ pointing).swapaxes(1, 2)
+        across = np.einsum("na,nkax->nkx", moment, found.pull[..., 6:9, 3:])  # of the multipoles, linear in the moment
+        pull, fields = np.einsum("nyz,nkyx->nkzx", chain, found.pull), found.fields.copy()
+        pull[..., 3:] = pull[..., 3:] @ axes[:, None]
+        pull[..., 6:10, 3:] += np.einsum("nkx,nqxj->nkqj", across, turned)
+        fields[..., 3:] = fields[..., 3:] @ axes
+        pull[..., 3:] /= ratios
+        fields[..., 3:] /= ratios
+        return PlateCoupling(found.signals, found.by_state @ chain, fields, pull)
+
     def strengths(self, currents: Array) -> Array:
         """(n, k) of the multipoles, from the currents (n, states)."""
         return np.asarray(currents @ self.memory.table.weights)
@@ -313,9 +340,9 @@ class PlateForce:
         return found if shift else found.real
 
     def settled(self, state: Array) -> Array:
-        """States (states,) of the plate at t = 0 under a floater that has long turned with the rotor, (12,)."""
+        """States (states,) of the plate at t = 0 under a floater that has long turned with the rotor, (m,)."""
         times = 2 * np.pi * np.arange(SETTLED) / SETTLED
-        signals = self(times, np.broadcast_to(state, (SETTLED, 12))).signals
+        signals = self(times, np.broadcast_to(state, (SETTLED, len(state)))).signals
         return np.asarray(np.einsum("ib,bi->i", self.remembered(SETTLED)[:, 0], signals))
 
     @property

@@ -10,11 +10,12 @@ from scipy.integrate import solve_ivp
 from second_opinions.phasor import mean_force, mean_torque
 from second_opinions.plate_tables import reaction_gradient
 
-from spinlev.dynamics.equilibria.equilibrium import Survey, resampled
+from spinlev.dynamics.equilibria.equilibrium import LOCKED, Survey, resampled
 from spinlev.dynamics.equilibria.orbits import differentiation, floquet_modes, periodic_orbit
 from spinlev.dynamics.equilibria.perturbed import plate_action
 from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
-from spinlev.dynamics.flights.flight import Flight, integrate, simulate
+from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
+from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.plate import PlateForce, PlateMemory
 from spinlev.dynamics.motion.rates import Rates
@@ -32,6 +33,10 @@ PLATE = Plate(Box((0.1, 0.24, 0.03), (0.01, 0.0, -0.055)), 3.5e7, Lowering(0.1, 
 SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(0.0, 0.0), plate=PLATE, start=OffsetStart(np.zeros(3)))
 REGION = Region(np.array([-0.014, -0.004, 0.031]), np.array([-0.006, 0.004, 0.041]))
 VALUES = parameters(SCENE, Scales.of(SCENE), frozen_spin=True)
+INERTIA = FLOATER.inertia * np.array([1.0, 0.65, 1.25])
+UNEVEN = replace(
+    SCENE, floater=replace(FLOATER, moments_of_inertia=tuple(INERTIA)), plate=replace(PLATE, lowering=None)
+)
 
 
 @pytest.fixture(scope="module")
@@ -56,16 +61,26 @@ def shaken(known, memory, rates):
     return with_plate(SCENE, CUBOID, Survey(known.equilibria[:1], ()), memory, rates).equilibria[0]
 
 
-def state_near(equilibrium, count, size=1e-2):
-    state = Scales.of(SCENE).pack(equilibrium.state)
-    return state + size * np.random.default_rng(3).normal(size=(count, 12))
+@pytest.fixture(scope="module")
+def uneven():
+    """A sphere with three moments of inertia, a dipole to all, at rest in the rotor's frame, and its equations."""
+    rates = Rates(Interaction(CUBOID, (), turning=True))
+    found = survey(UNEVEN, CUBOID, rates=rates).equilibria
+    return next(one for one in found if one.kind == LOCKED and one.distance < 20e-3), rates
 
 
-def test_derivatives_of_the_plates_forces(memory, known):
-    """Central differences, good to 1e-9 of the largest derivative."""
-    force, rng = PlateForce(memory, VALUES), np.random.default_rng(0)
-    times, states = np.array([0.3, 4.0]), state_near(known.equilibria[0], 2)
-    currents, way, step = rng.normal(size=(2, len(memory.table.rates))), rng.normal(size=(2, 12)), 1e-5
+def state_near(scene, equilibrium, count, size=1e-2):
+    state = Scales.of(scene).pack(equilibrium.state)
+    return state + size * np.random.default_rng(3).normal(size=(count, len(state)))
+
+
+@pytest.mark.parametrize("turning", [False, True])
+def test_derivatives_of_the_plates_forces(turning, memory, known, uneven):
+    """Central differences, good to 1e-9 of the largest derivative; of a body's quaternion, too."""
+    scene, near = (UNEVEN, uneven[0]) if turning else (SCENE, known.equilibria[0])
+    force, rng = PlateForce(memory, parameters(scene, Scales.of(scene))), np.random.default_rng(0)
+    times, states = np.array([0.3, 4.0]), state_near(scene, near, 2)
+    currents, way, step = rng.normal(size=(2, len(memory.table.rates))), rng.normal(size=states.shape), 1e-5
     heard, ahead, behind = (force(times, states + s * way) for s in (0, step, -step))
     slope = (ahead.signals - behind.signals) / (2 * step)
     assert np.abs(slope - np.einsum("nix,nx->ni", heard.by_state, way)).max() < 1e-9 * np.abs(heard.by_state).max()
@@ -256,6 +271,20 @@ def test_gravity_across_the_axis_makes_the_motion_periodic(rates):
     assert lab[0] > 5e-5  # it hangs towards where gravity points: 0.34 m/s² against some 10 Hz
 
 
+def test_gravity_across_the_axis_shakes_a_locked_body(uneven):
+    """Back to itself after each of five turns in which deviations grow 600 times; half the gravity moves it half."""
+    ways = []
+    for tilt in (0.035, 0.0175):
+        scene = replace(UNEVEN, plate=None, gravity=9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)]))
+        survey = find_equilibria(scene, CUBOID, rates=uneven[1])
+        found = next(one for one in survey if one.kind == LOCKED and 18e-3 < one.distance < 20e-3)
+        ways.append(found.turn.position - found.without.position)
+    assert np.abs(ways[0]).max() > 1e-5
+    assert np.abs(ways[0] - 2 * ways[1]).max() < 0.02 * np.abs(ways[0]).max()
+    flown = integrate(Flight(scene, CUBOID, 0.2, compact=True), found.start, 5 / scene.frequency)
+    assert np.abs(flown.rotor.position[::200] - found.start.position).max() < 1e-10
+
+
 def test_a_flight_begins_on_the_orbit(known, memory, shaken):
     flown = simulate(SCENE, CUBOID, 0.02, [shaken], memory=memory)
     np.testing.assert_allclose(flown.lab.position[0], shaken.start.position, atol=1e-15)
@@ -270,3 +299,61 @@ def test_trigonometric_interpolation():
     finer = 2 * np.pi * np.arange(17) / 17
     np.testing.assert_allclose(resampled(wave, 17), np.cos(3 * finer) + 0.2 * np.sin(finer), atol=1e-14)
     assert VALUES[Parameter.SPIN_DRAG] == 0
+
+
+def test_a_locked_body_over_a_plate_is_a_periodic_motion(uneven, memory):
+    """Flown for ten turns it comes back to itself after each, and a small kick grows by the stated growth.
+
+    The flight has the plate's force and the body's turn by other expressions.
+    """
+    alone, rates = uneven
+    (found,) = with_plate(UNEVEN, CUBOID, Survey((alone,), ()), memory, rates).equilibria
+    assert found.kind == LOCKED
+    assert found.currents is not None
+    assert np.ptp(found.turn.position[:, 2]) > 1e-7  # the plate does shake it
+    assert np.linalg.norm(found.position - alone.position) > 1e-5
+    assert abs(found.growth_per_s / alone.growth_per_s - 1) > 5e-3
+    flight, turns = Flight(UNEVEN, CUBOID, 0.1, compact=True, memory=memory), 10
+
+    def flown(start):
+        motion = integrate(flight, start, turns / UNEVEN.frequency, currents=found.currents[0])
+        assert motion.energy_error < 1e-11
+        return motion.rotor.position[:: len(motion.time) // turns]
+
+    start = found.start
+    still = flown(start)
+    assert len(still) == turns + 1
+    assert np.abs(still - start.position).max() < 1e-10
+    apart = flown(replace(start, position=start.position + np.array([0.0, 0.0, 1e-11]))) - still
+    # of a pair of multipliers: each deviation follows from the two before it
+    sums, product = np.linalg.lstsq(np.stack([apart[-2], -apart[-3]], axis=1), apart[-1])[0]
+    assert sums**2 < 4 * product
+    assert np.log(product) / 2 * UNEVEN.frequency == pytest.approx(found.growth_per_s, rel=2e-3)
+    action = plate_action(UNEVEN, memory, found)
+    assert action["loss"] > 0
+    begun, currents = initial_state(
+        replace(UNEVEN, start=OffsetStart(np.zeros(3))), CUBOID, [replace(found, stable=True)]
+    )
+    np.testing.assert_allclose(begun.axes, start.axes, atol=1e-15)
+    np.testing.assert_array_equal(currents, found.currents[0])
+
+
+def test_a_locked_body_as_even_as_a_sphere_moves_as_the_sphere(memory, rates):
+    """Place, moment and modes of a body whose inertia differs by 1e-8 are those of the round body's orbit over a plate.
+
+    That one has the body spin with which it comes back to itself after a turn.
+    """
+    inertia = FLOATER.inertia * np.array([1.0, 1 + 1e-8, 1.0])
+    scene = replace(UNEVEN, floater=replace(FLOATER, remanence=0.03, moments_of_inertia=tuple(inertia)))
+    found = next(one for one in find_equilibria(scene, CUBOID, memory=memory) if one.kind == LOCKED)
+    assert np.linalg.norm(found.position - found.without.position) > 1e-5
+    assert np.ptp(found.turn.position[:, 2]) > 1e-9
+    along = np.sum(found.turn.spin * found.turn.moment, axis=1) / scene.angular_velocity
+    assert np.ptp(along) < 1e-7
+    scales, values = Scales.of(scene), parameters(scene, Scales.of(scene))
+    states, force = replace(scales, pointing=None).pack(found.turn), PlateForce(memory, values)
+    orbit = periodic_orbit(rates, values, along[0], force, states)
+    assert np.abs(orbit.states - states).max() < 1e-8
+    whole = periodic_orbit(Rates(Interaction(CUBOID, (), turning=True)), values, 0.0, force, scales.pack(found.turn))
+    of_body, of_sphere = (np.exp(2 * np.pi * floquet_modes(one).eigenvalues) for one in (whole, orbit))
+    assert max(np.abs(of_body - one).min() for one in of_sphere) < 1e-8  # it has a turn about its moment beside them

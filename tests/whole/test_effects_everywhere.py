@@ -10,6 +10,7 @@ import pytest
 from places import DOCS
 
 import spinlev as sl
+from spinlev.dynamics.equilibria.equilibrium import AVERAGED, LOCKED
 from spinlev.geometry.common import SpinlevError
 
 BASE = """
@@ -133,14 +134,76 @@ def test_the_effect_is_in_the_answer(effect, use):
     assert (apart < 1e-9) == ((effect, use.__name__) in LEFT_OUT), (effect, use.__name__, apart)
 
 
-def test_the_table_in_the_docs_is_this_walk():
-    """One row an effect, one column a use, a dash and a note where it is refused."""
+SHAPES = {
+    "cylinder": ("", 'shape = "cylinder"\nheight_mm = 11.0\ndiameter_mm = 12.7'),
+    AVERAGED: (AVERAGED, 'shape = "cuboid"\nsize_mm = [10.0, 10.0, 10.0]'),
+    LOCKED: (LOCKED, None),
+}
+"""Kind of their equilibria, and what describes them in place of a sphere; None: the body below."""
+BODY = """
+[[floater.magnets]]
+size_mm = [10.0, 10.0, 10.0]
+center_mm = [0.0, 0.0, 0.0]
+polarization_T = [0.0, 0.0, 1.305]
+density_kg_m3 = 7500.0
+[[floater.bodies]]
+size_mm = [4.0, 4.0, 4.0]
+center_mm = [7.0, 0.0, 3.0]
+density_kg_m3 = 2700.0
+"""
+"""A cube with something in a corner: its moment is along no principal axis of inertia, so that it has no mean."""
+OF_EVERY_SHAPE = [*list(EFFECTS)[:5], "steady coils about the axis"]
+REFUSED_FOR = {
+    (effect, shape): "instead received"
+    for effect in ("currents in the floater", "air beyond Stokes")
+    for shape in SHAPES
+}
+
+
+def shaped(text, shape):
+    """A scene of a sphere with another body in its place, and the plate below where that is."""
+    if described := SHAPES[shape][1]:
+        return text.replace("diameter_mm = 12.7", described)
+    head, _, rest = text.partition("[floater]")
+    floater, drag, tail = rest.partition("[drag]")
+    more = floater.replace("diameter_mm = 12.7\nremanence_T = 1.305\n", "").replace("density_kg_m3 = 7500.0\n", "")
+    return head + "[floater]" + more + BODY + drag + tail.replace("-52.0", "-74.0")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("effect", OF_EVERY_SHAPE)
+def test_the_effect_is_in_equilibria_of_the_shape(effect, shape):
+    bare, text, *_ = EFFECTS[effect]
+    if (effect, shape) in REFUSED_FOR:
+        with pytest.raises(SpinlevError, match=REFUSED_FOR[effect, shape]):
+            _ = levitation(shaped(text, shape), models(effect, True)).stability
+        return
+    found = levitation(shaped(text, shape), models(effect, True)).stability
+    alone = levitation(shaped(bare, shape), models(effect, False)).stability
+    assert found.kind == alone.kind == SHAPES[shape][0]
+    assert (found.currents is not None) == ("plate" in effect)
+    assert abs(found.distance - alone.distance) > 1e-9 or abs(found.growth_per_s - alone.growth_per_s) > 1e-6
+
+
+def table(first):
+    """Columns of a table in the docs whose head begins so, and its rows."""
     text = (DOCS / "architecture.md").read_text("utf-8")
-    head, rows = re.search(r"\| effect \|(.*)\|\n\|[- |]*\|\n((?:\|.*\n)+)", text).groups()
-    columns = [name.strip() for name in head.split("|")]
+    head, rows = re.search(rf"\| {first} \|(.*)\|\n\|[- |]*\|\n((?:\|.*\n)+)", text).groups()
+    cells = [[cell.strip() for cell in row.strip().strip("|").split("|")] for row in rows.splitlines()]
+    return [name.strip() for name in head.split("|")], {name: row for name, *row in cells}
+
+
+def test_the_tables_in_the_docs_are_these_walks():
+    """One row an effect, one column a use or a shape, a dash and a note where it is refused."""
+    columns, rows = table("effect")
     assert columns == [use.__name__.replace("_", " ") for use in USES]
-    found = [[cell.strip() for cell in row.strip().strip("|").split("|")] for row in rows.splitlines()]
-    assert [row[0] for row in found] == list(EFFECTS)
-    for name, *cells in found:
-        for column, cell in zip(columns, cells, strict=True):
-            assert (cell != "yes") == ((name, column) in {*REFUSED, *LEFT_OUT}), (name, column)
+    assert list(rows) == list(EFFECTS)
+    shapes, of_shapes = table("effect by shape")
+    assert shapes == list(SHAPES)
+    assert list(of_shapes) == OF_EVERY_SHAPE
+    refused = {*REFUSED, *LEFT_OUT, *REFUSED_FOR}
+    for heads, found in ((columns, rows), (shapes, of_shapes)):
+        for name, cells in found.items():
+            for column, cell in zip(heads, cells, strict=True):
+                assert (cell != "yes") == ((name, column) in refused), (name, column)

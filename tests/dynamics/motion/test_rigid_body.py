@@ -9,20 +9,24 @@ from article import NO_DRAG, SCENE
 from scipy.special import ellipj, ellipk
 
 from spinlev.dynamics.equilibria.equilibrium import AVERAGED, LOCKED
-from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
 from spinlev.dynamics.motion.body_shape import BodyShape
 from spinlev.dynamics.motion.effect import Interaction
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.events import rotor_gap
+from spinlev.dynamics.motion.plate import PlateMemory
+from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales, State, matrices_of, quaternions_of
 from spinlev.fem.harmonics.interior import shells, sizes
+from spinlev.fem.plate.table import Region
+from spinlev.fem.plate.tables import slab_and_rotor_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import tilt
-from spinlev.geometry.scene.contents import AbsoluteStart
+from spinlev.geometry.scene.contents import AbsoluteStart, Plate
 from spinlev.geometry.scene.floater import Floater
-from spinlev.geometry.shapes import Box
+from spinlev.geometry.shapes import Box, rotation_matrix
 
 CUBE = Floater(0.01 * 3**0.5 / 2, 1.3, 1.0, 7500.0, None, Box((0.01,) * 3))
 BRICK = Floater(float(np.linalg.norm([9e-3, 12e-3, 6e-3]) / 2), 1.3, 1.0, 7500.0, None, Box((9e-3, 12e-3, 6e-3)))
@@ -228,6 +232,27 @@ def test_a_locked_equilibrium_is_at_rest_in_the_rotors_frame():
     # what the flight's multipoles miss of the force is where it starts from
     assert moved.max() < 1e-5 * growth
     assert scales.unpack(scales.pack(locked.state)).axes == pytest.approx(locked.state.axes, abs=1e-14)
+
+
+@pytest.mark.slow
+def test_a_locked_cube_over_a_plate_stays_on_its_motion():
+    """Of the true shape, over a slab that leans by 5° and so shakes it once a turn: 0.5 µm in eight turns."""
+    box = Box((0.3, 0.3, 0.03), (0.0, 0.0, -0.0745), rotation_matrix((0.0, 5.0, 0.0)))
+    scene = replace(LEVITATING, plate=Plate(box, 3.5e7))
+    corners = box.to_body(np.array([0.0, 0.0, -0.0455]) + 4e-3 * np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]))
+    region = Region(corners.min(axis=0) - 5e-4, corners.max(axis=0) + 5e-4)
+    memory = PlateMemory(scene.plate, *slab_and_rotor_table(scene.plate, TABLE, region, (5.0, 300.0), 1e-2), "slab")
+    rates = Rates(with_effects(scene, TABLE))
+    known = survey(scene, TABLE, rates=rates)
+    locked = next(one for one in known.equilibria if one.kind == LOCKED)
+    (found,) = with_plate(scene, TABLE, replace(known, equilibria=(locked,)), memory, rates).equilibria
+    assert found.currents is not None
+    assert np.linalg.norm(found.position - locked.position) > 1e-4
+    assert np.ptp(found.turn.position[:, 2]) > 1e-7
+    flown = integrate(Flight(scene, TABLE, 0.1, memory=memory), found.start, 8 / 130.0, currents=found.currents[0])
+    turns = flown.rotor.position[::125]
+    assert len(turns) == 9
+    assert np.linalg.norm(turns - found.start.position, axis=1).max() < 5e-7
 
 
 def test_contact_is_that_of_the_true_surface():
