@@ -24,6 +24,7 @@ from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS
 from ..fem.rotor.floater import floater_sources, shares
 from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
 from ..geometry.common import MAGNET_CONDUCTIVITY
+from ..geometry.scene.contents import Scene
 from .levitation import Levitation
 from .words import spoken_time
 
@@ -89,9 +90,14 @@ def effects_summary(levitation: Levitation, effects: Sequence[ListedEffect]) -> 
 
 def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     (answers, why), shift = levitation.answers, None
-    if first is not None and why != NOTHING_PERMEABLE and first.kind != LOCKED:
-        shift = 1e3 * shift_by_mutual(levitation.mean.scene, levitation.table, first, answers)
+    if first is not None and why != NOTHING_PERMEABLE:
+        shift = 1e3 * shift_by_mutual(_scene(levitation, first), levitation.table, first, answers)
     return ListedEffect(MUTUAL, answers is not None, shift, None, why)
+
+
+def _scene(levitation: Levitation, first: Equilibrium | None) -> Scene:
+    """That of the body an equilibrium is of: the mean of its turns, or itself."""
+    return levitation.scene if first and first.kind == LOCKED else levitation.mean.scene
 
 
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
@@ -109,7 +115,7 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Eddy currents of the scene's rotor, or what those of sintered magnets, taken as balls, would be."""
-    scene, growth, included = levitation.mean.scene, None, levitation.losses is not None
+    scene, growth, included = _scene(levitation, first), None, levitation.losses is not None
     pieces = pieces_of([replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor], ())
     losses = levitation.losses or (ball_losses(pieces) if pieces else None)
     doubt = 0.0 if included else metal_error(pieces, scene.fastest)
@@ -118,7 +124,7 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
         # Within the sphere about a magnet, as in the hole of a ring, no ball is like that magnet.
         place = (first.without or first).position
         near = any(np.linalg.norm(place - m.body.center) < m.body.circumradius for m in scene.rotor)
-    if first and first.kind != LOCKED and losses and scene.frequency and doubt <= SLOW_ENOUGH and not near:
+    if first and losses and scene.frequency and doubt <= SLOW_ENOUGH and not near:
         growth = growth_by_rotor(scene, first, losses, included)
     why = _why("rotor.conductivity_S_m", included, growth, doubt)
     why += "; the floater is so near to the magnets that their size is not known" if near else ""

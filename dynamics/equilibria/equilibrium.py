@@ -143,11 +143,14 @@ class Mode:
     frequency_hz: float  # in the rotor's frame; 0 where it does not oscillate
 
 
-def turning_tangents(state: Array) -> tuple[Array, Array]:
-    """Twelve directions (13, 12) at a scaled state (13,) of a body, its turn about the rotor's axes, and projections.
+def free_directions(state: Array) -> tuple[Array, Array]:
+    """Directions (m, k) of a scaled state (m,) that keep what the equations keep, and projections (k, m) on them.
 
-    See `tangent_spaces` for a round one.
+    Of a round body those of `tangent_spaces`, of another one its turn about the rotor's axes is among them.
     """
+    if len(state) == 12:
+        tangents, projections = tangent_spaces(state[None])
+        return tangents[0], projections[0]
     tangents, projections = np.zeros((13, 12)), np.zeros((12, 13))
     tangents[:6, :6] = projections[:6, :6] = np.eye(6)
     tangents[10:, 9:] = projections[9:, 10:] = np.eye(3)

@@ -33,10 +33,9 @@ from .equilibrium import (
     Equilibrium,
     LeftOut,
     Modes,
+    free_directions,
     left_eigenvectors,
     resampled,
-    tangent_spaces,
-    turning_tangents,
 )
 from .path import DIFFERENCE, END, ON, Steps, directions, follow
 
@@ -264,7 +263,8 @@ def floquet_modes(orbit: Orbit) -> Modes:
     of round-off.  Of the plate's own modes, which only decay, the floater's are distinguished by their shapes.
     """
     size, own_size = orbit.derivatives.shape[1], orbit.states.shape[1]
-    tangent, projection = (scipy.linalg.block_diag(part, np.eye(size - own_size)) for part in _kept(orbit.states[0]))
+    currents = np.eye(size - own_size)
+    tangent, projection = (scipy.linalg.block_diag(part, currents) for part in free_directions(orbit.states[0]))
     free = tangent.shape[1] - (size - own_size)
     coarse, steps = _propagated(orbit.derivatives, own_size, STEPS)[-1], 2 * STEPS
     while True:
@@ -283,14 +283,6 @@ def floquet_modes(orbit: Orbit) -> Modes:
     errors = (stepped + rounded)[own] / (2 * np.pi * np.abs(multipliers[own]))
     shapes = tangent @ right[:, own]
     return Modes(rates + 1j * _turns(matrices[:, :own_size], shapes, rates), errors, shapes[:own_size])
-
-
-def _kept(state: Array) -> tuple[Array, Array]:
-    """Directions (m, k) of a state (m,) that keep what the equations keep, and projections (k, m) on them."""
-    if len(state) > 12:
-        return turning_tangents(state)
-    tangents, projections = tangent_spaces(state[None])
-    return tangents[0], projections[0]
 
 
 def _propagated(derivatives: Array, own_size: int, steps: int) -> Array:

@@ -20,7 +20,7 @@ from ..motion.rates import Rates
 from ..motion.rotor_effects import Mutual, brake_slope, rough_force
 from ..motion.state import Parameter, Scales, State
 from .balance import CONVERGED_STEP, Balance, moved_pose, solve, tangent_basis
-from .equilibrium import Equilibrium, left_eigenvectors, tangent_spaces
+from .equilibrium import Equilibrium, free_directions, left_eigenvectors
 
 TILTS = np.array([3, 4])  # of the unknowns of a `Balance`
 MOST_STEPS = 20  # of the quasi-Newton method
@@ -129,7 +129,10 @@ def shift_by_mutual(scene: Scene, table: FieldTable, equilibrium: Equilibrium, a
         effect = Mutual(answers, scene.floater.moment)
         force, torque = (part[0] for part in effect.wrench(place, moment, *table.evaluate(place)))
     units = scales.time**2 / np.array([scene.floater.mass * scales.length, scene.floater.inertia])
-    pushed = np.concatenate([force * units[0], tangent_basis(moment)[0] @ torque * units[1]])
+    turn = tangent_basis(moment)[0] @ torque
+    if fixed.state.axes is not None:  # along the body's
+        turn = fixed.state.axes.T @ torque * (scene.floater.inertia / scene.floater.principal_inertia)
+    pushed = np.concatenate([force * units[0], turn * units[1]])
     return float(np.linalg.norm(np.linalg.solve(fixed.slope, pushed)[:3]) * scales.length)
 
 
@@ -158,11 +161,11 @@ def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses,
 
 
 def _growth(scene: Scene, fixed: Equilibrium, brake: Array, included: bool) -> float:
-    """Change of the growth rate (1/s) by a part (12, 12) of the Jacobian, which has it or has not."""
+    """Change of the growth rate (1/s) by a part of the Jacobian, which has it or has not."""
     # To first order, of the mode that grows fastest with it: the fastest one without it may be another mode, and the
     # difference of their growth rates is no effect.
     scales = Scales.of(scene)
-    tangents, projections = (found[0] for found in tangent_spaces(scales.pack(fixed.state)[None]))
+    tangents, projections = free_directions(scales.pack(fixed.state))
     whole = fixed.jacobian if included else fixed.jacobian + brake
     values, right = np.linalg.eig(projections @ whole @ tangents)
     leading = int(np.argmax(values.real))

@@ -38,8 +38,8 @@ from .equilibrium import (
     LeftOut,
     Survey,
     eigenmodes,
+    free_directions,
     modes,
-    turning_tangents,
 )
 from .orbits import ForcedMotion, overlap
 
@@ -470,7 +470,7 @@ def locked_equilibrium(
     state = np.concatenate([position, velocity, quaternion, rate * axes[2]])
     value, slope = (part[0] for part in rates.locked_balance(position[None], quaternion[None], values))
     jacobian = rates(state[None], values)[1][0]
-    tangents, projections = turning_tangents(state)
+    tangents, projections = free_directions(state)
     found = eigenmodes(projections @ jacobian @ tangents, tangents)
     gravity = abs(float(values[Parameter.GRAVITY_Z]))
     unpacked = scales.unpack(state)

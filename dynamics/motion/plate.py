@@ -52,6 +52,7 @@ from .state import (
     dot,
     dotted,
     matrices_of,
+    rotation_slopes,
     subtract,
     turned,
     turned_about_z,
@@ -309,9 +310,7 @@ class PlateForce:
         ratios, pointing = np.split(self.values[list(OF_BODY)], 2)
         quaternion = states[:, 6:10]
         axes = matrices_of(quaternion)
-        # they are of second degree in the quaternion, so that a difference is the derivative
-        slopes = [(matrices_of(quaternion + e) - matrices_of(quaternion - e)) / 2 for e in np.eye(4)]
-        turned, moment = np.stack(slopes, axis=1), axes @ pointing
+        turned, moment = rotation_slopes(quaternion), axes @ pointing
         found = self(times, np.concatenate([states[:, :6], moment, states[:, 10:]], axis=1))
         chain = np.zeros((len(states), 12, 13))  # of a round body's state by this one's
         chain[:, :3, :3], chain[:, 6:9, 6:10] = np.eye(3), (turned @ pointing).swapaxes(1, 2)

@@ -36,7 +36,7 @@ from ...geometry.magnets import Magnet, polarizability
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.floater import Floater
 from .effect import SMALLEST, ZERO, Added, Motion, Poses, conservative, dissipative
-from .state import Parameter, Scales, State, Vector, add, cross, dot, dotted, subtract
+from .state import Parameter, Scales, State, Vector, add, cross, dot, dotted, rotation_slopes, subtract
 
 NORMALS, RADII = 32, (0.35, 0.7, 1.0)
 FALL = 3  # Minus the power of q
@@ -332,17 +332,23 @@ class Dissipation(Protocol):
 
 
 def brake_slope(table: Dissipation, scene: Scene, state: State) -> Array:
-    """(12, 12): what currents of `table` add to derivatives of scaled rates of `scene`, locked in `state`."""
+    """(12, 12) or (13, 13): what currents of `table` add to slopes of scaled rates of `scene` in `state`, locked."""
     scales, floater = Scales.of(scene), scene.floater
     matrix = table.dissipation(state.position[None], floater.moment * state.moment[None])[0]
     units = np.repeat([scales.length, 1.0], 3) / scales.time
     masses = np.repeat([floater.mass * scales.length, floater.inertia], 3) / scales.time**2
-    spin = scales.pack(state)[9:] - [0.0, 0.0, scene.angular_velocity * scales.time]
-    rates = np.zeros((6, 12))
-    rates[:, 3:6], rates[:, 9:] = np.eye(6)[:, :3], np.eye(6)[:, 3:]
-    rates[0, 1] = scene.angular_velocity * scales.time
-    rates[1, 0] = -rates[0, 1]
-    rates[3:, 6:9] = -float(spin @ state.moment) * np.eye(3)  # turning m̂ in a spin about it is a turn as well
-    found = np.zeros((12, 12))
-    found[[3, 4, 5, 9, 10, 11]] = -(matrix * units / masses[:, None]) @ rates
+    packed, size, rate = scales.pack(state), scales.size, scene.angular_velocity * scales.time
+    rates = np.zeros((6, size))
+    rates[:3, 3:6], rates[0, 1], rates[1, 0] = np.eye(3), rate, -rate
+    if state.axes is None:
+        lag = packed[9:] - [0.0, 0.0, rate]
+        rates[3:, 6:9] = -float(lag @ state.moment) * np.eye(3)  # turning m̂ in a spin about it is a turn as well
+        rates[3:, 9:] = np.eye(3)
+    else:
+        rates[3:, 6:10], rates[3:, 10:] = (rotation_slopes(packed[6:10]) @ packed[10:]).T, state.axes
+    push = -(matrix * units / masses[:, None]) @ rates
+    if state.axes is not None:
+        push[3:] = state.axes.T @ push[3:] * (floater.inertia / floater.principal_inertia)[:, None]
+    found = np.zeros((size, size))
+    found[[3, 4, 5, -3, -2, -1]] = push
     return found

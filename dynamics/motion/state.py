@@ -334,6 +334,13 @@ def matrices_of(quaternions: Array) -> Array:
     return np.moveaxis(np.array([[entry + 0 * quaternions[..., 0] for entry in row] for row in rows]), (0, 1), (-2, -1))
 
 
+def rotation_slopes(quaternions: Array) -> Array:
+    """(..., 4, 3, 3) derivatives of `matrices_of` by quaternions (..., 4)."""
+    # of second degree in them, so that a difference is the derivative
+    ends = [matrices_of(quaternions + e) - matrices_of(quaternions - e) for e in np.eye(4)]
+    return np.stack(ends, axis=-3) / 2
+
+
 def quaternions_of(matrices: Array) -> Array:
     """(..., 4) unit quaternions of rotations (..., 3, 3), w first and not negative.
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from article import PERMEABLE
 
+from spinlev.dynamics.equilibria.equilibrium import LOCKED
 from spinlev.dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_mutual
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.motion.effect import Interaction
@@ -22,6 +23,7 @@ from spinlev.geometry.scene.contents import Drag, Scene
 
 SCENE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))
 CONDUCTING = replace(SCENE, floater=replace(PERMEABLE, conductivity=6.7e5))
+UNEVEN = replace(PERMEABLE, moments_of_inertia=tuple(PERMEABLE.inertia * np.array([1.0, 0.65, 1.25])))
 LOSSES = ball_losses(pieces_of([replace(magnet, conductivity=6.7e5) for magnet in SCENE.rotor], ()))
 
 
@@ -35,6 +37,16 @@ def alone(table):
     return find_equilibria(SCENE, table)[0]
 
 
+@pytest.fixture(scope="module")
+def locked(table):
+    """Of a sphere with three moments of inertia, at rest in the rotor's frame."""
+    return nearest_locked(replace(SCENE, floater=UNEVEN), table)
+
+
+def nearest_locked(scene, table):
+    return min((e for e in find_equilibria(scene, table) if e.kind == LOCKED), key=lambda e: e.distance)
+
+
 def with_rates(equilibrium, scene, rates):
     """The same place, with the Jacobian of other equations of motion there."""
     state, values = Scales.of(scene).pack(equilibrium.state), parameters(scene, Scales.of(scene), frozen_spin=True)
@@ -42,7 +54,7 @@ def with_rates(equilibrium, scene, rates):
 
 
 @pytest.mark.slow
-def test_shift_by_mutual_magnetisation(table, alone):
+def test_shift_by_mutual_magnetisation(table, alone, locked):
     """To first order, 0.05 mm to a part in fifty; the rough force without the table to a factor of two."""
     answers = cached_mutual_table(SCENE.rotor, PERMEABLE, print)[0]
     effect = Mutual(answers, PERMEABLE.moment)
@@ -50,6 +62,9 @@ def test_shift_by_mutual_magnetisation(table, alone):
     moved = np.linalg.norm(there.position - alone.position)
     assert shift_by_mutual(SCENE, table, alone, answers) == pytest.approx(moved, rel=0.02)
     assert shift_by_mutual(SCENE, table, alone, None) == pytest.approx(moved, rel=1.0)
+    scene = replace(SCENE, floater=UNEVEN)
+    moved = np.linalg.norm(nearest_locked(scene, Interaction(table, (effect,))).position - locked.position)
+    assert shift_by_mutual(scene, table, locked, answers) == pytest.approx(moved, rel=0.05)
     for depth in (15e-3, 20e-3, 30e-3):
         place, direction = np.array([[1e-3, 0.0, -depth]]), np.array([[0.2, 0.0, 0.98]])
         direction /= np.linalg.norm(direction)
@@ -68,6 +83,14 @@ def test_growth_by_the_currents_of_the_floater(table, alone):
     assert growth_by_floater(CONDUCTING, table, there, True) == pytest.approx(said, rel=1e-3)
     assert 0.01 < said < 0.1
     assert said == pytest.approx(there.growth_per_s - alone.growth_per_s, rel=0.02)
+
+
+def test_growth_of_a_locked_body_by_the_currents_of_the_rotor(table, locked):
+    scene = replace(SCENE, floater=UNEVEN)
+    there = nearest_locked(scene, Interaction(table, (RotorCurrents(LOSSES),)))
+    said = growth_by_rotor(scene, locked, LOSSES, False)
+    assert said == pytest.approx(there.growth_per_s - locked.growth_per_s, rel=0.02)
+    assert growth_by_rotor(scene, there, LOSSES, True) == pytest.approx(said, rel=1e-3)
 
 
 def test_growth_by_the_currents_of_the_rotor(table, alone):
