@@ -26,6 +26,7 @@ from typing import ClassVar
 
 import heyoka as hy
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ...geometry.common import MU_0, Array, even_directions
@@ -34,6 +35,7 @@ from .solid import (
     CHUNK,
     FOUR_PI,
     Coefficients,
+    both_signs,
     entries,
     entry,
     factorials,
@@ -141,6 +143,33 @@ def from_charges(points: Array, charges: Array, ball: Ball, degree: int) -> Coef
     sums *= factorials(degree) / (FOUR_PI * ball.radius**2)  # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r
     sums[0] = 0.0  # a constant potential
     return np.asarray(sums)
+
+
+def from_outer(sums: Sequence[Coefficients], radii: Array, centers: Array, ball: Ball, degree: int) -> Coefficients:
+    """Coefficients a_lm (T) of outer expansions about other centres, whose sources lie outside the ball.
+
+    (ρ/R)^(1-l) (-1)^l Σ c_l'm' Θ_(l+l')(m+m')(d/ρ), d from their centre to the ball's: Θ_l'm' are derivatives of 1/r.
+
+    Parameters
+    ----------
+    sums, radii, centers : c_lm (T) of k expansions, ρ (k,) m and (k, 3) m
+    ball : of radius R, about whose centre the field is expanded
+    degree : highest l
+    """
+    away, own = (ball.center - centers) / radii[:, None], max(len(each) for each in sums) - 1
+    square = np.sum(away**2, axis=1)
+    # all at once, because recurrences cost by the call; a point each
+    values = weighted_sums(own + degree, away / square[:, None], np.diag(1 / np.sqrt(square)))
+    values *= factorials(own + degree)
+    l, total = np.arange(degree + 1), np.zeros((degree + 1, degree + 1), complex)
+    for each, sizes, ratio in zip(sums, values, radii / ball.radius, strict=True):
+        last = len(each) - 1
+        (known, zero), (given, middle) = both_signs(sizes[: last + degree + 1, : last + degree + 1]), both_signs(each)
+        shifts = sliding_window_view(known[:, zero - last : zero + last + degree + 1], (degree + 1, degree + 1))
+        part = np.einsum("ab,abij->ij", given[:, middle - last : middle + last + 1], shifts)
+        total += ((-1.0) ** l * ratio ** (1.0 - l))[:, None] * part
+    total[0] = 0.0  # a constant potential
+    return np.asarray(np.tril(total))
 
 
 def field_at_center(incident: Coefficients) -> Array:

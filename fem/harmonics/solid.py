@@ -89,7 +89,7 @@ def weighted_sums(degree: int, points: Array, weights: Array) -> Coefficients:
     return result
 
 
-def _both_signs(coefficients: Coefficients) -> tuple[Coefficients, int]:
+def both_signs(coefficients: Coefficients) -> tuple[Coefficients, int]:
     """[l, m] also of m < 0 by c_l(-m) = (-1)^m conj c_lm, with room for m ± 1; and the column of m = 0."""
     size = len(coefficients)
     full, orders = np.zeros((size, 2 * size + 3), complex), np.arange(size)
@@ -100,7 +100,7 @@ def _both_signs(coefficients: Coefficients) -> tuple[Coefficients, int]:
 
 def regular_derivative(sums: Coefficients, axis: int) -> Coefficients:
     """[l, m] of a real linear functional of ∂Υ_lm/∂x_axis, from its values on Υ_lm itself (m ≥ 0)."""
-    full, zero = _both_signs(sums)
+    full, zero = both_signs(sums)
     orders, below = zero + np.arange(len(sums)), np.vstack([np.zeros((1, full.shape[1])), full[:-1]])
     plus, minus = below[:, orders + 1], -below[:, orders - 1]
     return np.asarray(((plus + minus) / 2, (plus - minus) / 2j, below[:, orders])[axis])
@@ -226,7 +226,7 @@ def _ladder(degree: int) -> Array:
 
 def derivative(coefficients: Coefficients, axis: int) -> Coefficients:
     """Coefficients of ∂f/∂x_axis of f = Σ c_lm Θ_lm: one degree more."""
-    full, zero = _both_signs(coefficients)
+    full, zero = both_signs(coefficients)
     orders = zero + np.arange(len(coefficients) + 1)
     lower, upper = full[:, orders - 1], full[:, orders + 1]
     found = ((lower - upper) / 2, (lower + upper) / 2j, -full[:, orders])[axis]

@@ -55,8 +55,7 @@ from .table import (
 # Relative size of a singular value that is none; and up to how many weights they are found. No QR with pivots: their
 # order jumps from a scene to its neighbour, and derivatives would jump with it.
 SMALL, FEW_WEIGHTS = 1e-9, 500
-# What a weight costs that is held, and one that is not, by an error of the size of all that is fitted
-PENALTY, FREE = 1e-3, 1e-6
+PENALTY = 1e-3  # what a weight costs that is held, by an error of the size of all that is fitted
 # Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
 SINGLE = 250
 GAPS = (0.03, 0.08, 0.16, 0.5, 1.5)  # at which both are compared, in floater radii
@@ -247,8 +246,9 @@ def _rotor_fit(
     rows *= counts[:, None]
     direct, beyond = (part[first, second] * size[first] * size[second] * counts for part in (direct, beyond))
     small = np.arange(rows.shape[1]) >= alone
-    found = least_squares(rows, beyond, small)
-    found[:alone] += least_squares(rows[:, :alone], direct, small[:alone])
+    free = effort(len(grids)).free
+    found = least_squares(rows, beyond, small, free)
+    found[:alone] += least_squares(rows[:, :alone], direct, small[:alone], free)
     ends = np.cumsum([column.shape[1] for column in columns])
     parts = iter(np.split(found, ends))
     made = [
@@ -329,7 +329,8 @@ def sphere_fit(
         return np.concatenate([value / energy_size, *(by_place / force_size)], axis=-1)
 
     pairs = list(combinations(range(len(grids)), 2))
-    sums = [pair_sum(grids[a], grids[b], images, effort(len(grids)).charges) for a, b in pairs]
+    taken = effort(len(grids))
+    sums = [pair_sum(grids[a], grids[b], images, taken.charges) for a, b in pairs]
     right = scaled(energy, -force, force)
     found, weights = _fitted(grids, single, OF_SPHERE, sums, places, 1, scaled, right, PENALTY)
     coupled = np.zeros((len(grids), len(grids)))
@@ -364,7 +365,7 @@ def returned_fit(
         return np.concatenate([first.reshape(*rows, -1), second.reshape(*rows, -1)], axis=-1)
 
     pairs = list(permutations(range(len(grids)), 2))
-    sums = [mixed_sum(grids[a], inner[b], images) for a, b in pairs]
+    sums = [mixed_sum(grids[a], inner[b], images, effort(len(grids)).reflected) for a, b in pairs]
     # the energy is -M·V
     right = -np.concatenate([(field / sizes[0]).ravel(), (change / sizes[1]).ravel()])
     found, weights = _fitted(grids, single, OF_RETURN, sums, places, 2, scaled, right, 10 * PENALTY)
@@ -403,7 +404,8 @@ def _fitted(
     for one in sums:
         columns.append(scaled(*one.derivatives(places, still, order))[None])
         small.append(np.zeros(1, bool))
-    found = least_squares(np.concatenate(columns).T, right, np.concatenate(small), cost)
+    free = effort(len(grids)).free
+    found = least_squares(np.concatenate(columns).T, right, np.concatenate(small), free, cost)
     parts = iter(np.split(found, np.cumsum([len(column) for column in columns])[:-1]))
     each = [np.stack([kind @ next(parts) for _ in numbers], axis=1).reshape(len(kind), -1, 2) for kind in kinds]
     return each, np.array([float(part[0]) for part in parts])
@@ -421,18 +423,18 @@ def classes(grid: ResponseGrid, mirrored: bool) -> Array:
     return np.asarray(np.eye(number.max() + 1)[number])
 
 
-def least_squares(columns: Array, values: Array, small: Array, cost: float = PENALTY) -> Array:
+def least_squares(columns: Array, values: Array, small: Array, free: float, cost: float = PENALTY) -> Array:
     """Weights (k,) of columns (n, k) of any sizes that give values (n,).
 
     Parameters
     ----------
     small : (k,) which weights are kept small: by themselves they are hardly determined
-    cost : of a held one, by an error of the size of all values
+    free, cost : of one that is not, where there are many, and of one that is, by an error of the size of all values
     """
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
     if not small.any() and len(size) <= FEW_WEIGHTS:
         return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
     square = columns.T @ columns / np.outer(size, size)  # a copy of the columns would take hundreds of megabytes
-    square[np.diag_indices_from(square)] += np.where(small, cost, FREE) ** 2
+    square[np.diag_indices_from(square)] += np.where(small, cost, free) ** 2
     return np.asarray(scipy.linalg.solve(square, columns.T @ values / size, assume_a="pos") / size)

@@ -5,6 +5,7 @@ And samples of them, of which tables are made: by charges on the magnets' surfac
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Protocol
 
@@ -21,18 +22,19 @@ from ..closed_forms.moments import carrier, volume_rule
 from ..closed_forms.potentials import unit_dipole_fields, unit_dipole_potentials
 from ..closed_forms.uniform import UniformField, remanent_field
 from ..elements.surface import SurfaceCharges
-from ..harmonics.expansion import box_rule, gauss
+from ..harmonics.expansion import box_rule, gauss, uniform_moments
 from ..harmonics.interior import (
     Ball,
     dipole_sources,
     field_at_center,
     from_charges,
     from_magnetization,
+    from_outer,
     interior_coefficients,
     multipole_force,
     multipole_torque,
 )
-from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums
+from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums, weighted_sums
 from .table import ResponseGrid, effort, induced_sources, point_counts, reflection
 
 DEGREES = range(6, 41)
@@ -40,8 +42,7 @@ ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.
 # Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets
 NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
 CHUNK = 512  # points in the magnets at once, so that the fields of all dipoles there take some megabytes
-# Part of the sphere's response that the degrees left out may hold, and the most degrees of the rotor's response to it
-TAIL, MOST_RETURNED = 1e-4, 24
+MOST_RETURNED = 24  # degrees of the rotor's response to the sphere's
 
 
 def singular_ratio(magnets: Sequence[Magnet], ball: Ball) -> float:
@@ -82,6 +83,7 @@ NODES = 24
 DIRECT_DIGITS = 12.0  # as `Effort.digits`, for the direct part of the response
 OWN = 8  # for the rotor's own field in a table, which then errs by 7e-5
 EDGES = 10.0  # by how much the part of these charges may be larger where they are densest
+MOMENTS = 10  # degrees at most of a far magnet's moments; where more are needed, its closed form is as quick
 ACROSS = 8  # of a rule in a magnet for what its second permeability adds to its own field
 
 
@@ -130,38 +132,66 @@ class ChargeResponse:
         self.magnets, carriers = magnets, magnets
         self.permeable = any(magnet.contrast for magnet in magnets)
         self._shares = np.array([1 / (1 + (mean - 1) / 2) for mean in means])  # c/χ
+        # of each magnet its charges beyond those of the carrier, and what part of the field is theirs
+        self._charges = [(np.zeros((0, 3)), np.zeros(0))] * len(magnets)
+        self._part = 1.0
         if self.permeable:
             self.charges = SurfaceCharges([isotropic(*each) for each in zip(magnets, means, strict=True)], count)
             along = [isotropic(magnet, magnet.recoil_permeability) for magnet in magnets]
             carriers = tuple(carrier(magnet) for magnet in along)
             alone = SurfaceCharges(along, own or count)
-            self._own = alone.places, alone.areas * alone.beyond(carriers)
+            amounts, bear = alone.areas * alone.beyond(carriers), np.flatnonzero([m.contrast for m in along])
+            for k, number in enumerate(bear):
+                self._charges[number] = alone.places[alone.owner == k], amounts[alone.owner == k]
             faces = sum(float(np.linalg.norm(m.polarization)) * m.body.area for m in carriers)
-            self._part = np.clip(EDGES * np.abs(self._own[1]).sum() / max(faces, np.finfo(float).tiny), 1e-9, 1.0)
+            self._part = np.clip(EDGES * np.abs(amounts).sum() / max(faces, np.finfo(float).tiny), 1e-9, 1.0)
             # what two permeabilities add to that along the easy axis, to first order
             rest = [m.permeability_in_rotor - m.recoil_permeability * np.eye(3) for m in magnets]
             self._across = closed_dipoles(carriers, rest, ACROSS)
-        self._closed = [UniformField(magnet) for magnet in carriers if magnet.polarization.any()]
+        self._closed = [UniformField(magnet) for magnet in carriers]
+
+    @cached_property
+    def _moments(self) -> list[Coefficients]:
+        """Of each magnet, about its centre and in its circumradii, its carrier's and its charges' together."""
+        found = []
+        for form, (places, amounts) in zip(self._closed, self._charges, strict=True):
+            body, whole = form.magnet.body, np.zeros((MOMENTS + 1, MOMENTS + 1), complex)
+            own = uniform_moments(form.magnet, MOMENTS).coefficients
+            whole[: len(own), : len(own)] = own
+            away, weights = (places - body.center) / body.circumradius, amounts[:, None] / body.circumradius**2
+            found.append(whole + np.conj(weighted_sums(MOMENTS, away, weights / FOUR_PI)[0]))
+        return found
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
-        """See `RotorResponse`; of each magnet the degrees that its own distance asks for."""
+        """See `RotorResponse`; of each magnet the degrees that its own distance asks for, by moments if it is far."""
         found, share = np.zeros((degree + 1, degree + 1), complex), -degree * _decay(self.magnets, ball)
-        for form in self._closed:
-            few = _degrees(share, _decay([form.magnet], ball), degree)
-            found[: few + 1, : few + 1] += interior_coefficients(form.field, ball, few)
-        if self.permeable:
-            # so small a part needs fewer degrees for the same error
-            few = _degrees(share - np.log(self._part), _decay(self.magnets, ball), degree)
-            found[: few + 1, : few + 1] += from_charges(*self._own, ball, few)
-            found += from_magnetization(*self._across, ball, degree)
-        return found
+        bodies = [magnet.body for magnet in self.magnets]
+        centers, radii = np.array([b.center for b in bodies]), np.array([b.circumradius for b in bodies])
+        reach = np.maximum(np.linalg.norm(ball.center - centers, axis=1) - ball.radius, 1.01 * radii)
+        ends = np.ceil(share / np.log(radii / reach))
+        far, most = np.flatnonzero(ends <= MOMENTS), 0
+        for k, (form, (places, amounts)) in enumerate(zip(self._closed, self._charges, strict=True)):
+            decay = _decay([form.magnet], ball)
+            few = _degrees(share, decay, degree)
+            if ends[k] <= MOMENTS:
+                most = max(most, few)
+                continue
+            if form.magnet.polarization.any():
+                found[: few + 1, : few + 1] += interior_coefficients(form.field, ball, few)
+            if len(places):  # so small a part needs fewer degrees for the same error
+                few = _degrees(share - np.log(self._part), decay, degree)
+                found[: few + 1, : few + 1] += from_charges(places, amounts, ball, few)
+        if most:
+            sums = [self._moments[k][: int(ends[k]) + 1, : int(ends[k]) + 1] for k in far]
+            found[: most + 1, : most + 1] += from_outer(sums, radii[far], centers[far], ball, most)
+        return found + from_magnetization(*self._across, ball, degree) if self.permeable else found
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""
         if not self.permeable:
             return np.zeros((degree + 1, degree + 1), complex)
         potentials = [-derivative(sources, axis) for axis in range(3)]
-        points, tensors = self.direct(min(float(m.body.distance(ball.center)) for m in self.magnets))
+        points, tensors = self.direct([float(m.body.distance(ball.center)) for m in self.magnets])
         places = np.concatenate([self.charges.places, points])
         field, direct = np.split(
             outer_sums(potentials, (places - ball.center) / ball.radius), [len(self.charges.places)]
@@ -171,8 +201,8 @@ class ChargeResponse:
         found = from_charges(self.charges.places, self.charges.areas * beyond, ball, degree)
         return found + from_magnetization(points, induced, ball, degree)
 
-    def direct(self, nearest: float) -> tuple[Array, Array]:
-        """Points (n, 3) m and μ0 M dV by b (n, 3, 3) m³ of the first part, for sources no nearer than so many m."""
+    def direct(self, nearest: ArrayLike) -> tuple[Array, Array]:
+        """Points (n, 3) m and μ0 M dV by b (n, 3, 3) m³ of the first part, see `direct_rule`."""
         return direct_rule(self.magnets, nearest, self._shares)
 
     def beyond(self, field: Array) -> Array:
@@ -181,18 +211,19 @@ class ChargeResponse:
         return self.charges.response(field) - chi / (1 + chi / 2) * field
 
 
-def direct_rule(magnets: Sequence[Magnet], nearest: float, shares: ArrayLike = 1.0) -> tuple[Array, Array]:
+def direct_rule(magnets: Sequence[Magnet], nearest: ArrayLike, shares: ArrayLike = 1.0) -> tuple[Array, Array]:
     """Points (n, 3) m and (μ - 1) dV (n, 3, 3) m³ in magnets, for integrals of fields over them.
 
     Parameters
     ----------
     magnets : k of them
-    nearest : distance of the fields' sources from the magnets at least, m
+    nearest : (k,) or one for all, distance of the fields' sources from each magnet at least, m
     shares : (k,) or one for all, part of each magnet's μ - 1 that is taken
     """
     points, tensors = [], []
-    for magnet, share in zip(magnets, np.broadcast_to(shares, len(magnets)), strict=True):
-        counts = point_counts(magnet.box, nearest, DIRECT_DIGITS)
+    each = (np.broadcast_to(part, len(magnets)).tolist() for part in (nearest, shares))
+    for magnet, distance, share in zip(magnets, *each, strict=True):
+        counts = point_counts(magnet.box, distance, DIRECT_DIGITS)
         places, volumes = (
             box_rule(magnet.body, [gauss(-h, h, n) for h, n in zip(magnet.box.half_edges, counts, strict=True)])
             if isinstance(magnet.body, Box)
@@ -426,7 +457,7 @@ def sphere_samples(rotor: ChargeResponse, floater: Floater, places: Array, watch
     rows = []
     for place in watched(places, watch, "induced magnetisation of the floater"):
         ball = Ball(place, floater.radius)
-        own = rotor.own_field(ball, enough_degree(rotor.magnets, ball, TAIL))
+        own = rotor.own_field(ball, enough_degree(rotor.magnets, ball, effort(len(rotor.magnets)).degrees))
         degree, sources = len(own) - 1, induced_sources(own, floater.recoil_permeability)
         first = sources.copy()
         first[2:] = 0.0
@@ -476,7 +507,7 @@ def returned_samples(
 
     for place in watched(places, watch, "rotor's response to it"):
         ball = Ball(place, floater.radius)
-        degree = min(enough_degree(rotor.magnets, ball, TAIL), MOST_RETURNED)
+        degree = min(enough_degree(rotor.magnets, ball, effort(len(rotor.magnets)).degrees), MOST_RETURNED)
         own = rotor.own_field(ball, degree)
         back, slope = point_response(grids, inner, coupling, high(own), ball), []
         for unit in np.eye(3):

@@ -13,7 +13,7 @@ Electricity (3rd ed. 1968), section 5.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from itertools import permutations, product
 from typing import Any, NamedTuple
@@ -48,21 +48,22 @@ class Effort(NamedTuple):
     """How finely a rotor's responses are computed: what its table errs by is the points' and charges' alone."""
 
     digits: float  # of the points: -ln of the error of Gauss's rule, about
-    charges: int  # along an edge of a face, that stand for the remanence where two magnets' fields are in the sphere
+    charges: int  # that stand for the remanence where two magnets' fields are in the sphere, as for `charges`
+    reflected: int  # the same, where magnets respond to the sphere's response to them
+    free: float  # what a weight costs that is not held, by an error of the size of all that is fitted
     nodes: tuple[int, int]  # along an edge of a face, of two responses whose difference tells their error
     dipoles: int  # places of them for each gap and magnet
     inner: int  # points along each axis at which magnets beside each other respond beyond their direct response
     corners: bool  # whether places before edges and corners are sampled, or before the faces' middles alone
     poses: int  # at which errors are found, for each gap and magnet beside that at its pole
-    degrees: float  # where the degrees and the series of both bodies end there
-    series: float
+    degrees: float  # part of the sphere's response that the degrees left out may hold, of samples and errors
+    series: float  # where that of both bodies' responses ends, relative to its first term
 
 
 # With the weights fitted, few magnets' force and torque are met to 1e-3 of all that is added, many magnets' to 2e-2.
 # With 10 nodes the response of a cube with μr = 1.05 to a dipole errs by at most 7e-4 at any distance, with 14 by 6e-4.
-FEW_MAGNETS = Effort(7.2, 3, (10, 14), 16, 2, True, 2, 1e-4, 1e-5)
-MANY_MAGNETS, MANY = Effort(5.5, 2, (4, 6), 6, 1, False, 1, 1e-3, 1e-4), 4
-OF_RESPONSE = 2  # charges along an edge of a face, to whose response in the sphere magnets respond
+FEW_MAGNETS = Effort(7.2, 3, 2, 1e-6, (10, 14), 16, 2, True, 2, 1e-4, 1e-5)
+MANY_MAGNETS, MANY = Effort(5.5, 0, 0, 1e-2, (4, 6), 6, 1, False, 1, 1e-3, 1e-4), 4
 
 
 def effort(magnets: int) -> Effort:
@@ -298,11 +299,15 @@ class ResponseGrid:
         return self.box.center + np.array(list(product(nodes, repeat=3))) * self.box.half_edges @ self.box.rotation.T
 
     def charges(self, number: int) -> tuple[Array, Array]:
-        """Places (k, 3) m in the rotor's frame of charges on the faces that stand for the remanence, and these (k,).
+        """Places (k, 3) m in the rotor's frame of charges that stand for the remanence, and these (k,).
 
-        At Gauss's points, `number` along an edge, in units of the charge of a face that the remanence leaves upright.
+        On the faces at Gauss's points, `number` along an edge, in units of the charge of a face that the remanence
+        leaves upright; with 0 one at each pole, as far out as the box reaches in the mean.
         """
-        nodes, weights = gauss_legendre(number)
+        if not number and self.axis.any():
+            pole = float(np.linalg.norm(self.axis * self.box.half_edges)) * (self.box.rotation @ self.axis)
+            return self.box.center + np.array([-pole, pole]), np.array([-1.0, 1.0])
+        nodes, weights = gauss_legendre(max(number, 1))
         along, places, amounts = list(zip(nodes, weights / 2, strict=True)), [np.zeros((0, 3))], []
         for k in np.flatnonzero(np.abs(self.axis) > PARALLEL):
             for side, (u, first), (v, second) in product((-1.0, 1.0), along, along):
@@ -391,17 +396,20 @@ class MutualTable:
     @cached_property
     def _sums(self) -> list[EnergySum]:
         """Whose sum is the energy of the moment M."""
-        sums = [grid.energy(grid.numbers) for grid in self.grids]
+        taken, sums = effort(len(self.grids)), [grid.energy(grid.numbers) for grid in self.grids]
         number = round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
-        inner, along = [grid.inner(number) for grid in self.grids], effort(len(self.grids)).charges
+        inner = [grid.inner(number) for grid in self.grids]
         if self.coupling.any():
             sums.append(coupled_sum(np.concatenate(inner), self.coupling))
+        mixed, pairs = list[EnergySum](), list[EnergySum]()
         for a, b in permutations(range(len(self.grids)), 2):
             if self.mixed[a, b]:
-                sums.append(mixed_sum(self.grids[a], inner[b], self.images, self.mixed[a, b]))
+                mixed.append(mixed_sum(self.grids[a], inner[b], self.images, taken.reflected, self.mixed[a, b]))
             if a < b and self.pairs[a, b]:
-                sums.append(pair_sum(self.grids[a], self.grids[b], self.images, along, self.pairs[a, b]))
-        return sums
+                pairs.append(pair_sum(self.grids[a], self.grids[b], self.images, taken.charges, self.pairs[a, b]))
+        # of one formula in one frame, they cost one call
+        some = [part for part in (mixed, pairs) if part]
+        return sums + [replace(part[0], rows=np.concatenate([one.rows for one in part])) for part in some]
 
     def energy(
         self,
@@ -493,11 +501,11 @@ def pair_sum(first: ResponseGrid, second: ResponseGrid, images: Array, count: in
     return charge_sum(pair_energy, (places, weight * amounts), second.charges(count), first.radius, images)
 
 
-def mixed_sum(source: ResponseGrid, points: Array, images: Array, weight: float = 1.0) -> EnergySum:
+def mixed_sum(source: ResponseGrid, points: Array, images: Array, count: int, weight: float = 1.0) -> EnergySum:
     """Minus `weight` (T) times the energy of the moment by what `points` (k, 3) m respond to the sphere's response.
 
-    That is to the `source`; `images` are the weights of `mixed_energy`.
+    That is to the `source`; `images` are the weights of `mixed_energy`, `count` is as for `pair_sum`.
     """
-    places, amounts = source.charges(OF_RESPONSE)
+    places, amounts = source.charges(count)
     mean = points, np.full(len(points), 1 / len(points))
     return charge_sum(mixed_energy, (places, weight * amounts), mean, source.radius, images)

@@ -12,8 +12,8 @@ from second_opinions.magnet_elements import element_response
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center, multipole_force
 from spinlev.fem.mutual import response
 from spinlev.fem.mutual.making import MUTUAL, cached_mutual_table, mutual_table
-from spinlev.fem.mutual.response import TAIL, ChargeResponse, enough_degree, places_around, response_products, two_body
-from spinlev.fem.mutual.table import image_weights, induced_sources, reflection, response_to_charge
+from spinlev.fem.mutual.response import ChargeResponse, enough_degree, places_around, response_products, two_body
+from spinlev.fem.mutual.table import effort, image_weights, induced_sources, reflection, response_to_charge
 from spinlev.fem.rotor.table import canonical
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import Magnet, horizontal, tilt, vertical
@@ -122,15 +122,15 @@ def stated_by(rotor):
 @pytest.mark.parametrize("rotor", [MAGNETS, vertical(10e-3, 10e-3, 1.305, 1.05)])
 def test_charges_need_fewer_degrees_than_the_remanence(rotor, monkeypatch):
     """On the sphere's response they change the force by less than the degrees that are left out of both may hold."""
-    few, forces = ChargeResponse(rotor, 10, 8), []
+    few, forces, tail = ChargeResponse(rotor, 10, 8), [], effort(1).degrees
     monkeypatch.setattr(response, "EDGES", np.inf)
     for place in poses(0.1, 12, 51, rotor)[0]:
         ball = Ball(place, PERMEABLE.radius)
-        both = [one.own_field(ball, enough_degree(rotor, ball, TAIL)) for one in (few, ChargeResponse(rotor, 10, 8))]
+        both = [one.own_field(ball, enough_degree(rotor, ball, tail)) for one in (few, ChargeResponse(rotor, 10, 8))]
         answers = [multipole_force(own, induced_sources(own, PERMEABLE.recoil_permeability), ball) for own in both]
         forces.append(np.linalg.norm(answers[0] - answers[1]) / np.linalg.norm(answers[1]))
     print(f"\nfewer degrees of the charges: {max(forces):.1e} of the force on what the rotor induces")
-    assert 0 < max(forces) < TAIL
+    assert 0 < max(forces) < tail
 
 
 @pytest.mark.slow
