@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.continuation.branch import BranchPoint
 from ..dynamics.continuation.frequencies import BORDER, CONTACT, stable_ranges
-from ..dynamics.equilibria.balance import Balance
 from ..dynamics.equilibria.derivatives import Implicit, Nearby, Tangent
-from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, LOCKED, Equilibrium, EquilibriumError
-from ..dynamics.motion.equations import parameters
+from ..dynamics.equilibria.equilibrium import FOLD, LOCKED, Equilibrium, EquilibriumError
+from ..dynamics.equilibria.search import of_whole_body
 from ..dynamics.motion.events import rotor_gap
 from ..dynamics.motion.rotor_effects import Mutual
 from ..dynamics.motion.state import Scales, State
@@ -56,7 +55,6 @@ END_FOUND = 1e-6  # Relative error of derivatives of ends, by how exactly they a
 # 100 are off by, in scenes by which it was chosen (two) and others (nine)
 TABLED = 10.0
 OF_MODES = ("growth", "mode_growth", "mode_frequency", "plate_damping")
-BALANCED = 1e-6  # what is left of scaled balances at an equilibrium of the equations, at most
 AT_FOLD = "at a fold an equilibrium has no derivatives"
 
 
@@ -119,18 +117,8 @@ class Gradient:
         return found, implicit, base
 
     def _by_mean(self, known: Equilibrium) -> bool:
-        """Whether an equilibrium is one of the floater's mean, which has dipoles all over the body.
-
-        So it is of a round floater where those on its axis will not do.
-        """
-        scene = self.levitation.scene
-        if known.kind == AVERAGED or not scene.floater.round or scene.floater.is_sphere:
-            return known.kind == AVERAGED
-        fixed, scales = known.without or known, Scales.of(scene)
-        spin = self.levitation.spin * scales.spin_ratio
-        balance = Balance(self.levitation.rates, parameters(scene, scales, frozen_spin=True), spin)
-        values, _ = balance(fixed.position[None] / scales.length, fixed.state.moment[None])
-        return bool(np.abs(values).max() > BALANCED)
+        """Whether an equilibrium is one of the floater's mean, which has dipoles all over the body."""
+        return of_whole_body(self.levitation.scene, self.levitation.rates, known)
 
     def end_by(self, point: BranchPoint, key: str) -> tuple[float, float]:
         """Derivative of the frequency of a range's end, at which the scene is, by a number, and its estimated error."""
@@ -138,7 +126,7 @@ class Gradient:
             return 0.0, 0.0
         if not self._end:
             known = equilibrium_at(self.levitation, point)
-            base = NearbyScenes(self.levitation, self.scene, False, False)
+            base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), False)
             implicit = Implicit(known, base.setting)
             self._end.append((known, base, implicit, base.around("frequency_hz")))
         known, base, implicit, by_frequency = self._end[0]

@@ -9,11 +9,12 @@ import numpy as np
 
 from ..dynamics.continuation.branch import BranchPoint, follow_branch
 from ..dynamics.continuation.frequencies import branch_through, by_frequency, on_branch
-from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, PAST_TABLE, Equilibrium, EquilibriumError, Survey
+from ..dynamics.equilibria.equilibrium import FOLD, LOCKED, PAST_TABLE, Equilibrium, EquilibriumError, Survey
 from ..dynamics.equilibria.search import (
     FixedPoints,
     cached_points,
     free_of_bodies,
+    of_whole_body,
     survey,
     with_plate,
 )
@@ -125,9 +126,17 @@ class Levitation:
 
     @cached_property
     def mean(self) -> "Levitation":
-        """That of the floater's mean over turns about its moment; this one where it is round about that."""
+        """That of the floater's mean over turns about its moment, which has dipoles all over the body.
+
+        This one where it is round about that, and those on its axis will do for the first equilibrium.
+        """
         floater = self.scene.floater
-        return self if floater.round else self.elsewhere(floater=floater.averaged)
+        if floater.is_sphere or floater.mean:
+            return self
+        known = _first(self.without_plate.equilibria) if floater.round else None
+        if floater.round and (known is None or not of_whole_body(self.still, self.rates, known)):
+            return self
+        return self.elsewhere(floater=floater.averaged)
 
     @cached_property
     def quiet(self) -> "Levitation":
@@ -331,10 +340,9 @@ class Levitation:
         if (chosen := _first(self.without_plate.equilibria)) is None:
             return ()
         mean = self.mean
-        if not mean.scene.floater.mean or chosen.kind == AVERAGED:
-            start, scene = Scales.of(mean.still).pack(chosen.start), mean.still
-        else:
-            return ()  # of frequency-locked equilibria no branch is followed
+        if chosen.kind == LOCKED:
+            return ()  # no branch of these is followed
+        start, scene = Scales.of(mean.still).pack(chosen.start), mean.still
         try:
             return tuple(branch_through(scene, mean.rates, start, scene.frequency, self.spin))
         except EquilibriumError as error:

@@ -44,6 +44,7 @@ from .equilibrium import (
 from .orbits import ForcedMotion, overlap
 
 BEYOND = 0.1  # Part of a floater's weight that multipoles on its axis may leave out; beyond, its whole body tells
+BALANCED = 1e-6  # left of the balance, where an equilibrium is met to round-off
 TURNS = 16  # about the moment from which each frequency-locked one is looked for
 STEPS = 60  # of Newton's method at most
 REACH = 0.2  # longest of its steps, in radii and rad
@@ -147,7 +148,10 @@ def survey(
     equations = rates or Rates(with_effects(scene, table))
     top = _own_spin(scene) * scales.time * scales.spin_ratio
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio, top)
-    return survey_of(scene, balance, remembered(lambda: _search(scene, table, balance, farthest, watch), ""))
+    known = remembered(lambda: _search(scene, table, balance, farthest, watch), "")
+    if np.any(scene.gravity[:2]) and any(of_whole_body(scene, equations, e) for e in upright(scene, balance, known)):
+        balance = replace(balance, rates=Rates(mean_over_turns(scene, table)[1]))
+    return survey_of(scene, balance, known)
 
 
 def _survey_of_any_body(
@@ -286,10 +290,29 @@ def _by_whole_body(
     return exact, points[np.array([free(p[:3] * scales.length, p[3:]) for p in points], bool)]
 
 
+def of_whole_body(scene: Scene, rates: Rates, known: Equilibrium) -> bool:
+    """Whether an equilibrium is one of dipoles all over the floater, without the plate's currents.
+
+    So it is of a floater's mean over turns, and of a round floater where those on its axis, of whose motion the `rates`
+    are, will not do: they do not balance there.
+    """
+    if known.kind or scene.floater.is_sphere or scene.floater.mean:
+        return known.kind == AVERAGED
+    fixed, scales = known.without or known, Scales.of(scene)
+    balance = Balance(rates, parameters(scene, scales, frozen_spin=True), known.spin * scales.spin_ratio)
+    left, _ = balance(fixed.position[None] / scales.length, fixed.state.moment[None])
+    return bool(np.abs(left).max() > BALANCED)
+
+
+def upright(scene: Scene, balance: Balance, known: FixedPoints) -> list[Equilibrium]:
+    """The `known` fixed points of a `scene`, whose `balance` says how it spins, as equilibria in upright gravity."""
+    rows = zip(known.points, known.doubts, known.residuals, known.slopes, known.jacobians, strict=True)
+    return [_equilibrium(Scales.of(scene), balance, *row) for row in rows]
+
+
 def survey_of(scene: Scene, balance: Balance, known: FixedPoints) -> Survey:
     """The survey of a `scene` with its `balance`, of which all fixed points are `known`."""
-    rows = zip(known.points, known.doubts, known.residuals, known.slopes, known.jacobians, strict=True)
-    found = _survey([_equilibrium(Scales.of(scene), balance, *row) for row in rows], known.curves)
+    found = _survey(upright(scene, balance, known), known.curves)
     if not np.any(scene.gravity[:2]):
         return found
     return _forced(ForcedMotion(replace(scene, plate=None), balance.rates, balance.values, None), found)
@@ -337,15 +360,16 @@ def with_plate(
     scene, table, rates : as for the survey `known` without the plate's currents
     memory : these currents
     """
-    known, means = free_of_bodies(scene, known), tuple[Equilibrium, ...]()
-    if not scene.floater.round:
+    known, rates = free_of_bodies(scene, known), rates or Rates(with_effects(scene, table))
+    whole = [e for e in known.equilibria if of_whole_body(scene, rates, e) and not scene.floater.mean]
+    if whole:
+        others = tuple(e for e in known.equilibria if e not in whole)
         round_scene, exactly, _ = mean_over_turns(scene, table)
-        apart = {kind: tuple(e for e in known.equilibria if e.kind == kind) for kind in (AVERAGED, LOCKED)}
-        over = with_plate(round_scene, exactly, replace(known, equilibria=apart[AVERAGED]), memory)
-        means, known = over.equilibria, replace(over, equilibria=apart[LOCKED])
+        over = with_plate(round_scene, exactly, replace(known, equilibria=tuple(whole)), memory)
+        whole, known = list(over.equilibria), replace(over, equilibria=others)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
-    found = _forced(ForcedMotion(scene, rates or Rates(with_effects(scene, table)), values, memory), known)
-    return _survey([*means, *found.equilibria], found.curves, found.left_out)
+    found = _forced(ForcedMotion(scene, rates, values, memory), known)
+    return _survey([*whole, *found.equilibria], found.curves, found.left_out)
 
 
 def _forced(problem: ForcedMotion, known: Survey) -> Survey:
