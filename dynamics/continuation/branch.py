@@ -89,14 +89,16 @@ class Family(BalanceCurve):
     rates: Rates  #: compiled once for all values of the parameter
     problem: Problem  #: what the parameter does
     unit: float = 1.0  #: of the parameter, a typical change over which the equilibrium moves by its radius
+    spin_ratio: float = 1.0  #: of the floater's moments of inertia, by which spins are in a `Balance`
 
     def balance(self, parameter: float) -> Balance:
         """Forces and torques at one value of the parameter."""
-        return Balance(self.rates, *self.problem(parameter))
+        values, spin = self.problem(parameter)
+        return Balance(self.rates, values, spin * self.spin_ratio)
 
     def balances(self, parameter: Array, which: Indices) -> Balance:
         values, spins = zip(*map(self.problem, parameter.tolist()), strict=True)
-        return Balance(self.rates, np.array(values), np.array(spins))
+        return Balance(self.rates, np.array(values), np.array(spins) * self.spin_ratio)
 
     def solution(self, guess: Array, parameter: float) -> Array | None:
         """Unknowns (7,) of the equilibrium near a place and moment (6,) at one value of the parameter."""
@@ -111,7 +113,7 @@ class Family(BalanceCurve):
         state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
         return BranchPoint(
             parameter=parameter,
-            spin=float(balance.spin),
+            spin=float(balance.spin) / self.spin_ratio,
             position=unknowns[:3] * balance.values[Parameter.LENGTH],
             state=state[0],
             tangent=tangent,

@@ -40,7 +40,7 @@ class Grid:
 
     rates: Rates  # compiled for that field
     values: Array  # (n, p) runtime parameters of the points
-    spin: Array  # (n,) body spin s
+    spin: Array  # (n,) body spin s, as of a `Balance`
     ranges: Sequence[SearchRange]  # in which equilibria are looked for
     region: Indices  # (n,) which of them is the point's
     places: Indices  # (n, axes) coordinates; not every place of the grid need have a point
@@ -239,7 +239,7 @@ def family_grid(family: RotorFamily, frequencies: Array, measures: Array, spin: 
     return Grid(
         rates=family.rates,
         values=family.values(frequencies[row], measures[column]),
-        spin=np.full(len(row), spin),
+        spin=np.full(len(row), spin * family.scene.floater.spin_ratio),
         ranges=[SearchRange(family.at(frequencies[0], measure)) for measure in measures],
         region=column,
         places=np.column_stack([row, column]),
@@ -273,6 +273,7 @@ def surveys(
         check_turning(scene)
     values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
     values[:, Parameter.MEASURE] = measures
+    spin = spin * np.array([scene.floater.spin_ratio for scene in scenes])
     grid = Grid(rates, values, spin, [SearchRange(scene) for scene in scenes], np.arange(len(scenes)), places)
     nodes = grid.coarse(SPACING if places.shape[1] > 1 else 2 * SPACING)
     point, position, moment = filled(grid, nodes)

@@ -201,7 +201,7 @@ def drift(
     """
     rates = rates or Rates(with_effects(scene, table))
     torque = SlowTorque.of(scene, rates, stokes)
-    family = Family(rates, spins(scene))
+    family = Family(rates, spins(scene), spin_ratio=scene.floater.spin_ratio)
     if start is None:
         if not (known := find_equilibria(scene, table, spin, rates=rates)):
             raise EquilibriumError(f"At {scene.frequency:g} Hz the floater has no equilibrium with body spin {spin:g}.")

@@ -36,7 +36,7 @@ from ..harmonics.interior import sphere
 from ..harmonics.solid import FOUR_PI, gauss_legendre, members, orthonormal
 
 INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
-DENSE = 4000  # nodes up to which their equations are factorised: 250 MB
+DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and columns that are made at once
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
 # Distance from a face, in edges by the nodes along them, from which on the nodes' own rule does: nodes are at most
 # h = 1.2 of that apart, so that it errs by exp(-2π 4/1.2) = 1e-9
@@ -546,7 +546,11 @@ class SurfaceCharges:
     @cached_property
     def _factors(self) -> tuple[Array, NDArray[np.int32]]:
         """Of (1 + χ/2) - χ K, for many right-hand sides, or where the iteration of `solved` does not converge."""
-        whole = -self.contrast[:, None] * self.normal_field(np.eye(len(self.places)))
+        count = len(self.places)
+        whole = np.empty((count, count), order="F")  # which is factorised in its place
+        for start in range(0, count, BLOCK):
+            columns = np.eye(count, min(BLOCK, count - start), -start)
+            whole[:, start : start + BLOCK] = -self.contrast[:, None] * self.normal_field(columns)
         whole[np.diag_indices_from(whole)] += 1 + self.contrast / 2
         factors, pivots = scipy.linalg.lu_factor(whole, overwrite_a=True)
         return factors, pivots

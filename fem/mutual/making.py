@@ -329,8 +329,7 @@ def sphere_fit(
         return np.concatenate([value / energy_size, *(by_place / force_size)], axis=-1)
 
     pairs = list(combinations(range(len(grids)), 2))
-    taken = effort(len(grids))
-    sums = [pair_sum(grids[a], grids[b], images, taken.charges) for a, b in pairs]
+    sums = [pair_sum(grids[a], grids[b], images, effort(len(grids)).charges) for a, b in pairs]
     right = scaled(energy, -force, force)
     found, weights = _fitted(grids, single, OF_SPHERE, sums, places, 1, scaled, right, PENALTY)
     coupled = np.zeros((len(grids), len(grids)))

@@ -83,7 +83,7 @@ NODES = 24
 DIRECT_DIGITS = 12.0  # as `Effort.digits`, for the direct part of the response
 OWN = 8  # for the rotor's own field in a table, which then errs by 7e-5
 EDGES = 10.0  # by how much the part of these charges may be larger where they are densest
-MOMENTS = 10  # degrees at most of a far magnet's moments; where more are needed, its closed form is as quick
+MOMENTS = 10  # degrees at most of a far magnet's moments; where more are needed, its closed form is taken
 ACROSS = 8  # of a rule in a magnet for what its second permeability adds to its own field
 
 

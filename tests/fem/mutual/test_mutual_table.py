@@ -12,7 +12,14 @@ from second_opinions.magnet_elements import element_response
 from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center, multipole_force
 from spinlev.fem.mutual import response
 from spinlev.fem.mutual.making import MUTUAL, cached_mutual_table, mutual_table
-from spinlev.fem.mutual.response import ChargeResponse, enough_degree, places_around, response_products, two_body
+from spinlev.fem.mutual.response import (
+    MOMENTS,
+    ChargeResponse,
+    enough_degree,
+    places_around,
+    response_products,
+    two_body,
+)
 from spinlev.fem.mutual.table import effort, image_weights, induced_sources, reflection, response_to_charge
 from spinlev.fem.rotor.table import canonical
 from spinlev.geometry.common import InputError
@@ -131,6 +138,30 @@ def test_charges_need_fewer_degrees_than_the_remanence(rotor, monkeypatch):
         forces.append(np.linalg.norm(answers[0] - answers[1]) / np.linalg.norm(answers[1]))
     print(f"\nfewer degrees of the charges: {max(forces):.1e} of the force on what the rotor induces")
     assert 0 < max(forces) < tail
+
+
+def test_far_magnets_are_as_exact_by_moments_as_by_their_closed_forms(monkeypatch):
+    """Of four of all shapes, against the closed forms and charges of all: to the part that is asked for."""
+    bodies = [
+        Box(np.array([7e-3, 5e-3, 6e-3]), np.zeros(3), rotation_matrix([20.0, -12.0, 25.0])),
+        Cylinder(3e-3, 4e-3, np.array([15e-3, 0.0, 0.5e-3])),
+        Cylinder(4e-3, 5e-3, np.array([0.0, 16e-3, -0.5e-3]), inner_radius=1.6e-3),
+        Sphere(3.2e-3, np.array([16e-3, 16e-3, 0.0])),
+    ]
+    rotor = ChargeResponse(tuple(Magnet(body, np.array([0.6, -0.5, 1.0]), 1.05) for body in bodies), 6)
+    places = places_around(rotor.magnets, PERMEABLE.radius, (0.3, 1.0), 2, 5)
+    for rtol in (1e-4, 1e-6):
+        fields = []
+        for most in (MOMENTS, 0):
+            monkeypatch.setattr(response, "MOMENTS", most)
+            balls = [Ball(place, PERMEABLE.radius) for place in places]
+            fields.append([rotor.own_field(ball, enough_degree(rotor.magnets, ball, rtol)) for ball in balls])
+        forces = [
+            np.array([multipole_force(a, induced_sources(a, 1.05), ball) for a, ball in zip(own, balls, strict=True)])
+            for own in fields
+        ]
+        apart = np.linalg.norm(forces[0] - forces[1], axis=1) / np.linalg.norm(forces[1], axis=1)
+        assert 0 < apart.max() < rtol
 
 
 @pytest.mark.slow

@@ -67,14 +67,28 @@ def test_the_limits_of_a_cylinder_are_those_of_its_mean():
 
 
 @pytest.mark.slow
-def test_over_a_plate_a_cylinder_levitates_where_its_mean_does():
-    """Periodic motions are followed by the equations of which the equilibrium is."""
-    plate = Plate(Box((0.3, 0.3, 0.03), (0.0, 0.0, -0.045)), 3.5e7)
+def test_a_branch_passes_through_the_equilibrium_it_is_of_whatever_the_spin():
+    """A cylinder's spin counts by its moments of inertia, which are unlike."""
+    levitation = Levitation(cylinder_and_mean()[0].scene, Models("cuboid", "none", interaction="rigid"), -0.1)
+    near = min(levitation.branch, key=lambda point: abs(point.parameter - 143.5))
+    assert near.spin == pytest.approx(levitation.equilibria[0].spin)
+    np.testing.assert_allclose(near.position, levitation.equilibria[0].position, atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plate", "tilt"), [(Plate(Box((0.3, 0.3, 0.03), (0.0, 0.0, -0.045)), 3.5e7), 0.0), (None, 0.02)]
+)
+def test_forced_a_cylinder_levitates_where_its_mean_does(plate, tilt):
+    """Periodic motions are followed by the equations of which the equilibrium is, over a plate and where axes lean."""
+    gravity = 9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
     over = [
-        Levitation(replace(one.scene, plate=plate), Models("cuboid", "slab", interaction="rigid")).equilibria[0]
+        Levitation(
+            replace(one.scene, plate=plate, gravity=gravity), Models("cuboid", "slab", interaction="rigid")
+        ).equilibria[0]
         for one in cylinder_and_mean()
     ]
-    assert over[0].currents is not None
+    assert (over[0].currents is not None) == (plate is not None)
     np.testing.assert_allclose(over[0].position, over[1].position, atol=1e-9)
     assert over[0].growth_per_s == pytest.approx(over[1].growth_per_s, rel=1e-6)
 
