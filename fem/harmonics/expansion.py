@@ -18,6 +18,7 @@ from .expressions import FieldExpressions, harmonic_sums, whole_gradient
 from .interior import Ball, moment
 from .solid import (
     FOUR_PI,
+    STEP,
     Coefficients,
     Entry,
     OuterSums,
@@ -146,7 +147,7 @@ class MultipoleExpansion:
             own = MultipoleExpansion(np.zeros(3), self.radius, self.own_coefficients)
             return turned_field(self.axes, own.expressions(turned_expressions(self.axes.T, place)))
         scaled = [component * (1.0 / self.radius) for component in place]
-        parts = self._slopes(2)
+        parts = self._slopes(2, self.degree + 2)
         sums = harmonic_sums(scaled, [real_terms(part) for part in parts])
         return sums[:3], whole_gradient(sums[3:])
 
@@ -162,17 +163,13 @@ class MultipoleExpansion:
         field, gradient = tensors(self.derivatives(points, 2))
         return field, gradient
 
-    def sums(self, order: int) -> OuterSums:
-        """The sums that `derivatives` are, of places in radii from the centre."""
-        return OuterSums.of(self._slopes(order))
-
-    def _slopes(self, order: int) -> list[Coefficients]:
-        """Coefficients, of one size, of what `derivatives` gives."""
+    def _slopes(self, order: int, last: int) -> list[Coefficients]:
+        """Coefficients up to the `last` degree of what `derivatives` gives."""
         found: dict[Entry, Coefficients] = {(i,): -derivative(self.coefficients, i) for i in range(3)}
         for degree in range(2, order + 1):
             for each in entries(degree):
                 found[each] = derivative(found[each[:-1]], each[-1]) / self.radius
-        return [np.pad(part, (0, self.degree + 1 + order - len(part))) for part in found.values()]
+        return [np.pad(part, (0, last + 1 - len(part))) for part in found.values()]
 
     def root_mean_square(self, points: Array) -> tuple[Array, Array]:
         """Sizes (n,) of B (T) and of its gradient (T/m), as a mean over the spheres on which the points lie.
@@ -188,17 +185,27 @@ class MultipoleExpansion:
 
 def summed_derivatives(expansions: Sequence[MultipoleExpansion], points: Array, order: int) -> Array:
     """`derivatives` (n, k) of all `expansions` together at points (n, 3) m, or each at its own (expansions, n, 3)."""
-    sums, centers, radii, numbers = _joined(tuple(expansions), order)
-    places = points if points.ndim == 2 else points[numbers]
-    return sums.totals((places - centers[:, None]) / radii[:, None, None])
+    total = np.zeros((points.shape[-2], order * (order + 2)))
+    for sums, centers, radii, numbers in _joined(tuple(expansions), order):
+        places = points if points.ndim == 2 else points[numbers]
+        total += sums.totals((places - centers[:, None]) / radii[:, None, None])
+    return total
 
 
 @lru_cache(maxsize=32)  # a table is asked for by thousands of calls, of one point often
-def _joined(expansions: tuple[MultipoleExpansion, ...], order: int) -> tuple[OuterSums, Array, Array, NDArray[np.intp]]:
-    """The sums of all expansions, the centres (k, 3) m and radii (k,) m about which they are, and their numbers."""
-    sums, numbers = OuterSums.joined([one.sums(order) for one in expansions])
-    centers, radii = np.array([one.center for one in expansions]), np.array([one.radius for one in expansions])
-    return sums, centers[numbers], radii[numbers], numbers
+def _joined(
+    expansions: tuple[MultipoleExpansion, ...], order: int
+) -> list[tuple[OuterSums, Array, Array, NDArray[np.intp]]]:
+    """The sums of expansions of so many steps of degrees together, their centres (k, 3) m, radii (k,) m and numbers."""
+    steps = np.array([-(-(one.degree + order) // STEP) for one in expansions])
+    found = []
+    for count in np.unique(steps):
+        numbers = np.flatnonzero(steps == count)
+        some = [expansions[k] for k in numbers]
+        slopes = [one._slopes(order, max(one.degree for one in some) + order) for one in some]
+        centers, radii = np.array([one.center for one in some]), np.array([one.radius for one in some])
+        found.append((OuterSums.of(np.array(slopes)), centers, radii, numbers))
+    return found
 
 
 def turned_expressions(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:

@@ -10,25 +10,28 @@ A real harmonic function outside a sphere is Σ_lm c_lm Θ_lm with c_l(-m) = (-1
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations_with_replacement
 from typing import Any, Self
 
+import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.common import Array, frozen_array
+from ..compiled_code import compiled, one_thread
 
 Coefficients = NDArray[np.complex128]  # c[l, m] for 0 ≤ m ≤ l, as a square array
 Member = tuple[int, int, int]  # l, m, and 0 for the real or 1 for the imaginary part
 FOUR_PI = 4 * np.pi
 
-CHUNK = 4096  # points at once, so that the harmonics of all degrees fit in memory
-# Points at once of sums, more of few degrees as far as their harmonics are so many numbers, and terms times points: so
-# that they fit in the processor's cache
-BLOCK, NUMBERS, TERMS = 256, 1 << 16, 1 << 14
+CHUNK = 4096  # points at once, so that what belongs to them fits in memory
+# Points at once of harmonics, more of few degrees as far as they are so many numbers: so that these fit in the
+# processor's cache
+BLOCK, NUMBERS = 128, 1 << 18
+STEP, STEPS = 6, 4  # degrees that are compiled together, and how often: a second, once; others are seldom asked for
 FACTORIALS = np.array([float(math.factorial(n)) for n in range(171)])  # all that a double can hold
 
 
@@ -46,47 +49,99 @@ def factorials(degree: int) -> Array:
     return frozen_array(np.where(m <= l, FACTORIALS[np.maximum(l - m, 0)] * FACTORIALS[l + m], 1.0), l.shape)
 
 
-def regular_orders(degree: int, x: Array, y: Array, z: Array) -> Iterator[tuple[int, Array, Any]]:
-    """Order by order m: Υ_lm = R_lm (x + iy)^m, as m, R (degree + 1 - m, n) and the power (n,).
-
-    Real recurrences for one m at a time take a third of the time and memory of all complex harmonics.
-
-    Parameters
-    ----------
-    degree : highest l
-    x, y, z : coordinates (n,)
-    """
-    square, across = x * x + y * y + z * z, x + 1j * y
-    power, first = np.ones_like(across), 1.0
+@cache
+def _leading(degree: int) -> Array:
+    """[l, m]: Υ_lm over (x + iy)^m and the polynomial of z that `_step` takes for it; 0 for m > l."""
+    found = np.zeros((degree + 1, degree + 1))
     for m in range(degree + 1):
-        if m:
-            power, first = power * across, -first / (2 * m)
-        rows = np.empty((degree + 1 - m, len(x)))
-        rows[0] = first
+        found[m, m] = (-0.5) ** m / FACTORIALS[m]
         for l in range(m + 1, degree + 1):
-            upper = z * rows[l - 1 - m]
-            upper *= 2 * l - 1
-            if l - 2 >= m:
-                upper -= square * rows[l - 2 - m]
-            np.divide(upper, (l + m) * (l - m), out=rows[l - m])
-        yield m, rows, power
+            found[l, m] = found[l - 1, m] * (2 * l - 1) / ((l - m) * (l + m))
+    return frozen_array(found, found.shape)
+
+
+@cache
+def _step(last: int) -> Any:
+    """Compiled: what `real_harmonics` gives of the next `STEP` degrees, from the two up to the `last` one."""
+    before, here = ([hy.expression(f"h_{l}_{k}") for k in range(2 * l + 1)] for l in (last - 1, last))
+    variables, (x, y, z), made = [*before, *here], [hy.par[k] for k in range(3)], list[Any]()
+    square = x * x + y * y + z * z
+    for l in range(last + 1, last + STEP + 1):
+        upper = [z * part for part in here]
+        for k, factor in enumerate(_ladder(l).tolist()):
+            upper[k] -= factor * square * before[k]
+        cosine, sine = here[-2:] if l > 1 else (here[0], None)
+        turned = [cosine * x - sine * y, cosine * y + sine * x] if l > 1 else [cosine * x, cosine * y]
+        before, here = here, [*upper, *turned]
+        made += here
+    return compiled(hy.cfunc, made, variables, fast_math=True)
+
+
+@cache
+def _ladder(l: int) -> Array:
+    """(2 l - 3,): what of r² times degree l - 2 goes into degree l; no other scale has so short a recurrence."""
+    m = (np.arange(max(2 * l - 3, 0)) + 1) // 2
+    return ((l - 1) ** 2 - m * m) / ((2.0 * l - 1) * (2.0 * l - 3))
+
+
+def real_harmonics(degree: int, points: Array, factor: Array | float) -> Array:
+    """Harmonics ((degree + 1)², n) at points (3, n): degree by degree those of m = 0, cos φ, sin φ, cos 2φ, ...
+
+    They are `factor` (n,) times the parts of Υ_lm, over `_leading`.
+    """
+    steps = min(-(-degree // STEP), STEPS)
+    found = np.empty(((max(degree, steps * STEP) + 1) ** 2, points.shape[1]))
+    found[0], (x, y, z), square = factor, points, np.sum(points**2, axis=0)
+    with one_thread():
+        for last in range(0, steps * STEP, STEP):
+            first, here, end = max(last - 1, 0) ** 2, (last + 1) ** 2, (last + STEP + 1) ** 2
+            _step(last)(found[first:here], pars=points, outputs=found[here:end])
+    for l in range(steps * STEP + 1, degree + 1):
+        lower, upper, new = (found[(l + k) ** 2 : (l + k + 1) ** 2] for k in (-2, -1, 0))
+        np.multiply(upper, z, out=new[:-2])
+        new[:-4] -= _ladder(l)[:, None] * square * lower
+        new[-2], new[-1] = upper[-2] * x - upper[-1] * y, upper[-2] * y + upper[-1] * x
+    return found[: (degree + 1) ** 2]
+
+
+@cache
+def _places(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
+    """l, m, and whether it goes as sin mφ, ((degree + 1)²,) of each of `real_harmonics`."""
+    number = np.arange((degree + 1) ** 2)
+    l = np.sqrt(number + 0.5).astype(int)
+    k = number - l * l
+    return l, (k + 1) // 2, (k > 0) & (k % 2 == 0)
+
+
+def _complex(values: Array, degree: int) -> Coefficients:
+    """Υ_lm as [..., l, m] from their real parts (..., harmonics)."""
+    found, (l, m, sine) = np.zeros((*values.shape[:-1], degree + 1, degree + 1), complex), _places(degree)
+    found.real[..., l[~sine], m[~sine]] = values[..., ~sine]
+    found.imag[..., l[sine], m[sine]] = values[..., sine]
+    return np.asarray(found * _leading(degree))
 
 
 def regular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
     """Complex regular harmonics Υ_lm (n,) by (l, m), 0 ≤ m ≤ l ≤ `degree`, at coordinates x, y, z (n,)."""
-    orders = regular_orders(degree, x, y, z)
-    return {(m + k, m): row * power for m, rows, power in orders for k, row in enumerate(rows)}
+    values, sizes = real_harmonics(degree, np.stack([x, y, z]), 1.0), _leading(degree)
+    return {
+        (l, m): sizes[l, m] * (values[l * l + 2 * m - 1] + 1j * values[l * l + 2 * m] if m else values[l * l] + 0j)
+        for l in range(degree + 1)
+        for m in range(l + 1)
+    }
 
 
 def weighted_sums(degree: int, points: Array, weights: Array) -> Coefficients:
     """Σ_n weight_n Υ_lm(r_n), [k, l, m], up to a `degree` at `points` (n, 3) with `weights` (n, k)."""
-    result = np.zeros((weights.shape[1], degree + 1, degree + 1), complex)
-    for first in range(0, len(points), CHUNK):
-        here = slice(first, first + CHUNK)
-        for m, rows, power in regular_orders(degree, *np.ascontiguousarray(points[here].T)):
-            turned = np.ascontiguousarray(power[:, None] * weights[here])
-            result[:, m:, m] += (rows @ turned.view(float)).view(complex).T
-    return result
+    step, total = _block(degree), np.zeros(((degree + 1) ** 2, weights.shape[1]))
+    for start in range(0, len(points), step):
+        some = np.ascontiguousarray(points[start : start + step].T)
+        total += real_harmonics(degree, some, 1.0) @ weights[start : start + step]
+    return _complex(total.T, degree)
+
+
+def _block(degree: int) -> int:
+    return max(BLOCK, NUMBERS // (degree + 1) ** 2)
 
 
 def both_signs(coefficients: Coefficients) -> tuple[Coefficients, int]:
@@ -123,105 +178,44 @@ def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) ->
 
 @dataclass(frozen=True, eq=False)
 class OuterSums:
-    """Sums Σ c_lm Θ_lm of k functions, about one centre or several: the real harmonics they have, and their weights."""
+    """Sums Σ c_lm Θ_lm of k functions, about one centre or several."""
 
-    degrees: Array  # of each centre, falling
-    # l, m and number of the centre of those with cos mφ, then of those with sin mφ; centre by centre
-    orders: tuple[tuple[NDArray[np.intp], ...], ...]
-    weights: tuple[Array, Array]  # (count, k) of each kind
-
-    @classmethod
-    def of(cls, coefficients: Sequence[Coefficients]) -> Self:
-        """Of arrays c of one size, about one centre."""
-        stacked = np.stack(coefficients, axis=-1)
-        m = np.arange(len(stacked))
-        sizes = (np.sqrt(factorials(len(stacked) - 1)) * np.where(m, 2.0, 1.0))[..., None]
-        parts = stacked.real * sizes, np.where(m[:, None], -stacked.imag, 0.0) * sizes
-        orders = tuple(np.nonzero(part.any(axis=2)) for part in parts)
-        return cls(
-            np.array([len(stacked) - 1]),
-            tuple((l, m, np.zeros_like(l)) for l, m in orders),
-            (parts[0][orders[0]], parts[1][orders[1]]),
-        )
+    degree: int
+    used: NDArray[np.intp]  # numbers of the harmonics that they have
+    weights: Array  # (k, used, centres)
 
     @classmethod
-    def joined(cls, sums: Sequence[Self]) -> tuple[Self, NDArray[np.intp]]:
-        """Of several centres together, and their numbers (sums,) in the order in which it has them."""
-        order = np.argsort([-one.degrees[0] for one in sums], kind="stable")
-        chosen = [sums[k] for k in order]
-        orders = [
-            (*(np.concatenate([one.orders[kind][i] for one in chosen]) for i in (0, 1)),
-             np.repeat(np.arange(len(chosen)), [len(one.weights[kind]) for one in chosen]))
-            for kind in (0, 1)
-        ]  # fmt: skip
-        weights = [np.concatenate([one.weights[kind] for one in chosen]) for kind in (0, 1)]
-        return cls(np.array([one.degrees[0] for one in chosen]), tuple(orders), (weights[0], weights[1])), order
+    def of(cls, coefficients: Coefficients) -> Self:
+        """Of arrays c_lm (centres, k, l, m)."""
+        degree = coefficients.shape[-1] - 1
+        l, m, sine = _places(degree)
+        # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r; of c_l(-m) the real part is the same
+        whole = coefficients * (factorials(degree) * _leading(degree) * np.where(np.arange(degree + 1), 2.0, 1.0))
+        parts = np.where(sine, -whole.imag[..., l, m], whole.real[..., l, m])
+        used = np.flatnonzero(parts.any(axis=(0, 1)))
+        return cls(degree, used, np.ascontiguousarray(parts[..., used].transpose(1, 2, 0)))
 
     def totals(self, places: Array) -> Array:
-        """Totals (n, k) of all centres, from each of which every point has its place: (centres, n, 3).
-
-        At few points many centres share the steps of the recurrences, of which 27 expansions would else ask for 600.
-        """
-        block = max(BLOCK, NUMBERS // int(self.degrees[0] + 1) ** 2)
-        together = max(1, block // max(places.shape[1], 1))
-        result = np.zeros((places.shape[1], self.weights[0].shape[1]))
-        for first in range(0, len(places), together):
-            for start in range(0, len(result), block):
+        """Totals (n, k) of all centres, from each of which every point has its place: (centres, n, 3)."""
+        (count, _, centers), number, block = self.weights.shape, places.shape[1], _block(self.degree)
+        together = max(1, block // max(number, 1))  # of few points many centres share a call
+        result = np.zeros((number, count))
+        for first in range(0, centers if len(self.used) else 0, together):
+            weights = self.weights[:, :, first : first + together].reshape(count, -1)
+            for start in range(0, number, block):
                 here = slice(start, start + block)
-                result[here] += self._part(first, places[first : first + together, here])
+                points = np.ascontiguousarray(places[first : first + together, here].reshape(-1, 3).T)
+                inverse = 1 / np.sum(points**2, axis=0)
+                values = real_harmonics(self.degree, points * inverse, np.sqrt(inverse))
+                if len(self.used) < len(values):
+                    values = values[self.used]
+                result[here] += (weights @ values.reshape(weights.shape[1], -1)).T
         return result
-
-    def _part(self, first: int, places: Array) -> Array:
-        """`totals` of the centres from a `first` one on, at points that fit in the cache together."""
-        (centers, count), points = places.shape[:2], places.reshape(-1, 3)
-        degrees = self.degrees[first : first + centers]
-        square = np.einsum("na,na->n", points, points)
-        x, y, z = points.T / square
-        ends = [count * int(np.sum(degrees >= l)) for l in range(degrees[0] + 1)]
-        zonal, power = _zonal(ends, z, 1 / square), np.empty((len(ends), len(points)), complex)
-        power[0], across = 1 / np.sqrt(square), x + 1j * y
-        for order, end in enumerate(ends[1:], 1):
-            np.multiply(power[order - 1, :end], -np.sqrt(1 - 0.5 / order) * across[:end], out=power[order, :end])
-        total = np.zeros((count, self.weights[0].shape[1]))
-        shape, step = (centers, count), max(1, TERMS // count)
-        for (l, m, k), weights, part in zip(self.orders, self.weights, (power.real, power.imag), strict=True):
-            begin, end = np.searchsorted(k, (first, first + centers))
-            heights, across = zonal.reshape(*zonal.shape[:2], *shape), part.reshape(len(ends), *shape)
-            for start in range(begin, end, step):
-                here = slice(start, min(start + step, end))
-                values = heights[l[here], m[here], k[here] - first] * across[m[here], k[here] - first]
-                total += values.T @ weights[here]
-        return total
 
 
 def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
     """Σ c_lm Θ_lm (n, k) at points (n, 3), for k arrays c of one size."""
-    return OuterSums.of(coefficients).totals(points[None])
-
-
-def _zonal(ends: Sequence[int], z: Array, square: Array) -> Array:
-    """√((l-m)! (l+m)!) Υ_lm (l, m, n) at heights z with r², without the factor that it has for l = m.
-
-    Of degree l at the first `ends`[l] points only. All orders at once: a tenth of the calls that one by one would need.
-    """
-    factors, found = _ladder(len(ends) - 1), np.empty((len(ends), len(ends), len(z)))
-    for l, end in enumerate(ends):
-        found[l, l, :end] = 1.0
-        if l:
-            np.multiply(found[l - 1, :l, :end], factors[0, l, :l, None] * z[:end], out=found[l, :l, :end])
-        if l > 1:
-            found[l, : l - 1, :end] -= factors[1, l, : l - 1, None] * square[:end] * found[l - 2, : l - 1, :end]
-    return found
-
-
-@cache
-def _ladder(degree: int) -> Array:
-    """(2, l, m): factors of z and r² in the recurrence of `_zonal`."""
-    l, m = np.indices((degree + 1, degree + 1))
-    root = np.sqrt(np.maximum(l * l - m * m, 1))
-    return frozen_array(
-        np.array([(2 * l - 1) / root, np.sqrt(np.maximum((l - 1) ** 2 - m * m, 0)) / root]), (2, *l.shape)
-    )
+    return OuterSums.of(np.stack(coefficients)[None]).totals(points[None])
 
 
 def derivative(coefficients: Coefficients, axis: int) -> Coefficients:

@@ -430,10 +430,11 @@ def least_squares(columns: Array, values: Array, small: Array, free: float, cost
     small : (k,) which weights are kept small: by themselves they are hardly determined
     free, cost : of one that is not, where there are many, and of one that is, by an error of the size of all values
     """
-    size = np.linalg.norm(columns, axis=0)
+    square = columns.T @ columns
+    size = np.sqrt(np.diag(square))
     size[size == 0] = 1.0
     if not small.any() and len(size) <= FEW_WEIGHTS:
         return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
-    square = columns.T @ columns / np.outer(size, size)  # a copy of the columns would take hundreds of megabytes
+    square /= np.outer(size, size)  # a copy of the columns would take hundreds of megabytes
     square[np.diag_indices_from(square)] += np.where(small, cost, free) ** 2
     return np.asarray(scipy.linalg.solve(square, columns.T @ values / size, assume_a="pos") / size)

@@ -7,7 +7,7 @@ from spinlev.fem.closed_forms.uniform import UniformField
 from spinlev.fem.elements.magnetostatics import coulomb_field
 from spinlev.fem.harmonics.expansion import MultipoleExpansion, summed_derivatives, uniform_moments
 from spinlev.fem.harmonics.expressions import CompiledField
-from spinlev.fem.harmonics.solid import BLOCK, entries, rotated_harmonics, tensors
+from spinlev.fem.harmonics.solid import BLOCK, entries, outer_sums, rotated_harmonics, tensors, weighted_sums
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.shapes import Box, Cylinder, Sphere, rotation_matrix
 
@@ -41,6 +41,18 @@ def test_closed_form_is_coulombs_law_to_1e_13(polarization):
     exact = coulomb_field(magnet, POINTS)
     assert worst(UniformField(magnet).evaluate(POINTS)[0], exact) < 1e-13
     assert worst(CompiledField(UniformField(magnet).expressions)(POINTS)[0], exact) < 1e-13
+
+
+@pytest.mark.parametrize("degree", [1, 5, 6, 13, 24, 25, 40])
+def test_the_harmonics_of_charges_are_their_potential(degree):
+    """Σ q/|r - s| of charges in a sphere, far from which the degrees left out are round-off, or as many as they are."""
+    rng = np.random.default_rng(degree)
+    way = rng.normal(size=(50, 3))
+    sources = 0.4 * way[:20] / np.linalg.norm(way[:20], axis=1)[:, None]
+    points, amounts = 4 * way / np.linalg.norm(way, axis=1)[:, None], rng.normal(size=(20, 2))
+    found = outer_sums([np.conj(part) for part in weighted_sums(degree, sources, amounts)], points)
+    exact = (1 / np.linalg.norm(points[:, None] - sources, axis=-1)) @ amounts
+    assert np.abs(found - exact).max() < (4 * 0.1**degree + 1e-14) * np.abs(exact).max()
 
 
 def test_the_code_of_all_cuboids_is_each_ones_own_closed_form():
