@@ -51,9 +51,10 @@ FORMATS = {
     "slab": 3,
     "edges": 2,
     "rotor-losses": 2,
+    "floater-currents": 1,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 6,
+    "equilibria": 7,
     "experiment": 2,
     "code": 1,
 }

@@ -23,7 +23,7 @@ from ..dynamics.motion.floater_effects import (
 from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS
 from ..fem.rotor.floater import floater_sources, shares
 from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
-from ..geometry.common import MAGNET_CONDUCTIVITY
+from ..geometry.common import MAGNET_CONDUCTIVITY, ComputationError
 from ..geometry.scene.contents import Scene
 from .levitation import Levitation
 from .words import spoken_time
@@ -102,11 +102,13 @@ def _scene(levitation: Levitation, first: Equilibrium | None) -> Scene:
 
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     """Eddy currents of the scene's floater, or what those of a sintered magnet would be."""
-    scene, floater, growth = levitation.scene, levitation.scene.floater, None
-    if not floater.is_sphere:
-        return ListedEffect(FLOATER_CURRENTS, False, None, None, OF_SPHERES)
+    scene, growth = _scene(levitation, first), None
+    floater = scene.floater
     there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
-    doubt = slow_error(there)
+    try:
+        doubt = slow_error(there)
+    except ComputationError as error:  # it cannot be meshed
+        return ListedEffect(FLOATER_CURRENTS, False, None, None, f"no floater.conductivity_S_m; not known: {error}")
     if first and scene.frequency and doubt <= SLOW_ENOUGH:
         growth = growth_by_floater(there, levitation.table, first, bool(floater.conductivity))
     why = _why("floater.conductivity_S_m", bool(floater.conductivity), growth, doubt)
@@ -136,8 +138,9 @@ def _shape(levitation: Levitation) -> ListedEffect:
     floater = levitation.scene.floater
     left_out = shares(floater, floater_sources(floater), HIGHEST)
     why = (
-        f"its multipoles and its polarizability in the rotor's field; plate, the magnets' response and currents have "
-        f"its dipole and a sphere of its volume, whose error is up to {left_out.sum():.1%} of what they do"
+        f"its multipoles and its polarizability in the rotor's field; plate, the magnets' response and the "
+        f"rotor's currents have its dipole and a sphere of its volume, whose error is up to {left_out.sum():.1%} of "
+        "what they do"
     )
     return ListedEffect(FLOATER_SHAPE, True, None, None, why)
 

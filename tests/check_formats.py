@@ -30,6 +30,7 @@ SOLVERS = {
     "slab": "fem/plate/tables.py",
     "edges": "fem/plate/slab.py",
     "rotor-losses": "fem/rotor_metal.py",
+    "floater-currents": "fem/floater_metal.py",
     "floating": "fem/plate/floating.py",
     "floating-free": "fem/plate/floating.py",
     "equilibria": "dynamics/equilibria/search.py",

@@ -146,7 +146,9 @@ def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium,
     values = parameters(scene, scales, frozen_spin=True)
     still = values.copy()
     still[Parameter.TILT_EDDY] = 0.0
-    rates = Rates(Interaction(with_coils(scene, table).field, (FloaterCurrents(),)))
+    effect, turning = FloaterCurrents.of(scene), not scene.floater.round
+    assert effect is not None
+    rates = Rates(Interaction(with_coils(scene, table).field, (effect,), turning))
     slopes = [rates(scales.pack(fixed.state)[None], each)[1][0] for each in (values, still)]
     return _growth(scene, fixed, slopes[0] - slopes[1], included)
 

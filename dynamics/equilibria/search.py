@@ -490,6 +490,7 @@ def locked_equilibrium(
     """
     rate = float(values[Parameter.RATE])
     axes = matrices_of(quaternion)
+    quaternion = quaternions_of(axes)  # of its two signs that of a packed state: the Jacobian's entries have it
     velocity = rate * np.array([-position[1], position[0], 0.0])
     state = np.concatenate([position, velocity, quaternion, rate * axes[2]])
     value, slope = (part[0] for part in rates.locked_balance(position[None], quaternion[None], values))

@@ -15,6 +15,7 @@ from .body_shape import BodyShape
 from .coils import with_coils
 from .effect import Interaction
 from .floater_effects import (
+    FLOATER_CURRENTS,
     FLOATER_SHAPE,
     INDUCED_SHAPE,
     FloaterShape,
@@ -123,8 +124,9 @@ def mean_over_turns(scene: Scene, table: FieldFormula) -> tuple[Scene, Interacti
     The last is the same with the mean's multipoles about its moment as dipoles up to degree 7, for searches.
     """
     whole, round_scene = with_coils(scene, table), replace(scene, floater=scene.floater.averaged)
-    # Beside what the shape does all effects are those of a round body as well.
-    kept = tuple(e for e in whole.effects if e.name not in (FLOATER_SHAPE, INDUCED_SHAPE))
+    # Beside what its shape decides all effects are those of a round body as well.
+    of_shape = FLOATER_SHAPE, INDUCED_SHAPE, FLOATER_CURRENTS
+    kept = tuple(e for e in whole.effects if e.name not in of_shape)
     others = replace(whole, turning=False, effects=kept)
     rough = FloaterShape.of(round_scene.floater, floater_sources(round_scene.floater), whole.field)
     return round_scene, with_effects(round_scene, others), with_effects(round_scene, others.joined(rough))

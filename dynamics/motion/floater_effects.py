@@ -35,8 +35,11 @@ steady turn at every frequency: what is odd in X of X (1 - τX)⁻¹ = X + τX²
 weakens, the even part the ball's lift, its push out of the field.  What changes the turn, and the drift through G, is
 taken as slow against the delays (`slow_error`); a magnet's motions are not always (`too_slow`).  Where skin depth is
 large against R all is that of a thin field, a loss κ |Ḃ|² + (2/21) R² κ |Ġ|² whose derivatives by v and w force and
-torque are.  Degree 3 is left out; it changes the growth rates of modes by 1 to 2 % of this effect's at 14 to 22 mm,
-more nearer by.
+torque are.  A body of another shape has tensors of field and gradient in place of κ and (2/21) R² κ, and where it has
+no centre of symmetry one between the two (`fem.floater_metal`).  Each part of a uniform field's has the shares c of a
+ball and delays τ that are longer or shorter by one ratio, such that B̈ has the right factor; so it is exact for a
+slow turn up to the second order, and a gradient's delays are right in the mean.  Degree 3 is left out; it changes the
+growth rates of modes by 1 to 2 % of this effect's at 14 to 22 mm, more nearer by.
 """
 
 from collections.abc import Sequence
@@ -48,6 +51,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...fem.closed_forms.eddy_bodies import skin_number
+from ...fem.floater_metal import GRADIENTS, current_shape
 from ...fem.harmonics.interior import LocalField
 from ...fem.rotor.floater import FloaterSources, force_and_torque, polarizability_tensor
 from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable
@@ -56,7 +60,7 @@ from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import AIR_VISCOSITY, Scene
 from ...geometry.scene.floater import Floater
 from .coils import CoilForce
-from .effect import ZERO, Added, Effect, Motion, Poses, dissipative
+from .effect import NOTHING, ZERO, Added, Effect, Motion, Poses, dissipative
 from .state import Parameter, Vector, add, cross, dot
 
 REAL_AIR = "air beyond Stokes"
@@ -253,24 +257,34 @@ class InducedShape:
         which = Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE
         length, inertia, share = (motion.given[p] for p in which)
         field, gradient, unit = motion.field, motion.gradient, share * share
-        even = float(self.tensor[0, 0])
-        if np.abs(self.tensor - even * np.eye(3)).max() <= EVEN * abs(even):
+        induced = by_tensor(self.tensor, field, motion)
+        if is_even(self.tensor):
             # as of a sphere, whatever its turn: there is no torque
-            energy = -0.5 * unit * even * dot(field, field)
-            return Added(pulled=[unit * length * even * b for b in field], energy=energy)
-        if motion.axes is None:
-            across, along = float(self.tensor[0, 0]), float(self.tensor[2, 2] - self.tensor[0, 0])
-            lengthwise = along * dot(motion.moment, field)
-            induced = [across * b + lengthwise * m for b, m in zip(field, motion.moment, strict=True)]
-        else:
-            own = [dot([row[k] for row in motion.axes], field) for k in range(3)]
-            turned = [hy.sum([float(a) * b for a, b in zip(row, own, strict=True)]) for row in self.tensor]
-            induced = [dot(row, turned) for row in motion.axes]
+            energy = -0.5 * unit * dot(induced, field)
+            return Added(pulled=[unit * length * b for b in induced], energy=energy)
         return Added(
             force=[unit * length * dot(induced, [gradient[i][j] for i in range(3)]) for j in range(3)],
             torque=[unit / inertia * t for t in cross(induced, field)],
             energy=-0.5 * unit * dot(induced, field),
         )
+
+
+def is_even(tensor: Array) -> bool:
+    """Whether a tensor (3, 3) is the same in all directions."""
+    return bool(np.abs(tensor - tensor[0, 0] * np.eye(3)).max() <= EVEN * abs(tensor[0, 0]))
+
+
+def by_tensor(tensor: Array, vector: Vector, motion: Motion) -> list[hy.expression]:
+    """A tensor (3, 3) along the body's axes by a vector along the rotor's; of a round body it is round about z."""
+    across, along = float(tensor[0, 0]), float(tensor[2, 2] - tensor[0, 0])
+    if is_even(tensor):
+        return [across * v for v in vector]
+    if motion.axes is None:
+        lengthwise = along * dot(motion.moment, vector)
+        return [across * v + lengthwise * m for v, m in zip(vector, motion.moment, strict=True)]
+    own = [dot([row[k] for row in motion.axes], vector) for k in range(3)]
+    turned = [hy.sum([float(a) * b for a, b in zip(row, own, strict=True)]) for row in tensor]
+    return [dot(row, turned) for row in motion.axes]
 
 
 Matrix = list[list[hy.expression]]
@@ -295,23 +309,31 @@ def check_floater_metal(scene: Scene) -> None:
 
     Raises InputError: with the skin depth, and the conductivity or frequency up to which it would do.
     """
-    floater, frequency = scene.floater, scene.fastest
-    number = skin_number(floater.radius, floater.conductivity or 0.0, frequency)
+    floater, frequency, radius = scene.floater, scene.fastest, _as_slow(scene.floater)
+    number = skin_number(radius, floater.conductivity or 0.0, frequency)
     if too_slow(scene):
         rule = "leave its skin depth large against it where it has a remanence"
         said = f"{2 * frequency:.4g} Hz, twice the rotor's frequency,"
-        depth, share = floater.radius / np.sqrt(number), np.sqrt(SLOW_ENOUGH * 105) / 2 / number
+        depth, share = radius / np.sqrt(number), np.sqrt(SLOW_ENOUGH * 105) / 2 / number
     elif number > THINNEST:
         rule = f"leave its skin depth at least {np.sqrt(2 / THINNEST):.2g} of its radius"
-        said, depth, share = f"{frequency:.4g} Hz", floater.radius * np.sqrt(2 / number), THINNEST / number
+        said, depth, share = f"{frequency:.4g} Hz", radius * np.sqrt(2 / number), THINNEST / number
     else:
         return
     most = ROUNDED * share
+    ball = "in a ball" if floater.is_sphere else f"in a {floater.shape} whose currents are as slow as in a ball"
     raise InputError(
         f"Input floater.conductivity_S_m must {rule}; instead received {floater.conductivity:.3g} S/m: "
-        f"{depth * 1e3:.3g} mm at {said} in a ball of {2e3 * floater.radius:.4g} mm. Take at most "
+        f"{depth * 1e3:.3g} mm at {said} {ball} of {2e3 * radius:.4g} mm. Take at most "
         f"{most * (floater.conductivity or 0):.3g} S/m or {most * frequency:.3g} Hz, or leave it out."
     )
+
+
+def _as_slow(floater: Floater) -> float:
+    """Radius (m) of a ball whose currents are as slow as a floater's."""
+    if floater.is_sphere or not floater.conductivity:
+        return floater.radius
+    return float(floater.radius * np.sqrt(current_shape(floater).delays.max()))
 
 
 def slow_error(scene: Scene) -> float:
@@ -320,10 +342,10 @@ def slow_error(scene: Scene) -> float:
     As for the rotor's metal (`fem.rotor_metal`) the fastest are at twice the rotor's frequency.  A drive of a
     rate of change a adds a τ² of the slowest mode, which follows the lag with its delay τ.
     """
-    floater, (times, rates, _) = scene.floater, scene.knots
-    delay = skin_number(floater.radius, floater.conductivity or 0.0, 1 / (2 * np.pi)) / ZEROS[0][0] ** 2
+    floater, radius, (times, rates, _) = scene.floater, _as_slow(scene.floater), scene.knots
+    delay = skin_number(radius, floater.conductivity or 0.0, 1 / (2 * np.pi)) / ZEROS[0][0] ** 2
     ramp = float(np.abs(np.diff(rates) / np.diff(times)).max(initial=0.0)) * delay**2
-    number = skin_number(floater.radius, floater.conductivity or 0.0, scene.fastest)
+    number = skin_number(radius, floater.conductivity or 0.0, scene.fastest)
     return min(1.0, (2 * number) ** 2 / 105 + ramp)
 
 
@@ -332,36 +354,130 @@ def too_slow(scene: Scene) -> bool:
     return scene.floater.remanence > 0 and slow_error(scene) > SLOW_ENOUGH
 
 
+Numbers = tuple[float, ...]
+UNIT: Numbers = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
 @dataclass(frozen=True)
 class FloaterCurrents:
-    """The floater's own eddy currents; how strong and how slow they are, the runtime parameters say."""
+    """The floater's own eddy currents; how strong and how slow they are, the runtime parameters say.
+
+    These are of a ball of the floater's radius, and the rest is by such a ball's.
+    """
 
     name: str = FLOATER_CURRENTS
+    delays: Numbers = (1.0,)
+    tensors: tuple[Numbers, ...] = (UNIT,)  # of the field (3, 3), one for each delay
+    gradient: Numbers = ()  # (5, 5) by `GRADIENTS`; a ball's has none
+    gradient_delay: float = 1.0
+    coupling: Numbers = ()  # (3, 5) of field and gradient; none of a body with a centre of symmetry
 
     @classmethod
     def of(cls, scene: Scene) -> "FloaterCurrents | None":
         """See `OF_SCENE`."""
-        return cls() if scene.floater.conductivity else None
+        if not scene.floater.conductivity:
+            return None
+        if scene.floater.is_sphere:
+            return cls()
+        shape = current_shape(scene.floater)
+        return cls(
+            delays=tuple(shape.delays.tolist()),
+            tensors=tuple(tuple(tensor.ravel().tolist()) for tensor in shape.tensors),
+            gradient=tuple(shape.gradient.ravel().tolist()),
+            gradient_delay=shape.gradient_delay,
+            coupling=tuple(shape.coupling.ravel().tolist()) if shape.coupling.any() else (),
+        )
+
+    @property
+    def compiled_in(self) -> Numbers:
+        """Numbers in the code of the equations, see `Rates.elsewhere`."""
+        return (*self.delays, *(n for tensor in self.tensors for n in tensor), *self.gradient, *self.coupling)
 
     def added(self, motion: Motion) -> Added:
         length, inertia = hy.par[Parameter.LENGTH], hy.par[Parameter.INERTIA]
         tilt, along = hy.par[Parameter.TILT_EDDY], hy.par[Parameter.SPIN_EDDY]
-        moment, drift, lag = motion.moment, motion.drift, motion.lag
+        moment, drift, lag = motion.moment, motion.drift, self._lag(motion)
         gradient = [[length * entry for entry in row] for row in motion.gradient]
-        bend = curvature(motion)
-        change = _changed_field(lag, motion.field, [dot(row, drift) for row in gradient])
-        sheared = _turned_gradient(lag, gradient)
+        bend, moving = curvature(motion), [dot(row, drift) for row in gradient]
+        dipole: Vector = NOTHING
+        for delay, tensor in zip(self.delays, self.tensors, strict=True):
+            change = _changed_field(lag, motion.field, moving, delay)
+            dipole = add(dipole, by_tensor(np.reshape(tensor, (3, 3)), change, motion))
+        sheared = _turned_gradient(lag, gradient, self.gradient_delay)
         changes = [[dot(bend[i][j], drift) - sheared[i][j] for j in range(3)] for i in range(3)]
-        pull = [hy.sum([changes[i][j] * bend[i][j][k] for i in range(3) for j in range(3)]) for k in range(3)]
+        share, changed = GRADIENT, changes
+        if self.gradient:
+            share = 1.0
+            dipole, changed = self._of_shape(dipole, change, changes, motion)
+        pull = [hy.sum([changed[i][j] * bend[i][j][k] for i in range(3) for j in range(3)]) for k in range(3)]
         force = [
-            -tilt * inertia * (dot([gradient[i][k] for i in range(3)], change) + GRADIENT * pull[k]) for k in range(3)
+            -tilt * inertia * (dot([gradient[i][k] for i in range(3)], dipole) + share * pull[k]) for k in range(3)
         ]
-        product = [[dot(changes[i], gradient[j]) for j in range(3)] for i in range(3)]
+        product = [[dot(changed[i], gradient[j]) for j in range(3)] for i in range(3)]
         twist = [product[i][j] - product[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
-        turn = cross(motion.field, change)
-        torque = [turn[k] - 2 * GRADIENT * twist[k] for k in range(3)]
-        excess = (along - tilt) * dot(torque, moment)
+        turn = cross(motion.field, dipole)
+        torque = [turn[k] - 2 * share * twist[k] for k in range(3)]
+        # a body that is not round has no spin of its own that is held
+        excess = (along - tilt) * dot(torque, moment) if motion.axes is None else ZERO
         return dissipative(force, [tilt * torque[i] + excess * moment[i] for i in range(3)], motion)
+
+    def _lag(self, motion: Motion) -> Vector:
+        """The spin as seen from the rotor, along the moment too.
+
+        That of a round body is in the equations with its part along the moment times a ratio, by which the torque along
+        it turns it less (`state.Scales`); the power is that of the energy which has the same.
+        """
+        if not self.gradient or motion.axes is not None:
+            return motion.lag
+        less = (1.0 / hy.par[Parameter.INERTIA_Z] - 1.0) * dot(motion.spin, motion.moment)
+        return [w + less * m for w, m in zip(motion.lag, motion.moment, strict=True)]
+
+    def _of_shape(
+        self, dipole: Vector, change: Vector, changes: Matrix, motion: Motion
+    ) -> tuple[list[hy.expression], Matrix]:
+        """The dipole with what the gradient's change adds, and the quadrupole (3, 3), of their `changes`."""
+        loss, mixed = np.reshape(self.gradient, (5, 5)), np.reshape(self.coupling or np.zeros(15), (3, 5))
+        if motion.axes is None:
+            return _of_round(loss, mixed, dipole, change, changes, motion.moment)
+        axes, columns = motion.axes, [[row[k] for row in motion.axes] for k in range(3)]
+        halves = [[dot(changes[i], column) for i in range(3)] for column in columns]
+        own = [[dot(halves[j], columns[i]) for j in range(3)] for i in range(3)]
+        parts = [hy.sum([float(g[i, j]) * own[i][j] for i, j in np.argwhere(g)]) for g in GRADIENTS]
+        answers = [hy.sum([float(row[k]) * parts[k] for k in range(5)]) for row in loss]
+        if self.coupling:
+            more = [hy.sum([float(row[k]) * parts[k] for k in range(5)]) for row in mixed]
+            dipole = add(dipole, [dot(row, more) for row in axes])
+            seen = [dot(column, change) for column in columns]
+            answers = add(answers, [hy.sum([float(row[k]) * seen[k] for k in range(3)]) for row in mixed.T])
+        whole = [[hy.sum([float(g[i, j]) * a for g, a in zip(GRADIENTS, answers, strict=True) if g[i, j]])
+                  for j in range(3)] for i in range(3)]  # fmt: skip
+        halves = [[dot(whole[i], row) for i in range(3)] for row in axes]
+        return list(dipole), [[dot(halves[j], axes[i]) for j in range(3)] for i in range(3)]
+
+
+def _of_round(
+    loss: Array, mixed: Array, dipole: Vector, change: Vector, changes: Matrix, moment: Vector
+) -> tuple[list[hy.expression], Matrix]:
+    """See `FloaterCurrents._of_shape`, of a body that is round about its moment m̂ with `loss` and coupling `mixed`.
+
+    Of the gradient's change C there are m̂·C m̂, C m̂ across m̂, and the rest.
+    """
+    rest, tilted, straight = (float(loss[k, k]) for k in (0, 3, 1))
+    pointed = [dot(row, moment) for row in changes]
+    along = dot(pointed, moment)
+    across = [p - along * m for p, m in zip(pointed, moment, strict=True)]
+    lengthwise, sideways = 1.5 * (straight - rest) * along, [(tilted - rest) * a for a in across]
+    if mixed.any():
+        one, two = float(mixed[2, 1]), float(mixed[0, 3])
+        dipole = [d + 1.5**0.5 * one * along * m + 2**0.5 * two * a
+                  for d, m, a in zip(dipole, moment, across, strict=True)]  # fmt: skip
+        seen = dot(change, moment)
+        lengthwise = lengthwise + 1.5**0.5 * one * seen
+        sideways = add(sideways, [0.5**0.5 * two * (c - seen * m) for c, m in zip(change, moment, strict=True)])
+    whole = [[rest * changes[i][j] + lengthwise * moment[i] * moment[j] + sideways[i] * moment[j]
+              + moment[i] * sideways[j] - (lengthwise / 3.0 if i == j else 0.0) for j in range(3)]
+             for i in range(3)]  # fmt: skip
+    return list(dipole), whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,21 +489,24 @@ class _Mode:
     square: hy.expression
 
 
-def _modes(degree: int, lag: Vector) -> list[_Mode]:
-    """Those that are followed, and one for all others, so fast that it is never behind by much."""
+def _modes(degree: int, lag: Vector, slower: float) -> list[_Mode]:
+    """Those that are followed, and one for all others, so fast that it is never behind by much.
+
+    Each is `slower` than a ball's by a factor.
+    """
     inverse = np.array(ZEROS[degree - 1]) ** -2.0
     fourth, sixth = SUMS[degree - 1]
-    shares, delays = inverse**2 / fourth, inverse
+    shares, delays = inverse**2 / fourth, inverse * slower
     rest = 1 - shares.sum()
     square, slowness = dot(lag, lag), hy.par[Parameter.SLOWNESS]
     modes = [_Mode(float(c), t * slowness, square * (t * slowness) ** 2.0) for c, t in zip(shares, delays, strict=True)]
-    last = float(sixth / fourth - shares @ delays) / rest
+    last = float(sixth / fourth * slower - shares @ delays) / rest
     return [*modes, _Mode(float(rest), last * slowness, square * (last * slowness) ** 2.0)]
 
 
-def _changed_field(lag: Vector, field: Vector, moving: Vector) -> Vector:
+def _changed_field(lag: Vector, field: Vector, moving: Vector, slower: float) -> Vector:
     """Σ c [(1 - τX)⁻² G v - X (1 - τX)⁻¹ B], from X³ = -w² X."""
-    modes = _modes(1, lag)
+    modes = _modes(1, lag, slower)
     once = [1 / (1 + mode.square) for mode in modes]
     turned = hy.sum([m.share * o for m, o in zip(modes, once, strict=True)])
     lifted = hy.sum([m.share * m.delay * o for m, o in zip(modes, once, strict=True)])
@@ -399,9 +518,9 @@ def _changed_field(lag: Vector, field: Vector, moving: Vector) -> Vector:
     return add(moving, following)
 
 
-def _turned_gradient(lag: Vector, gradient: Matrix) -> Matrix:
+def _turned_gradient(lag: Vector, gradient: Matrix, slower: float) -> Matrix:
     """Σ c X (1 - τX)⁻¹ G, from X (X² + w²) (X² + 4w²) = 0: 1/(1 - τ²X²) by Newton's differences at 0, w², 4w²."""
-    modes, square = _modes(2, lag), dot(lag, lag)
+    modes, square = _modes(2, lag, slower), dot(lag, lag)
     first = _commutator(lag, gradient)
     second = _commutator(lag, first)
     powers = [first, second, _commutator(lag, second)]

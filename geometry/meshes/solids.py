@@ -24,6 +24,7 @@ MILLIMETRE = 1e-3
 CURVED, ROUND = 6, 2.0  # Degree of the elements at round surfaces, and how many of them in a radius of curvature
 METAL_CURVED, METAL_ROUND = 5, 1.0  # the same for metal; they leave 1e-4 of a mantle's volume and place
 METAL_LARGEST = 0.7  # Element of metal, in cube roots of the smallest body's volume
+FINER = 1, 2, 4  # by which elements of metal are made smaller where the mesher fails
 # Least element that a radius of curvature asks for, in cube roots of a part's volume: one spans a small fillet.
 SMALLEST = 0.06
 # Of that, where the mesher fails: its luck with the same part is another with elements of other sizes.
@@ -73,14 +74,21 @@ class SolidMesh:
 
 
 def mesh_metal(bodies: Sequence[Solid]) -> SolidMesh:
-    """Mesh of bodies that touch, without air."""
+    """Mesh of bodies that touch, without air. Raises MeshError."""
     center = np.mean([body.center for body in bodies], axis=0)
     unit = min(body.volume for body in bodies) ** (1 / 3)
     shape = occ_solid(bodies[0], center, unit)
     for body in bodies[1:]:
         shape = shape + occ_solid(body, center, unit)
-    sizes = {"maxh": METAL_LARGEST, "curvaturesafety": METAL_ROUND}
-    mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
+    for finer in FINER:
+        sizes = {"maxh": METAL_LARGEST / finer, "curvaturesafety": METAL_ROUND}
+        try:
+            mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
+            break
+        except Exception as error:  # several kinds, as of a thin wall through which large elements would go
+            if finer == FINER[-1]:
+                said = " and ".join(body.described_size for body in bodies)
+                raise MeshError(f"Metal cannot be meshed for its currents: {error} ({said}). {SIMPLER}") from None
     mesh.Curve(METAL_CURVED)
     return SolidMesh(mesh, frozen_array(center, (3,)), unit)
 

@@ -432,7 +432,8 @@ def _floater(scene: Scene) -> dict[str, Any]:
     for part in floater.pieces:
         keys = {**shape_keys(part.magnet.body), **pose_keys(part.magnet.body), "density_kg_m3": part.density}
         bare = not (part.magnet.polarization.any() or part.magnet.contrast)
-        (bodies if bare else magnets).append(keys if bare else keys | _said(schema.FloaterMagnetTable, part.magnet))
+        table, form = (bodies, schema.BallastTable) if bare else (magnets, schema.FloaterMagnetTable)
+        table.append(keys | _said(form, part.magnet))
     return {"magnets": magnets, **({"bodies": bodies} if bodies else {}), **given}
 
 

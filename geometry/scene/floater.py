@@ -47,7 +47,7 @@ class Floater:
     remanence : remanent polarisation, T; the largest of several magnets
     recoil_permeability : μr, the largest of several magnets
     density : kg/m³, the mean of several parts
-    conductivity : S/m, or None where its own eddy currents are not modelled
+    conductivity : S/m, of several parts the largest, or None where its own eddy currents are not modelled
     body : its shape about the origin where it is a cuboid, cylinder or ring, which is polarised along its z
     pieces : the parts of any other body, in its frame; see `composed`
     moments_of_inertia : (3,) kg m² about the axes of its frame where they are given and not those of its parts
@@ -70,7 +70,6 @@ class Floater:
     def composed(
         cls,
         pieces: Sequence[FloaterPart],
-        conductivity: float | None = None,
         moments_of_inertia: tuple[float, float, float] | None = None,
     ) -> Self:
         """A floater of pieces whose centre of mass may be anywhere.
@@ -78,7 +77,6 @@ class Floater:
         Parameters
         ----------
         pieces : in the scene file's frame
-        conductivity : S/m, as of `Floater`
         moments_of_inertia : kg m² about the file's axes through the centre of mass, in place of those of the pieces
         """
         masses = np.array([piece.mass for piece in pieces])
@@ -92,6 +90,7 @@ class Floater:
         else:
             turn = _principal_axes(_inertia(pieces, center))
         bodies = [piece.magnet.body for piece in pieces]
+        metals = [piece.magnet.conductivity for piece in pieces if piece.magnet.conductivity is not None]
         if center.any() or not np.array_equal(turn, np.eye(3)):
             bodies = [moved(body, turn.T @ (body.center - center), turn.T @ body.rotation) for body in bodies]
         return cls(
@@ -99,7 +98,7 @@ class Floater:
             remanence=max(float(np.linalg.norm(piece.magnet.polarization)) for piece in pieces),
             recoil_permeability=max(piece.magnet.recoil_permeability for piece in pieces),
             density=float(masses.sum() / sum(body.volume for body in bodies)),
-            conductivity=conductivity,
+            conductivity=max(metals, default=None),
             pieces=tuple(
                 replace(piece, magnet=replace(piece.magnet, body=body))
                 for piece, body in zip(pieces, bodies, strict=True)

@@ -334,11 +334,6 @@ def _floater_faults(floater: schema.FloaterTable, whole: schema.SceneTable) -> I
                 "Input floater.inertia_kg_m2 must be moments of inertia, of which none is larger than the other two "
                 f"together; instead received {high:g} beside {low:g} and {middle:g}."
             )
-    if not sphere and floater.conductivity_S_m is not None and not whole.coils:
-        yield (
-            "Input floater.conductivity_S_m must be left out where the floater is no sphere, as its currents are not "
-            f"known then; instead received {floater.conductivity_S_m:g}."
-        )
     if not sphere and whole.drag and whole.drag.model == "air":
         yield (
             'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '

@@ -218,9 +218,11 @@ class BallastTable(_Shaped):
     """A part of a floater that is not magnetic, placed along the axes of the floater's keys."""
 
     density_kg_m3: Density
+    conductivity_S_m: Conductivity | None = None
 
-    def piece(self, part: Part | None) -> FloaterPart:
-        return FloaterPart(Magnet(self.body(part), np.zeros(3)), self.density_kg_m3)
+    def piece(self, part: Part | None, conductivity: float | None) -> FloaterPart:
+        """The part; `conductivity` is that of all magnets that do not name their own."""
+        return FloaterPart(Magnet(self.body(part), np.zeros(3), conductivity=self.conductivity_S_m), self.density_kg_m3)
 
 
 class FloaterMagnetTable(BallastTable):
@@ -229,10 +231,12 @@ class FloaterMagnetTable(BallastTable):
     polarization_T: Annotated[Three[Polarization], _zero_or(1e-12)]
     recoil_permeability: Permeability = RECOIL_PERMEABILITY
 
-    def piece(self, part: Part | None) -> FloaterPart:
-        body = self.body(part)
+    def piece(self, part: Part | None, conductivity: float | None) -> FloaterPart:
+        body, own = self.body(part), self.conductivity_S_m
         polarization = self.along(body, self.polarization_T)
-        return FloaterPart(Magnet(body, polarization, self.recoil_permeability), self.density_kg_m3)
+        metal = conductivity if own is None else own
+        magnet = Magnet(body, polarization, self.recoil_permeability, conductivity=metal)
+        return FloaterPart(magnet, self.density_kg_m3)
 
 
 class FloaterTable(Table):
@@ -262,15 +266,15 @@ class FloaterTable(Table):
         permeability = self.recoil_permeability or RECOIL_PERMEABILITY
         given = None if self.inertia_kg_m2 is None else tuple(self.inertia_kg_m2)
         if self.composite:
-            pieces = [table.piece(parts.get(k)) for k, table in enumerate(self.tables)]
-            return Floater.composed(pieces, self.conductivity_S_m, given)  # type: ignore[arg-type]
+            pieces = [table.piece(parts.get(k), self.conductivity_S_m) for k, table in enumerate(self.tables)]
+            return Floater.composed(pieces, given)  # type: ignore[arg-type]
         assert self.remanence_T is not None
         assert self.density_kg_m3 is not None
         if self.shape == "file":
             body = known_shape(parts[-1]) or parts[-1]
             polarization = body.rotation.T @ np.array([0.0, 0.0, self.remanence_T])
-            piece = FloaterPart(Magnet(body, polarization, permeability), self.density_kg_m3)
-            return Floater.composed([piece], self.conductivity_S_m, given)  # type: ignore[arg-type]
+            magnet = Magnet(body, polarization, permeability, conductivity=self.conductivity_S_m)
+            return Floater.composed([FloaterPart(magnet, self.density_kg_m3)], given)  # type: ignore[arg-type]
         shape = solid_of(self)
         material = self.remanence_T, permeability, self.density_kg_m3, self.conductivity_S_m
         own = None if isinstance(shape, Sphere | Part) else shape

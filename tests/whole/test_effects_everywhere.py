@@ -153,11 +153,7 @@ density_kg_m3 = 2700.0
 """
 """A cube with something in a corner: its moment is along no principal axis of inertia, so that it has no mean."""
 OF_EVERY_SHAPE = [*list(EFFECTS)[:5], "steady coils about the axis"]
-REFUSED_FOR = {
-    (effect, shape): "instead received"
-    for effect in ("currents in the floater", "air beyond Stokes")
-    for shape in SHAPES
-}
+REFUSED_FOR = {("air beyond Stokes", shape): "instead received" for shape in SHAPES}
 
 
 def shaped(text, shape):

@@ -78,7 +78,7 @@ def test_a_start_is_free_as_the_body_lies():
         ),
         ({"shape": "sphere"}, "floater.diameter_mm must be given; instead it is missing"),
         ({"shape": "sphere", "diameter_mm": 12.0, "height_mm": 3.0}, "floater must have diameter_mm, as the shape is"),
-        ({"diameter_mm": 12.0, "height_mm": 6.0, "conductivity_S_m": 1e6}, "floater.conductivity_S_m must be left out"),
+        ({"diameter_mm": 12.0, "height_mm": 6.0, "conductivity_S_m": -1e6}, "floater.conductivity_S_m must be"),
         ({"diameter_mm": 12.0, "height_mm": -6.0}, "floater.height_mm must be at least 0.001"),
     ],
 )

@@ -1,0 +1,243 @@
+"""Eddy currents of a conducting body of any shape in a slowly changing field: how strong and how late they are.
+
+Such a field is uniform, or has a uniform gradient: eight numbers u. At rates u̇ the body loses the power u̇·K u̇, and has
+the moments -K u̇ + L ü. K is that of the currents without their own field, as of the rotor's metal (`rotor_metal`); L,
+the energy of that field,
+
+    L_ab = (μ0/4π) ∫∫ J_a(r)·J_b(r') / |r - r'|,        J = σE at a unit rate.
+
+Of a ball the uniform field has K = κ = (2π/15) σ R⁵ and L = (2/21) μ0σR² κ; its gradient the (2/21) R² κ, and of that
+(2/45) μ0σR².  By their ratios to these a body is described here.
+
+1/|r - r'| is integrated as that of charges smeared over a length ε, erf(|r - r'|/ε)/|r - r'|, at points that need be no
+denser than ε. What is missing is π ε² J_a·J_b inside, exactly, as J is harmonic; at the surface terms of ε³ and ε⁵
+more, which three lengths ε tell.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+import scipy
+
+from ..geometry.common import Array, ComputationError
+from ..geometry.files import LostError, call_apart
+from ..geometry.meshes.solids import LONGEST
+from ..geometry.scene.floater import Floater
+from ..geometry.shapes import Cylinder
+from ..geometry.solids import Part, Solid
+from .cache import TableKind
+from .closed_forms.eddy_bodies import thin_field_torque
+from .elements.spaces import volume_points
+from .rotor_metal import flat, metal_of
+
+ORDER = 5  # degree of the elements; of one less for the error that is stated
+SMEARED = np.array([0.15, 0.22, 0.3])  # ε in cube roots of a piece's volume
+POWERS = 0, 3, 5  # of ε that its field's energy is made of
+RULES, POINTS, BLOCK = (4, 3, 2, 1, 0), 4000, 400  # degrees of the points' rules, points at most, and those at a time
+# By which parts of a tensor over its mean are round-off of meshes: of a uniform field's, and of a gradient's
+ALIKE, GRADIENTS_ALIKE = 3e-4, 2e-3
+DIPOLE, QUADRUPOLE = 2 / 21, 2 / 45  # L/(μ0σR² K) of a ball, of a uniform field and of a gradient; K of that by R² κ
+# (5, 3, 3) gradients without trace, symmetric, of unit size and across each other
+GRADIENTS = np.zeros((5, 3, 3))
+GRADIENTS[0], GRADIENTS[1] = np.diag([1.0, -1.0, 0.0]) / 2**0.5, np.diag([-1.0, -1.0, 2.0]) / 6**0.5
+for _k, (_i, _j) in enumerate(((0, 1), (0, 2), (1, 2)), 2):
+    GRADIENTS[_k, _i, _j] = GRADIENTS[_k, _j, _i] = 2**-0.5
+THINNEST = 1e-2  # thickness over size below which a mesh may take long
+Pieces = Sequence[tuple[Solid, float]]  # bodies with their conductivities by the floater's
+
+
+@dataclass(frozen=True, eq=False)
+class CurrentShape:
+    """Currents of a body over those of a ball of its circumradius R and conductivity, along the axes of its frame.
+
+    Parameters
+    ----------
+    delays : (n,) by those of the ball's modes
+    tensors : (n, 3, 3) of a uniform field, each with a delay; their sum is K/κ
+    gradient : (5, 5) K/(κR²) of `GRADIENTS`
+    gradient_delay : its mean delay
+    coupling : (3, 5) K/(κR) between field and gradient, zero of bodies with a centre of symmetry
+    error : relative error of the tensors by the finite elements, at most
+    delay_error : the same of the delays
+    """
+
+    delays: Array
+    tensors: Array
+    gradient: Array
+    gradient_delay: float
+    coupling: Array
+    error: float
+    delay_error: float
+
+
+SHAPES = TableKind("floater-currents", CurrentShape, "Eddy currents of a floater by those of a ball")
+_known: dict[str, CurrentShape] = {}  # by their keys: equations ask for them again and again
+
+
+def conducting(floater: Floater) -> list[tuple[Solid, float]]:
+    """A floater's parts that conduct, with their conductivities by its own; all its magnets, where none has its own."""
+    given = [(part.magnet.body, part.magnet.conductivity or 0.0) for part in floater.parts]
+    if not any(sigma for _, sigma in given):
+        return [(magnet.body, 1.0) for magnet in floater.magnets] or [(body, 1.0) for body in floater.bodies]
+    largest = max(sigma for _, sigma in given)
+    return [(body, sigma / largest) for body, sigma in given if sigma]
+
+
+def current_shape(floater: Floater, report: Callable[[str], None] = lambda _: None) -> CurrentShape:
+    """The currents of a floater that is no sphere, from the cache if they are there.
+
+    `report` gets messages of a damaged cache. Raises MeshError, ComputationError: a part cannot be meshed.
+    """
+    pieces = conducting(floater)
+    inputs = pieces, floater.radius, floater.round
+    if (key := SHAPES.key(*inputs)) not in _known:
+        _known[key] = SHAPES.cached(inputs, lambda: _computed(pieces, floater), report)[0]
+    return _known[key]
+
+
+def _computed(pieces: Pieces, floater: Floater) -> CurrentShape:
+    hard = any(isinstance(body, Part) or _thickness(body) < THINNEST for body, _ in pieces)
+    try:  # the mesher may crash, or come to no end
+        matrices = call_apart(LONGEST, loss_and_delay, pieces) if hard else loss_and_delay(pieces)
+    except LostError as error:
+        names = " and ".join(body.described_size for body, _ in pieces)
+        raise ComputationError(
+            f"The floater's currents are not known: the mesher {error} ({names}). Leave out floater.conductivity_S_m."
+        ) from None
+    return _described(matrices, floater.radius, floater.round)
+
+
+def _thickness(body: Solid) -> float:
+    """The least size of a body over its largest; of a ring its wall counts."""
+    wall = [body.radius - body.inner_radius] if isinstance(body, Cylinder) else []
+    return float(min([*body.size, *wall]) / max(body.size))
+
+
+def loss_and_delay(pieces: Pieces) -> tuple[Array, Array, Array, Array]:
+    """K (8, 8) of conducting pieces about the origin, with elements of degree `ORDER` and of one less, and L, twice.
+
+    By conductivity in m⁵ to m⁷, and by μ0 and conductivity squared in m⁷ to m⁹; the second L is a coarser one.
+    The pieces are insulated from each other. Raises MeshError.
+    """
+    losses, fewer, points, flows = np.zeros((8, 8)), np.zeros((8, 8)), list[Array](), list[Array]()
+    units = [body.volume ** (1 / 3) for body, _ in pieces]
+    squares = list[Array]()
+    for body, sigma in pieces:
+        metal = metal_of([body], sigma, ORDER)
+        loads = metal.loads(rates_of_potential)
+        losses += metal.dissipation(rates_of_potential, loads)
+        fewer += metal_of(metal.mesh, sigma, ORDER - 1).dissipation(rates_of_potential)
+        rules = (volume_points(metal.mesh.mesh, ".*", degree) for degree in RULES)
+        few = next((rule for rule in rules if len(rule.weights) * len(pieces) <= POINTS), None)
+        coarse = replace(metal, points=few or volume_points(metal.mesh.mesh, ".*", RULES[-1]))
+        fields = rates_of_potential(coarse.places) - coarse.gradients(coarse.solutions(loads))
+        points.append(coarse.places)
+        flows.append(coarse.weights[:, None, None] * fields)
+        squares.append(sigma * flat(flows[-1]).T @ flat(fields))
+    exact, coarser = _own_field(points, flows, units, squares)
+    return losses, fewer, exact, coarser
+
+
+def rates_of_potential(points: Array) -> Array:
+    """(n, 3, 8) rates of A at points (n, 3), where a field along x, y and z, or a gradient, changes at a unit rate."""
+    uniform = [np.cross(axis, points) / 2 for axis in np.eye(3)]
+    return np.stack(uniform + [np.cross(points @ gradient, points) / 3 for gradient in GRADIENTS], axis=2)
+
+
+def _own_field(
+    points: Sequence[Array], flows: Sequence[Array], units: Sequence[float], squares: Sequence[Array]
+) -> tuple[Array, Array]:
+    """L over μ0 of currents times volumes `flows` at points, by three lengths ε and by two.
+
+    `squares` are each piece's ∫ J_a·J_b, and `units` the lengths that its ε are of.
+    """
+    places, flow = np.concatenate(points), np.concatenate(flows)
+    # between two pieces a mean of theirs: smearing by Gaussians of both
+    lengths = np.concatenate([np.full(len(p), unit**2) for p, unit in zip(points, units, strict=True)])
+    found = np.zeros((len(SMEARED), 8, 8))
+    for start in range(0, len(places), BLOCK):
+        rows = slice(start, start + BLOCK)
+        apart = scipy.spatial.distance.cdist(places[rows], places)
+        scale = np.sqrt((lengths[rows, None] + lengths) / 2)
+        near = apart == 0
+        apart[near] = 1e-9 * scale[near]
+        for k, share in enumerate(SMEARED):
+            kernel = scipy.special.erf(apart / (share * scale)) / apart
+            found[k] += flat(flow[rows]).T @ (kernel @ flow.reshape(len(places), -1)).reshape(-1, 8)
+    for k, share in enumerate(SMEARED):
+        found[k] += np.pi * share**2 * sum(u**2 * square for u, square in zip(units, squares, strict=True))
+    few = (SMEARED[1] ** 3 * found[0] - SMEARED[0] ** 3 * found[1]) / (SMEARED[1] ** 3 - SMEARED[0] ** 3)
+    weights = np.linalg.inv(SMEARED[:, None] ** np.array(POWERS))[0]
+    return np.tensordot(weights, found, axes=1) / (4 * np.pi), few / (4 * np.pi)
+
+
+def _described(matrices: tuple[Array, Array, Array, Array], radius: float, is_round: bool) -> CurrentShape:
+    """The description of a body with `loss_and_delay`, by a ball of a `radius` (m)."""
+    losses, fewer, own, coarser = ((m + m.T) / 2 for m in matrices)
+    if is_round:
+        losses, fewer, own = round_part(losses), round_part(fewer), round_part(own)
+    kappa = thin_field_torque(radius, 1.0)
+    delays, tensors = _modes(losses[:3, :3] / kappa, own[:3, :3] / (kappa * DIPOLE * radius**2))
+    gradient = losses[3:, 3:] / (kappa * radius**2)
+    coupling = losses[:3, 3:] / (kappa * radius)
+    allowed = np.sqrt(np.trace(gradient) / 5 * np.trace(losses[:3, :3]) / (3 * kappa))
+    return CurrentShape(
+        delays,
+        tensors,
+        _plain(gradient, GRADIENTS_ALIKE * np.trace(gradient) / 5),
+        float(np.trace(own[3:, 3:]) / np.trace(losses[3:, 3:]) / (QUADRUPOLE * radius**2)),
+        np.where(np.abs(coupling) > GRADIENTS_ALIKE * allowed, coupling, 0.0),
+        error=float(np.abs(np.diag(fewer)[:3] / np.diag(losses)[:3] - 1).max()),
+        delay_error=float(np.abs(np.trace(coarser[:3, :3]) / np.trace(own[:3, :3]) - 1)),
+    )
+
+
+def round_part(matrix: Array) -> Array:
+    """The mean of a matrix (8, 8) of field and gradients over turns about z, but for what only turns about z tell."""
+    found, mean = np.zeros((8, 8)), matrix.diagonal().copy()
+    for one, two in ((0, 1), (3, 5), (6, 7)):
+        mean[[one, two]] = (mean[one] + mean[two]) / 2
+    np.fill_diagonal(found, mean)
+    found[2, 4] = found[4, 2] = matrix[2, 4]
+    found[0, 6] = found[6, 0] = found[1, 7] = found[7, 1] = (matrix[0, 6] + matrix[1, 7]) / 2
+    return found
+
+
+def _modes(strength: Array, delay: Array) -> tuple[Array, Array]:
+    """Delays (n,) and tensors (n, 3, 3) whose sum is `strength` (3, 3) and, each times its delay, `delay` (3, 3).
+
+    Both are symmetric and positive, so that the same three vectors make them: of `delay` v = τ `strength` v the
+    `strength` v. They need not be across each other. Equal delays are one.
+    """
+    straight = all(np.abs(t - np.diag(np.diag(t))).max() < ALIKE * np.trace(t) / 3 for t in (strength, delay))
+    if straight:
+        rows, values = np.diag(strength), np.diag(delay) / np.diag(strength)
+        found = [(tau, np.diag(row * e)) for tau, row, e in zip(values, rows, np.eye(3), strict=True)]
+    else:
+        values, vectors = scipy.linalg.eigh(delay, strength)
+        found = [(tau, np.outer(p, p)) for tau, p in zip(values, (strength @ vectors).T, strict=True)]
+    joined = list[tuple[float, Array]]()
+    for tau, tensor in sorted(found, key=lambda one: float(one[0])):
+        if joined and abs(tau / joined[-1][0] - 1) < ALIKE:
+            before, known = joined[-1]
+            share = np.trace(known) / (np.trace(known) + np.trace(tensor))
+            joined[-1] = before * share + tau * (1 - share), known + tensor
+        else:
+            joined.append((float(tau), tensor))
+    tensors = [_plain(tensor, ALIKE * np.trace(strength) / 3) for _, tensor in joined]
+    return np.array([tau for tau, _ in joined]), np.array(tensors)
+
+
+def _plain(tensor: Array, small: float) -> Array:
+    """A symmetric matrix without what is round-off of a mesh: entries on its diagonal that are equal, or `small`."""
+    values = np.diag(tensor).copy()
+    for i, j in combinations(range(len(values)), 2):
+        if abs(values[i] - values[j]) < small:
+            values[[i, j]] = (values[i] + values[j]) / 2
+    if np.ptp(values) < small:
+        values[:] = values.mean()
+    others = np.where(np.abs(tensor) < small, 0.0, tensor)
+    np.fill_diagonal(others, values)
+    return others
