@@ -13,14 +13,13 @@ from ...geometry.common import Array, InputError, Watch, unwatched, watched
 from ...geometry.cutting import united
 from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
-from ...geometry.shapes import Box
+from ...geometry.shapes import Box, Cylinder
 from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..closed_forms.potentials import unit_dipole_fields
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
 from .response import (
-    CHUNK,
     NEAR_GAPS,
     OWN,
     ROTOR_GAPS,
@@ -50,12 +49,18 @@ from .table import (
     pair_sum,
     point_counts,
     response_box,
+    response_points,
 )
 
 # Relative size of a singular value that is none; and up to how many weights they are found. No QR with pivots: their
 # order jumps from a scene to its neighbour, and derivatives would jump with it.
 SMALL, FEW_WEIGHTS = 1e-9, 500
-PENALTY = 1e-3  # what a weight costs that is held, by an error of the size of all that is fitted
+# What a weight costs that is held, by an error of the size of all that is fitted, and one that is not; where there are
+# not `ENOUGH` values for each of these they run wild between the samples (errors of 7000 instead of 0.4 were seen)
+PENALTY, FREE, FEW, ENOUGH = 1e-3, 1e-6, 1e-2, 15
+# Points along an edge where there are several magnets: between the samples of some hundred places more run wild
+MOST = 8
+CHUNK = 512  # rows of equations at once, so that they take some megabytes
 # Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
 SINGLE = 250
 GAPS = (0.03, 0.08, 0.16, 0.5, 1.5)  # at which both are compared, in floater radii
@@ -158,10 +163,13 @@ def mutual_table(
             )
         box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
         counts = points[k] if points else _counts(magnet, floater.radius, len(magnets))
-        n = int(np.prod(counts))
-        zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
         axis = magnet.polarization / size if size else np.zeros(3)
-        grids.append(ResponseGrid(box, axis, floater.radius, counts, *zeros))
+        # where the floater can be in a ring's hole, no point is
+        hole = magnet.body.inner_radius if isinstance(magnet.body, Cylinder) else 0.0
+        hole = hole if hole > floater.radius else 0.0
+        n = len(response_points(box, counts, hole))
+        zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
+        grids.append(ResponseGrid(box, axis, floater.radius, counts, *zeros, hole))
     taken = effort(len(magnets))
     coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, OWN)) for nodes in taken.nodes)
     images = image_weights(floater.recoil_permeability)
@@ -193,7 +201,9 @@ def mutual_table(
 
 def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
     """Points along the edges of one of a `number` of magnets, where it responds to a floater of this `radius`, m."""
-    return point_counts(response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
+    asked = point_counts(response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
+    x, y, z = asked if number == 1 else np.minimum(asked, MOST).tolist()
+    return x, y, z
 
 
 def all_points(magnets: Sequence[Magnet], radius: float) -> int:
@@ -246,10 +256,9 @@ def _rotor_fit(
     rows *= counts[:, None]
     direct, beyond = (part[first, second] * size[first] * size[second] * counts for part in (direct, beyond))
     small = np.arange(rows.shape[1]) >= alone
-    free = effort(len(grids)).free
-    found = least_squares(rows, beyond, small, free)
-    found[:alone] += least_squares(rows[:, :alone], direct, small[:alone], free)
     ends = np.cumsum([column.shape[1] for column in columns])
+    found = least_squares(rows, beyond, small)
+    found[:alone] += least_squares(rows[:, :alone], direct, small[:alone])
     parts = iter(np.split(found, ends))
     made = [
         replace(grid, strengths=np.stack([kind @ next(parts) for _ in range(3)], axis=1))
@@ -403,8 +412,7 @@ def _fitted(
     for one in sums:
         columns.append(scaled(*one.derivatives(places, still, order))[None])
         small.append(np.zeros(1, bool))
-    free = effort(len(grids)).free
-    found = least_squares(np.concatenate(columns).T, right, np.concatenate(small), free, cost)
+    found = least_squares(np.concatenate(columns).T, right, np.concatenate(small), cost)
     parts = iter(np.split(found, np.cumsum([len(column) for column in columns])[:-1]))
     each = [np.stack([kind @ next(parts) for _ in numbers], axis=1).reshape(len(kind), -1, 2) for kind in kinds]
     return each, np.array([float(part[0]) for part in parts])
@@ -422,13 +430,13 @@ def classes(grid: ResponseGrid, mirrored: bool) -> Array:
     return np.asarray(np.eye(number.max() + 1)[number])
 
 
-def least_squares(columns: Array, values: Array, small: Array, free: float, cost: float = PENALTY) -> Array:
+def least_squares(columns: Array, values: Array, small: Array, cost: float = PENALTY) -> Array:
     """Weights (k,) of columns (n, k) of any sizes that give values (n,).
 
     Parameters
     ----------
     small : (k,) which weights are kept small: by themselves they are hardly determined
-    free, cost : of one that is not, where there are many, and of one that is, by an error of the size of all values
+    cost : of one that is, by an error of the size of all values
     """
     square = columns.T @ columns
     size = np.sqrt(np.diag(square))
@@ -436,5 +444,6 @@ def least_squares(columns: Array, values: Array, small: Array, free: float, cost
     if not small.any() and len(size) <= FEW_WEIGHTS:
         return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
     square /= np.outer(size, size)  # a copy of the columns would take hundreds of megabytes
+    free = FREE if len(values) >= ENOUGH * np.count_nonzero(np.logical_not(small)) else FEW
     square[np.diag_indices_from(square)] += np.where(small, cost, free) ** 2
     return np.asarray(scipy.linalg.solve(square, columns.T @ values / size, assume_a="pos") / size)

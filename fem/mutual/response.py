@@ -41,7 +41,7 @@ DEGREES = range(6, 41)
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
 # Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets
 NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
-CHUNK = 512  # points in the magnets at once, so that the fields of all dipoles there take some megabytes
+FIELDS = 200_000  # points in the magnets times dipoles' places at once: their fields take some megabytes
 MOST_RETURNED = 24  # degrees of the rotor's response to the sphere's
 
 
@@ -429,13 +429,16 @@ def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Arra
     """
     nearest = min(float(np.min(magnet.body.distance(places))) for magnet in rotor.magnets)
     points, tensors = rotor.direct(nearest)
-    direct = np.zeros((3 * len(places), 3 * len(places)))
-    for start in range(0, len(points), CHUNK):
-        some = slice(start, start + CHUNK)
+    direct, charges, step = np.zeros((3 * len(places), 3 * len(places))), rotor.charges, max(1, FIELDS // len(places))
+    for start in range(0, len(points), step):
+        some = slice(start, start + step)
         fields = unit_dipole_fields(points[some], places)
         direct += np.einsum("pni,qnj,nij->pq", fields, fields, tensors[some], optimize=True)
-    charges = rotor.charges
-    normal = np.einsum("pni,ni->np", unit_dipole_fields(charges.places, places), charges.normals)
+    normal = np.empty((len(charges.places), 3 * len(places)))
+    for start in range(0, len(normal), step):
+        some = slice(start, start + step)
+        fields = unit_dipole_fields(charges.places[some], places)
+        normal[some] = np.einsum("pni,ni->np", fields, charges.normals[some])
     # ∫ M·b dV = -∮ σ ψ dS
     found = -unit_dipole_potentials(charges.places, places).T @ (charges.areas[:, None] * rotor.beyond(normal))
     return direct / MU_0, (found + found.T) / (2 * MU_0)

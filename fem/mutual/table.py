@@ -50,7 +50,6 @@ class Effort(NamedTuple):
     digits: float  # of the points: -ln of the error of Gauss's rule, about
     charges: int  # that stand for the remanence where two magnets' fields are in the sphere, as for `charges`
     reflected: int  # the same, where magnets respond to the sphere's response to them
-    free: float  # what a weight costs that is not held, by an error of the size of all that is fitted
     nodes: tuple[int, int]  # along an edge of a face, of two responses whose difference tells their error
     dipoles: int  # places of them for each gap and magnet
     inner: int  # points along each axis at which magnets beside each other respond beyond their direct response
@@ -62,8 +61,8 @@ class Effort(NamedTuple):
 
 # With the weights fitted, few magnets' force and torque are met to 1e-3 of all that is added, many magnets' to 2e-2.
 # With 10 nodes the response of a cube with μr = 1.05 to a dipole errs by at most 7e-4 at any distance, with 14 by 6e-4.
-FEW_MAGNETS = Effort(7.2, 2, 2, 1e-6, (10, 14), 16, 2, True, 2, 1e-4, 1e-5)
-MANY_MAGNETS, MANY = Effort(5.5, 0, 0, 1e-2, (4, 6), 6, 1, False, 1, 1e-3, 1e-4), 4
+FEW_MAGNETS = Effort(7.2, 2, 2, (10, 14), 16, 2, True, 2, 1e-4, 1e-5)
+MANY_MAGNETS, MANY = Effort(5.5, 0, 0, (4, 6), 6, 1, False, 1, 1e-3, 1e-4), 4
 
 
 def effort(magnets: int) -> Effort:
@@ -281,12 +280,12 @@ class ResponseGrid:
     strengths: Array = field(metadata={"units": "A m2/T"})  # (n, 3) λ, A m²/T, along the body's axes
     degrees: Array = field(metadata={"units": "J"})  # (n, 3, 2) v and w of each power, J
     returned: Array = field(metadata={"units": "T"})  # (n, 2, 2) s and t of each power, T
+    hole: float = field(default=0.0, metadata={"units": "m"})  # radius of one along the third axis, without points, m
 
     @cached_property
     def points(self) -> Array:
         """(n, 3) m along the body's axes, from its centre: Gauss's in the box."""
-        nodes = [gauss_legendre(n)[0] for n in self.counts]
-        return np.asarray(self.box.half_edges * np.array(list(product(*nodes))))
+        return response_points(self.box, self.counts, self.hole)
 
     @property
     def places(self) -> Array:
@@ -353,6 +352,12 @@ def charge_sum(
     ends = np.repeat(here, len(there), axis=0), np.tile(there, (len(here), 1))
     same = np.broadcast_to([1 / radius, *images], (count, 1 + len(images)))
     return EnergySum(formula, np.concatenate([*ends, -np.outer(q, p).reshape(-1, 1), same], axis=1))
+
+
+def response_points(box: Box, counts: tuple[int, int, int], hole: float) -> Array:
+    """Gauss's points (n, 3) m along the edges of a `box`, from its centre, but for those in a `hole`."""
+    points = box.half_edges * np.array(list(product(*(gauss_legendre(n)[0] for n in counts))))
+    return np.asarray(points[np.hypot(points[:, 0], points[:, 1]) >= hole])
 
 
 def response_box(body: Solid) -> Box:
