@@ -51,7 +51,8 @@ def rotors():
 
 @pytest.fixture(scope="module")
 def tables(rotors):
-    return [fem_table(rotor, Accuracy(1e-5)) for rotor in rotors]
+    # elements come to 3.1e-6 here; at 1e-5 moments may be left out that are 1.5e-6 of the field
+    return [fem_table(rotor, Accuracy(4e-6)) for rotor in rotors]
 
 
 def test_what_the_gap_changes(rotors, tables):
