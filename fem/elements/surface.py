@@ -332,8 +332,10 @@ class _RoundSurface(Surface):
         modes = np.concatenate([self._modes(line, orders) for line in self.lines], axis=1)  # (targets, nodes, orders)
         apart = 2 * np.pi * (np.arange(turns)[:, None] - np.arange(turns)) / turns
         shares = np.where((orders == 0) | (orders == count), 1.0, 2.0) / turns
-        kernel = np.einsum("ijm,mab->iajb", modes * shares, np.cos(orders[:, None, None] * apart), optimize=True)
-        return np.asarray(kernel.reshape(len(self.places), -1))
+        kernel = np.empty((len(modes), turns, modes.shape[1], turns))
+        for first, ways in enumerate(apart):
+            kernel[:, first] = modes @ (shares[:, None] * np.cos(orders[:, None] * ways))
+        return kernel.reshape(len(self.places), -1)
 
     def _modes(self, line: tuple[Array, Array, Array], orders: NDArray[np.intp]) -> Array:
         """(targets, n, orders): n·h at the section's nodes by cos mφ times the polynomials of one line's nodes."""

@@ -418,15 +418,15 @@ class FittedExpansions:
         nothing, self.points, self._allowed = np.zeros((degree + 1, degree + 1), complex), points, allowed
         self._empty = [MultipoleExpansion(*one, nothing) for one in zip(centers, radii.tolist(), strict=True)]
         parts = [(l, m, 1j if part else 1.0) for l, m, part in members(degree) if l]
-        fields = np.concatenate([_fields(one, [(0, *part) for part in parts], points) for one in self._empty])
         degrees = np.tile([part[0] for part in parts], len(centers))
         # the highest degree last, so that the factor without it is a corner of the whole
         order, self._fewer = np.argsort(degrees, kind="stable"), int(np.sum(degrees < degree))
         self._parts = [(i // len(parts), *parts[i % len(parts)]) for i in order.tolist()]
-        fields /= allowed[:, None]
-        self._columns = fields.reshape(len(fields), -1)[order]  # hundreds of megabytes
-        del fields
-        self._size = np.linalg.norm(self._columns, axis=1)
+        self._columns = np.empty((len(order), 3 * len(points)))  # hundreds of megabytes
+        for one, rows in zip(self._empty, np.argsort(order).reshape(-1, len(parts)), strict=True):
+            fields = _fields(one, [(0, *part) for part in parts], points) / allowed[:, None]
+            self._columns[rows] = fields.reshape(len(parts), -1)
+        self._size = np.sqrt(np.einsum("ij,ij->i", self._columns, self._columns))  # `norm` makes a copy
         self._columns /= self._size[:, None]
         square = self._columns @ self._columns.T
         square[np.diag_indices_from(square)] += HELD * len(square)

@@ -196,9 +196,11 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
         single = [charged_expansion(surfaces, i, charges, degree) for i, one in enumerate(fits) if not one]
         tail = extrapolated_tail(single, min(ratios, default=CONVERGENCE))
         coarse, whole, pieces = whole, single, []
-        for number, (fit, share) in ((i, one) for i, one in enumerate(fits) if one):
-            own, last = fit.of(surfaces.field_beside(number, charges, fit.points))
-            whole, pieces = whole + own, pieces + [replace(e, coefficients=share * e.coefficients) for e in last]
+        for number, beside in enumerate(fits):
+            if beside:
+                own, last = beside[0].of(surfaces.field_beside(number, charges, beside[0].points))
+                pieces += [replace(e, coefficients=beside[1] * e.coefficients) for e in last]
+                whole = whole + own
         if not k:
             continue
         step = [replace(b, coefficients=b.coefficients - a.coefficients) for a, b in zip(coarse, whole, strict=True)]
@@ -210,13 +212,14 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
         watch("charges on the surfaces", k / len(NODES))
         if left * size <= accuracy.rtol / 4:
             break
-    alone = len(tail)
+    fitted, beside, alone = any(fits), None, len(tail)
+    fits.clear()  # hundreds of megabytes
     causes = {"discretisation": steps[:alone], "tail": tail, PIECES: pieces, CHARGES: steps[alone:]}
     known = {cause: parts for cause, some in causes.items() if (parts := nonzero(some))}
     polarized = tuple(one for one in carriers if one.polarization.any())
     table = RotorTable("surface", magnets, polarized, tuple(whole), known)
     # of hundreds of expansions it takes seconds to find what may be left out, where hardly anything may
-    if not any(fits) or np.max(table.absolute_error(points)[0] / scale) < accuracy.rtol / 2:
+    if not fitted or np.max(table.absolute_error(points)[0] / scale) < accuracy.rtol / 2:
         table = trimmed_table(table, accuracy, (points, scale), BETWEEN / 20, 1.0, FITTED)
     warn_beyond(table, accuracy, points, scale)
     return replace(table, provenance={"nodes": count, "seconds": time.perf_counter() - start})
