@@ -14,7 +14,8 @@ denser than ε. What is missing is π ε² J_a·J_b inside, exactly, as J is har
 more, which three lengths ε tell.
 """
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -85,15 +86,15 @@ def conducting(floater: Floater) -> list[tuple[Solid, float]]:
     return [(body, sigma / largest) for body, sigma in given if sigma]
 
 
-def current_shape(floater: Floater, report: Callable[[str], None] = lambda _: None) -> CurrentShape:
-    """The currents of a floater that is no sphere, from the cache if they are there.
+def current_shape(floater: Floater) -> CurrentShape:
+    """The currents of a floater that is no sphere, from the cache if they are there; a damaged one is logged.
 
-    `report` gets messages of a damaged cache. Raises MeshError, ComputationError: a part cannot be meshed.
+    Raises MeshError, ComputationError: a part cannot be meshed.
     """
     pieces = conducting(floater)
     inputs = pieces, floater.radius, floater.round
     if (key := SHAPES.key(*inputs)) not in _known:
-        _known[key] = SHAPES.cached(inputs, lambda: _computed(pieces, floater), report)[0]
+        _known[key] = SHAPES.cached(inputs, lambda: _computed(pieces, floater), logging.getLogger("spinlev").info)[0]
     return _known[key]
 
 

@@ -21,6 +21,7 @@ from ..dynamics.motion.floater_effects import (
     swinging,
 )
 from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS
+from ..fem.floater_metal import current_shape
 from ..fem.rotor.floater import floater_sources, shares
 from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
 from ..geometry.common import MAGNET_CONDUCTIVITY, ComputationError
@@ -107,12 +108,13 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
     there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
     try:
         doubt = slow_error(there)
+        missed = 0.0 if floater.is_sphere else current_shape(floater).error
     except ComputationError as error:  # it cannot be meshed
         return ListedEffect(FLOATER_CURRENTS, False, None, None, f"no floater.conductivity_S_m; not known: {error}")
     if first and scene.frequency and doubt <= SLOW_ENOUGH:
         growth = growth_by_floater(there, levitation.table, first, bool(floater.conductivity))
     why = _why("floater.conductivity_S_m", bool(floater.conductivity), growth, doubt)
-    return ListedEffect(FLOATER_CURRENTS, bool(floater.conductivity), 0.0, growth, why, doubt)
+    return ListedEffect(FLOATER_CURRENTS, bool(floater.conductivity), 0.0, growth, why, doubt + missed)
 
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:

@@ -391,7 +391,8 @@ class FloaterCurrents:
     @property
     def compiled_in(self) -> Numbers:
         """Numbers in the code of the equations, see `Rates.elsewhere`."""
-        return (*self.delays, *(n for tensor in self.tensors for n in tensor), *self.gradient, *self.coupling)
+        tensors = (number for tensor in self.tensors for number in tensor)
+        return (*self.delays, *tensors, *self.gradient, self.gradient_delay, *self.coupling)
 
     def added(self, motion: Motion) -> Added:
         length, inertia = hy.par[Parameter.LENGTH], hy.par[Parameter.INERTIA]

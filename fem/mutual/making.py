@@ -164,7 +164,7 @@ def mutual_table(
         box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
         counts = points[k] if points else _counts(magnet, floater.radius, len(magnets))
         axis = magnet.polarization / size if size else np.zeros(3)
-        # where the floater can be in a ring's hole, no point is
+        # where the floater can be in a ring's hole, no point is: with them weights run wild again, errors of 21
         hole = magnet.body.inner_radius if isinstance(magnet.body, Cylinder) else 0.0
         hole = hole if hole > floater.radius else 0.0
         n = len(response_points(box, counts, hole))
@@ -201,8 +201,8 @@ def mutual_table(
 
 def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
     """Points along the edges of one of a `number` of magnets, where it responds to a floater of this `radius`, m."""
-    asked = point_counts(response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
-    x, y, z = asked if number == 1 else np.minimum(asked, MOST).tolist()
+    enough = point_counts(response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
+    x, y, z = enough if number == 1 else np.minimum(enough, MOST).tolist()
     return x, y, z
 
 
