@@ -10,12 +10,13 @@ from peers import SCENE, magpylib_rotor
 
 from spinlev.dynamics.equilibria.search import survey, with_plate
 from spinlev.dynamics.flights.batch import ensemble
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, displaced, initial_state, integrate
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.choice import rotor_nearby
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry.shapes import Box
+from spinlev.geometry.scene.contents import AbsoluteStart
+from spinlev.geometry.shapes import Box, Cylinder
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.plan import PlatePlan
@@ -136,6 +137,40 @@ def test_flights_side_by_side(benchmark, start):
     benchmark.extra_info.update(count=64.0)
     flown = benchmark.pedantic(lambda: ensemble(FREE, table, starts, 1.0), rounds=2, warmup_rounds=1)
     assert set(flown.ended_by) == {"duration"}
+
+
+@pytest.mark.parametrize("shape", ["sphere", "cylinder", "cube"])
+def test_bodies_side_by_side(shape):
+    """What a trajectory of an ensemble costs beside one alone, both in balls: 64 of 2 s that stay in theirs."""
+    edge, body = FREE.floater.volume ** (1 / 3), None
+    if shape != "sphere":
+        body = Box((edge,) * 3) if shape == "cube" else Cylinder(6e-3, FREE.floater.volume / np.pi / 36e-6)
+    radius = FREE.floater.radius if body is None else body.circumradius
+    scene = replace(FREE, floater=replace(FREE.floater, radius=radius, body=body))
+    levitation = Levitation(scene, Models("cuboid", "none", interaction="rigid"))
+    begun = initial_state(scene, levitation.interaction, levitation.equilibria)[0]
+    offset = 2e-5 * np.random.default_rng(0).normal(size=(64, 3))
+    starts = displaced(begun, offset, scene.angular_velocity)
+    told = replace(scene, start=AbsoluteStart(*starts[0].vectors))
+    flight = Flight(told, levitation.interaction, 2.0, compact=True, in_balls=True)
+    times = np.zeros((ROUNDS, 2))
+    for row in times:
+        for k, simulated in enumerate(
+            (
+                lambda: integrate(flight, starts[0], 2.0),
+                lambda: ensemble(scene, levitation.interaction, starts, 2.0),
+            )
+        ):
+            before = process_time()
+            found = simulated()
+            row[k] = process_time() - before
+    alone, many = times.min(axis=0)
+    print(
+        f"\n{shape}: a second takes {500 * alone:.0f} ms alone, {500 * many / 64:.0f} ms as one of 64: "
+        f"{64 * alone / many:.1f} times as fast; {found.changes.sum()} changes of balls; {found}"
+    )
+    assert set(found.ended_by) == {"duration"}
+    assert 64 * alone > 2 * many
 
 
 @pytest.mark.benchmark(group="a simulated second at 110 Hz")

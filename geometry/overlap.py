@@ -114,6 +114,23 @@ def body_overlap(first: Solid, second: Solid) -> float:
     return -separation(first, second)[0]
 
 
+def parting(first: Solid, second: Solid, way: Array | None = None) -> Array | None:
+    """A direction (3,) that parts two bodies, which may touch; None where they overlap.
+
+    A `way` that has parted them in poses nearby does it here in most cases, and spares the search for another. Of a
+    sphere it is any, as its gap is no search.
+    """
+    offset = second.center - first.center
+    if apart(first, second):
+        return np.asarray(offset / np.linalg.norm(offset))
+    if way is not None and way @ offset - first.support(way[None])[0] - second.support(-way[None])[0] >= -TOUCHING:
+        return way
+    if isinstance(first, Sphere) or isinstance(second, Sphere):
+        return np.array([0.0, 0.0, 1.0]) if body_overlap(first, second) <= TOUCHING else None
+    gap, way = separation(first, second)
+    return way if gap >= -TOUCHING else None
+
+
 def sphere_overlap(center: ArrayLike, radius: float, body: Solids) -> float:
     """Penetration depth of a sphere about `center` (3,) of a `radius` (m) into a `body`, m; negative if apart."""
     return radius - float(body.distance(center))

@@ -345,7 +345,7 @@ def ensemble(
     ----------
     starts : dict or xarray.Dataset, optional
         By key of the scene file's `[start]`, three numbers for each trajectory (n, 3), or three for all: "offset_mm"
-        from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment" and "spin_hz".
+        from the stable equilibrium, or "position_mm" with "velocity_mm_s", "moment", "spin_hz" and "body_x".
     duration_s : float
         Of each trajectory, s.
     n : int, optional
@@ -362,7 +362,8 @@ def ensemble(
         Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
         the end and, as ``start_...``, at the beginning, in the laboratory frame as in `simulate`;
         `position_rotor_frame` is where the end is in the frame that turns with the rotor.
-        Accuracy: the field errs by 1e-6 of its gradient, steps by round-off.
+        Accuracy: the field errs by 1e-6 of its gradient, steps by round-off; of a body that is not round the field
+        errs by 1e-5, about an equilibrium by 1e-4.
 
     Raises
     ------
@@ -387,12 +388,13 @@ def ensemble(
     number = Workers(workers).checked().workers or os.cpu_count() or 1
     levitation = Levitation(scene, Models(model, "none", rtol, interaction=interaction))
     if starts is not None:
-        begun, drawn = given_starts(levitation, starts), dict[str, Any]()
+        (begun, offset), drawn = given_starts(levitation, starts), dict[str, Any]()
     else:
-        begun, drawn = drawn_starts(levitation, n, seed, spread or {}), {"seed": seed, "spread": repr(spread)}
+        begun, offset = drawn_starts(levitation, n, seed, spread or {}), None
+        drawn = {"seed": seed, "spread": repr(spread)}
     together = min(TOGETHER, -(-len(begun.position) // number))
     requested = levitation.scene, levitation.interaction, begun, duration_s
-    found = simulated(*requested, map if number == 1 else mapped(number), together)
+    found = simulated(*requested, map if number == 1 else mapped(number), together, offset)
     last = found.last.to_lab(levitation.scene.angle(found.levitated_s))
     data = {
         "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),

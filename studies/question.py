@@ -18,6 +18,7 @@ from ..dynamics.continuation.rotor_family import rotor_family
 from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import simulate_together
 from ..dynamics.flights.flight import initial_state
+from ..fem.cache import key_of
 from ..fem.rotor.models import of_true_moment
 from ..fem.rotor.table import canonical
 from ..geometry.common import Array, InputError, SpinlevError
@@ -86,9 +87,11 @@ def _simulate_together(levitations: Sequence[Levitation], duration: float) -> No
         with suppress(SpinlevError):
             still = one.scene.plate is None or one.models.plate_model == "none"
             still &= not one.scene.other_coils
-            if still and one.scene.floater.is_sphere and is_long(one.interaction):
+            if still and is_long(one.interaction):
+                floater = one.scene.floater
                 key = (
                     one.equations_key,
+                    "" if floater.is_sphere else key_of("equilibria", floater.bodies, floater.round),
                     one.interaction_model,
                     bool(np.any(one.scene.gravity[:2])),
                     bool(one.scene.drive),

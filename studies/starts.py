@@ -1,6 +1,7 @@
 """Initial states of an ensemble: given, or drawn at random about that of the scene."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,21 @@ from ..geometry.scene.contents import OffsetStart
 from .levitation import Levitation
 
 # SI units of the keys of `[start]`.
-UNITS = {"offset_mm": 1e-3, "position_mm": 1e-3, "velocity_mm_s": 1e-3, "moment": 1.0, "spin_hz": 2 * np.pi}
+UNITS = {
+    "offset_mm": 1e-3,
+    "position_mm": 1e-3,
+    "velocity_mm_s": 1e-3,
+    "moment": 1.0,
+    "spin_hz": 2 * np.pi,
+    "body_x": 1.0,
+}
 SPREADS = {"offset_mm": 1e-3, "velocity_mm_s": 1e-3, "moment_deg": np.pi / 180, "spin_hz": 2 * np.pi}
 
 
-def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> State:
+def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[State, Array | None]:
     """States (n, 3) at t = 0 from the keys of a scene's `[start]`, each three numbers a trajectory, or three for all.
+
+    With their offsets (n, 3) m from the equilibrium where these are given.
 
     Raises
     ------
@@ -36,14 +46,20 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> State:
     if "offset_mm" in columns:
         scene = levitation.elsewhere(start=OffsetStart(np.zeros(3)))
         begun, _ = initial_state(scene.scene, levitation.interaction, levitation.quiet.equilibria)
-        return displaced(begun, columns["offset_mm"], levitation.scene.angular_velocity)
+        return displaced(begun, columns["offset_mm"], levitation.scene.angular_velocity), columns["offset_mm"]
+    near = columns.pop("body_x", None)
     defaults = {"velocity_mm_s": (0.0, 0.0, 0.0), "moment": (0.0, 0.0, 1.0), "spin_hz": (0.0, 0.0, 0.0)}
-    whole = {key: columns.get(key, np.array([defaults.get(key)])) for key in list(UNITS)[1:]}
+    whole = {key: columns.get(key, np.array([defaults.get(key)])) for key in list(UNITS)[1:-1]}
     position, velocity, moment, spin = (np.tile(v, (count, 1)) if len(v) == 1 else v for v in whole.values())
     sizes = np.linalg.norm(moment, axis=1)
     if not sizes.all():
         raise InputError("Input starts.moment must be directions, not zero; instead received one that is.")
-    return State(position, velocity, moment / sizes[:, None], spin)
+    found, floater = State(position, velocity, moment / sizes[:, None], spin), levitation.scene.floater
+    if not floater.round:
+        sides = [None] * count if near is None else np.broadcast_to(near, (count, 3))
+        axes = np.array([floater.axes(m, x) for m, x in zip(found.moment, sides, strict=True)])
+        found = replace(found, axes=axes)
+    return found, None
 
 
 def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: Mapping[str, Any]) -> State:
@@ -67,7 +83,17 @@ def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: M
     begun = displaced(begun, offset, levitation.scene.angular_velocity)
     turned = begun.moment + moment
     turned = turned / np.linalg.norm(turned, axis=1)[:, None]
-    return State(begun.position, begun.velocity + velocity, turned, begun.spin + spin)
+    drawn = State(begun.position, begun.velocity + velocity, turned, begun.spin + spin)
+    if begun.axes is not None:
+        drawn = replace(drawn, axes=_least_turns(begun.moment, turned) @ begun.axes)
+    return drawn
+
+
+def _least_turns(before: Array, after: Array) -> Array:
+    """(n, 3, 3) turns of unit vectors (n, 3) to others, about an axis across both."""
+    about, cosine = np.cross(before, after), np.sum(before * after, axis=1)
+    cross = np.cross(about[:, None], np.eye(3)).swapaxes(1, 2)
+    return np.asarray(np.eye(3) + cross + cross @ cross / np.maximum(1 + cosine, 1e-12)[:, None, None])
 
 
 def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array:

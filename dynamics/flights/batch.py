@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...fem.compiled_code import compiled
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array, InputError
-from ...geometry.scene.contents import Scene
+from ...geometry.scene.contents import OffsetStart, Scene
 from ...geometry.scene.files import startless_text
 from ..motion.equations import Equations
 from ..motion.events import (
@@ -34,14 +34,14 @@ from ..motion.events import (
 )
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory
 from ..motion.state import DRIVEN, STEADY, Parameter, State, Vector
-from .balls import LARGE, SMALL
-from .flight import LEFT, LOOSER, MOST_SAMPLES, TOLERANCE, Course, Flight
+from .flight import LEFT, MOST_SAMPLES, Course, Flight
 from .trajectory import DURATION, IntegrationError, Recorder, Trajectory
 
 BATCH = 8  # Measured: a trajectory in a batch of 8 takes a quarter of the time of one alone, of 4 a half, of 16 a third
 TOGETHER = 200  # Steps between two looks for trajectories that have ended; a hundred are about 16 turns
 STEP_ERROR = 1e-9  # Of a launch, which is chaotic: a trajectory depends on the error of a step, but not the shares
 FLAT = 1e-9  # Sine of the angle to the horizontal that a plate may have
+Begun = tuple[State, Array | None]  # starts, and their offsets from an equilibrium where they are known
 
 
 class _Passenger(Course):
@@ -85,7 +85,9 @@ class _Passenger(Course):
 
     def alone(self) -> None:
         if self.recorder is None:
-            self.recorder = Recorder(self.state, self.flight.interval(self.duration), MOST_SAMPLES, self.time[0])
+            first = self.flight.balanced(self.values, np.array([self.time[0]]), self.state[None])[0]
+            recorder = Recorder(first, self.flight.interval(self.duration), MOST_SAMPLES, self.time[0])
+            self.recorder = recorder.doubled(self.time[0])
         self.fly()
         self.time, self.state = (float(self.recorder.times[-1]), 0.0), self.recorder.states[-1]
         self.over = True
@@ -222,9 +224,11 @@ class Endings:
     @classmethod
     def joined(cls, parts: "Sequence[Endings]") -> "Endings":
         vectors = zip(*(part.last.vectors for part in parts), strict=True)
+        axes = [part.last.axes for part in parts if part.last.axes is not None]
         names = ("ended_by", "levitated_s", "changes", "left_plate_table")
         whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-        return cls(last=State(*map(np.concatenate, vectors)), **whole)
+        last = State(*map(np.concatenate, vectors))
+        return cls(last=replace(last, axes=np.concatenate(axes) if axes else None), **whole)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{np.sum(self.ended_by == end)} by {end}" for end in np.unique(self.ended_by))
@@ -238,30 +242,37 @@ def ensemble(
     table: FieldTable,
     starts: State,
     duration: float,
-    mapped: Callable[[Callable[[State], Endings], Iterable[State]], Iterable[Any]] = map,
+    mapped: Callable[[Callable[[Begun], Endings], Iterable[Begun]], Iterable[Any]] = map,
     together: int = 512,
+    offset: Array | None = None,
 ) -> Endings:
     """Simulate a scene's floater from many starts for `duration` (s) each, or until contact or loss.
 
-    Raises InputError: `duration` is not positive, there is
-    no start, or the floater is no sphere; IntegrationError: a state became infinite.
+    Raises InputError: `duration` is not positive, or there is no start; IntegrationError: a state became infinite.
 
     Parameters
     ----------
     scene, table : the problem
-    starts : states (n, 3) at t = 0, SI units; the moments are made unit vectors
+    starts : states (n, 3) at t = 0, SI units; the moments are made unit vectors.  Without their axes bodies that are
+        not round are turned about them as little as can be
     mapped : as the built-in `map`; `concurrent.futures.ProcessPoolExecutor(2).map` uses two cores
     together : trajectories that a worker gets at once
+    offset : (n, 3) m of the starts from an equilibrium, if it is known: bodies that are not round are faster about it
 
-    Accuracy: that of a trajectory in balls, whose field errs by 1e-6 of its gradient.
+    Accuracy: that of a trajectory in balls, whose field errs by 1e-6 of its gradient; see `ERROR_OF_BODIES` for those
+    of a body that is not round.
     """
     _check(scene, starts, duration)
-    pieces = [slice(first, first + together) for first in range(0, len(starts.position), together)]
-    return Endings.joined(list(mapped(partial(_ended, scene, table, duration), [starts[p] for p in pieces])))
+    unit = starts.moment / np.linalg.norm(starts.moment, axis=1)[:, None]
+    starts = replace(starts, moment=unit)
+    if not scene.floater.round and starts.axes is None:
+        starts = replace(starts, axes=np.array([scene.floater.axes(moment) for moment in unit]))
+    pieces = [slice(first, first + together) for first in range(0, len(unit), together)]
+    given = [(starts[piece], None if offset is None else offset[piece]) for piece in pieces]
+    return Endings.joined(list(mapped(partial(_ended, scene, table, duration), given)))
 
 
 def _check(scene: Scene, starts: State, duration: float) -> None:
-    scene.floater.must_be("sphere", where="where many are simulated as one batch", instead="Simulate them one by one.")
     if not duration > 0:
         raise InputError(f"Input duration must be positive; instead received {duration} s.")
     if not len(starts.position):
@@ -270,9 +281,12 @@ def _check(scene: Scene, starts: State, duration: float) -> None:
         raise InputError("Input drive must have no center_mm and no axis in many trajectories at once; instead it has.")
 
 
-def _ended(scene: Scene, table: FieldTable, duration: float, starts: State) -> Endings:
-    flight, count = _flight(scene, table, duration), len(starts.position)
-    passengers = [_begun(flight, starts[k], duration, False) for k in range(count)]
+def _ended(scene: Scene, table: FieldTable, duration: float, given: Begun) -> Endings:
+    flight, (starts, offset) = _flight(scene, table, duration), given
+    passengers = [
+        _begun(flight, starts[k], duration, False, None if offset is None else offset[k])
+        for k in range(len(starts.position))
+    ]
     _fly(passengers)
     return _endings(passengers)
 
@@ -282,7 +296,7 @@ def _endings(passengers: Sequence[_Passenger]) -> Endings:
     return Endings(
         np.array([f.ended_by for f in passengers], dtype="<U8"),
         np.minimum([f.seconds for f in passengers], passengers[0].duration),
-        flight.scales.unpack(np.array([f.state[:12] for f in passengers])),
+        flight.scales.unpack(np.array([f.state[: flight.scales.size] for f in passengers])),
         np.array([f.changes.count for f in passengers]),
         np.array([f.left for f in passengers]),
     )
@@ -299,25 +313,25 @@ def simulate_together(
     Raises IntegrationError: a state became infinite.
     """
     began, known = perf_counter(), dict[str, Flight]()
-    passengers = []
-    for scene, start in zip(scenes, starts, strict=True):
-        key = startless_text(scene)
+    passengers, keys = [], [startless_text(scene) for scene in scenes]
+    for scene, start, key in zip(scenes, starts, keys, strict=True):
         if key not in known:
-            known[key] = _flight(scene, table, duration)
-        passengers.append(_begun(known[key], start, duration, True))
+            known[key] = _flight(scene, table, duration, shared=len(set(keys)) > 1)
+        offset = scene.start.offset if isinstance(scene.start, OffsetStart) else None
+        passengers.append(_begun(known[key], start, duration, True, offset))
     _fly(passengers)
     speed = sum(f.seconds for f in passengers) / (perf_counter() - began)
     return [f.trajectory(speed) if f.recorder else None for f in passengers]
 
 
-def _flight(scene: Scene, table: FieldTable, duration: float) -> Flight:
-    return Flight(scene, table, duration, compact=True, in_balls=True)
+def _flight(scene: Scene, table: FieldTable, duration: float, shared: bool = False) -> Flight:
+    return Flight(scene, table, duration, compact=True, in_balls=True, shared=shared)
 
 
-def _begun(flight: Flight, start: State, duration: float, recorded: bool) -> _Passenger:
+def _begun(flight: Flight, start: State, duration: float, recorded: bool, offset: Array | None) -> _Passenger:
     start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
-    free = clearance(flight.scene, np.zeros(1), start.position[None])[0] >= 0
-    course = flight.begin(start, duration, interval=flight.interval(duration) if recorded and free else None)
+    free = clearance(flight.scene, np.zeros(1), start.position[None], start.orientation[None])[0] >= 0
+    course = flight.begin(start, duration, None, flight.interval(duration) if recorded and free else None, offset)
     found = _Passenger(course)
     if not free:
         found.ended_by, found.over = CONTACT, True
@@ -326,11 +340,12 @@ def _begun(flight: Flight, start: State, duration: float, recorded: bool) -> _Pa
 
 def _fly(courses: Sequence[_Passenger]) -> None:
     """In slots, in small balls first, then in large ones; at last one by one near bodies, and where it is too fast."""
-    for formula in (SMALL, LARGE):
-        here = [f for f in courses if not f.over and f.flight.degree(f.values) == formula.degree]
+    balls = courses[0].flight.balls if courses else None
+    for kind in balls.kinds if balls else ():
+        here = [f for f in courses if not f.over and f.flight.degree(f.values) == kind.number]
         if here:
-            equations, events = here[0].flight.equations(formula.degree)
-            SimdBatch(equations, events, LOOSER * TOLERANCE, True).fly(here)
+            flight = here[0].flight
+            SimdBatch(*flight.equations(kind.number), flight.step_error(kind.number), True).fly(here)
     for course in courses:
         if not course.over:
             course.alone()
@@ -350,7 +365,7 @@ def launched(
     Contact with the rotor is that of `flight_events`; where a step misses an edge, contact is noticed at the latest
     where the sphere meets the largest one inside the magnet.  The plate is an obstacle without edges.  The field is the
     table's own expressions, so that a short one (dipoles, closed forms) is fast. Raises InputError: `duration` is not
-    positive, there is no start, the plate does not lie flat, or the floater is no sphere.
+    positive, there is no start, the plate does not lie flat, or the floater is no sphere, of which this is contact.
 
     Parameters
     ----------
@@ -364,6 +379,7 @@ def launched(
     Accuracy: that of the tables; beyond the range of the plate's the currents' field is continued as it is, and
     `Endings.left_plate_table` says which trajectories went there.
     """
+    scene.floater.must_be("sphere", where="for launches over currents in a plate", instead="Simulate them one by one.")
     _check(scene, starts, duration)
     flight, count = Flight(scene, table, duration, memory=memory, in_balls=False), len(starts.position)
     equations, (scales, values) = flight.equations(0)[0], (flight.scales, flight.values)

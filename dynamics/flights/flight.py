@@ -33,6 +33,7 @@ from ..motion.events import (
     Events,
     Leg,
     clearance,
+    first_contact,
     flight_events,
     motion_legs,
     plate_depth,
@@ -49,6 +50,7 @@ from .trajectory import (
     FlightStopped,
     Recorder,
     Trajectory,
+    crossing,
 )
 
 LEFT = "left"
@@ -96,6 +98,7 @@ class Flight:
     memory : the plate's currents, if they are modelled; else the plate is only an obstacle
     in_balls : whether the rotor's field is expanded in balls about the floater; None: where its expressions are long
     scales : units of the states; None: those of the scene
+    shared : whether the code of a body that is not round is for others as well, which differ in runtime parameters
     """
 
     def __init__(
@@ -108,8 +111,9 @@ class Flight:
         memory: PlateMemory | None = None,
         in_balls: bool | None = None,
         scales: Scales | None = None,
+        shared: bool = False,
     ) -> None:
-        self.scene, self.memory, self.scales = scene, memory, scales or Scales.of(scene)
+        self.scene, self.memory, self.scales, self._shared = scene, memory, scales or Scales.of(scene), shared
         self.whole, self.tilted = with_effects(scene, table), bool(np.any(scene.gravity[:2]))
         self.balls = Balls(scene, self.whole) if (is_long(table) if in_balls is None else in_balls) else None
         self.first = self.balls.end if self.balls else len(Parameter)
@@ -123,9 +127,18 @@ class Flight:
         long = memory is None and self._turns > STRAIGHT_TURNS  # straight code of a plate takes minutes to compile
         self._straight = long if compact is None else not compact
 
+    @property
+    def offset(self) -> Array | None:
+        """(3,) m of the scene's start from an equilibrium, if it begins at one."""
+        return self.scene.start.offset if isinstance(self.scene.start, OffsetStart) else None
+
     def degree(self, values: Array) -> int:
         """The `number` of the ball's kind in runtime parameters; 0: none."""
         return int(values[DEGREE]) if self.balls else 0
+
+    def step_error(self, degree: int) -> float:
+        """Relative error of a step in balls of a kind, or, 0, in the table's own field."""
+        return self._tolerance * (LOOSER if degree else 1) * (ROUGHER if self.whole.turning and degree else 1)
 
     def part(self, degree: int) -> Part:
         """The compiled motion in balls of a kind, or, 0, in the table's own field."""
@@ -139,7 +152,7 @@ class Flight:
                 hy.taylor_adaptive,
                 [*zip(equations.variables, equations.rates, strict=True), (hy.expression("work"), equations.power)],
                 np.zeros(len(equations.variables) + 1),
-                tol=self._tolerance * (LOOSER if degree else 1) * (ROUGHER if self.whole.turning and degree else 1),
+                tol=self.step_error(degree),
                 compact_mode=not self._straight or (self.balls is not None and degree not in small),
                 opt_level=OPTIMISATION if self.memory or self._turns > SHORT_TURNS else 0,
                 t_events=[hy.t_event(each, direction=falling) for each, _ in events],
@@ -157,8 +170,7 @@ class Flight:
         whole = in_ball(self.whole, ball) if degree else self.whole
         driven = bool(self.scene.drive)
         moving = self.scene.moving
-        # the code of a floater that is not round is its own anyway, as multipoles are written in
-        given = Given(self.values if whole.turning else None)
+        given = Given(self.values if whole.turning and not self._shared else None)
         equations = equations_of_motion(whole, self.tilted, self.memory, self.first, driven, moving, given)
         position, turn = equations.variables[:3], DRIVEN if driven else STEADY
         if degree:
@@ -193,11 +205,16 @@ class Flight:
         return np.concatenate([states[:, : self.scales.size], given, energy[:, None]], axis=1)
 
     def begin(
-        self, start: State, duration: float, currents: Array | None = None, interval: float | None = None
+        self,
+        start: State,
+        duration: float,
+        currents: Array | None = None,
+        interval: float | None = None,
+        offset: Array | None = None,
     ) -> "Course":
         """The course of `duration` (s) from a start (rotor's frame, t = 0), the plate's states being `currents` (k,).
 
-        It is sampled at multiples of `interval`, scaled; None: not at all.
+        It is sampled at multiples of `interval`, scaled; None: not at all. `offset` (3,) m: from an equilibrium.
         """
         values, own = self.values.copy(), np.zeros(0)
         farthest = max(0.1, 2 * float(np.linalg.norm(start.position)))  # of the rotor's origin; beyond, it is lost
@@ -209,7 +226,7 @@ class Flight:
             own = ((0.0 if currents is None else currents) - left) * values[Parameter.PLATE_SHARE]
         given = np.zeros(3 if self.scene.drive else 1)  # by the motor, and the work
         course = Course(self, duration, values, np.concatenate([self.own_states(start), own, given]))
-        course.enter_ball(self.scene.start.offset if isinstance(self.scene.start, OffsetStart) else None)
+        course.enter_ball(offset)
         if interval is not None:
             row, now = course.state[None], np.zeros(1)
             terms = self.jacobi(course.values, now, row)
@@ -335,22 +352,27 @@ class Course:
 
     def _piece(self, end: float, recorder: Recorder) -> tuple[Array, Array]:
         """Go on to the end of a piece or to an event: scaled times, and states with J - work."""
-        part = self.flight.part(self.flight.degree(self.values))
-        scales = self.flight.scales
-        piece = recorder.piece(part.integrator, self.values, self.time, self.state, end, scales.time)
+        flight, part = self.flight, self.flight.part(self.flight.degree(self.values))
+        watched, often = LEFT not in part.meanings, recorder.interval  # there are no bodies in a ball
+        if watched and not flight.scene.floater.is_sphere:  # samples alone tell of contact with its surface
+            often = flight.interval(self.duration)
+        piece = recorder.piece(part.integrator, self.values, self.time, self.state, end, flight.scales.time, often)
         self.sound = False
         self.time, self.state, times, states = piece.time, piece.state, piece.times, piece.states
         self.steps, self.ended_by = self.steps + piece.steps, DURATION
         if piece.event is not None:
             self.ended_by = part.meanings[piece.event]
-        if LEFT not in part.meanings:  # there are no bodies in a ball
-            there = scales.unpack(states)
-            gap = clearance(self.flight.scene, times * scales.time, there.position, there.orientation)
-            touching = np.flatnonzero(gap < -1e-9)
-            if len(touching):
-                self.ended_by = CONTACT
-                times, states = times[: touching[0] + 1], states[: touching[0] + 1]
-        return times, self.flight.balanced(self.values, times, states)
+        if watched and (first := self._touching(times, states)) is not None:
+            self.ended_by = CONTACT
+            times, states = times[: first + 1], states[: first + 1]
+            if first:
+                times[-1], states[-1] = crossing(part.integrator, times[-2:], states[-2:], self._touching)
+        return times, flight.balanced(self.values, times, states)
+
+    def _touching(self, times: Array, states: Array) -> int | None:
+        """The first of scaled times (n,) at which the floater overlaps something in its state (n, s)."""
+        there = self.flight.scales.unpack(states)
+        return first_contact(self.flight.scene, times * self.flight.scales.time, there.position, there.orientation)
 
     def content(self) -> dict[str, Any]:
         """All that decides the rest, for a checkpoint, and the region (2, 3) m of the plate's table; zeros: none."""
@@ -430,7 +452,7 @@ def integrate(
     thousand turns; over a plate see `PLATE_TOLERANCE`. see `Trajectory.energy_error`.
     """
     began, known = perf_counter(), flight.compile_seconds
-    course = flight.begin(start, duration, currents, flight.interval(duration))
+    course = flight.begin(start, duration, currents, flight.interval(duration), flight.offset)
     kept = checkpoint.read() if checkpoint else None
     if kept is not None:
         course.restore(kept)
@@ -569,7 +591,8 @@ def displaced(start: State, offset: Array, angular_velocity: float) -> State:
     """State `start` moved by `offset` (..., 3) m, as much at rest in a frame of `angular_velocity` as it was."""
     turning = np.cross([0.0, 0.0, angular_velocity], offset)
     moment, spin = (np.broadcast_to(v, offset.shape) for v in (start.moment, start.spin))
-    return State(start.position + offset, start.velocity + turning, moment, spin, start.axes)
+    axes = None if start.axes is None else np.broadcast_to(start.axes, (*offset.shape, 3))
+    return State(start.position + offset, start.velocity + turning, moment, spin, axes)
 
 
 def in_plate_range(memory: PlateMemory | None, lab: State, time: float = 0.0) -> bool:

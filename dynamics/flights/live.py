@@ -52,7 +52,7 @@ class LiveFlight:
         tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
         self.scene = scene
         flight = Flight(scene, table, np.inf, tolerance, True, memory)
-        self._course = flight.begin(start, np.inf, currents)
+        self._course = flight.begin(start, np.inf, currents, offset=flight.offset)
         flight.part(flight.degree(self._course.values))  # compiled now, so that the first piece is not late
         self._check_range(self.now.position)
 

@@ -12,7 +12,7 @@ and the last term is left out: the product of two corrections, each of the fourt
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 from time import perf_counter
 from typing import Any
 
@@ -23,12 +23,12 @@ from ...fem.compiled_code import compiled
 from ...fem.rotor.floater import FloaterSources, floater_sources, remanent_sources
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import MU_0, Array
-from ...geometry.overlap import body_overlap
+from ...geometry.overlap import parting
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.floater import Floater
 from ..motion.effect import ZERO, Added, Motion, interaction_of
 from ..motion.effects import with_effects
-from ..motion.events import CONTACT, clearance, motion_legs
+from ..motion.events import CONTACT, first_contact, motion_legs
 from ..motion.floater_effects import FloaterShape
 from ..motion.state import Parameter, Scales, State, Vector, add, cross, dot, rotation_of, subtract
 from .balls import DEGREE
@@ -181,7 +181,7 @@ class JointFlight:
             whole = interaction_of(with_effects(one, table)).joined(Neighbours(floaters, k))
             flight = Flight(one, whole, duration, scales=scales)  # type: ignore[arg-type]
             self.flights.append(flight)
-            course = flight.begin(initial_state(one, table)[0], duration)
+            course = flight.begin(initial_state(one, table)[0], duration, offset=flight.offset)
             if flight.balls:  # of one kind from the start on, as each pair of kinds is compiled
                 flight.balls.enter(flight.balls.kinds[-1:], course.state, course.values)
             self.courses.append(course)
@@ -332,7 +332,11 @@ class JointFlight:
     def _piece(self, end: float, recorder: Recorder) -> tuple[Array, Array]:
         """Go on to the end of a piece or to an event: scaled times and states."""
         part, scales = self.part(self.degrees), self.flights[0].scales
-        piece = recorder.piece(part.integrator, self.values, self.time, self.state, end, scales.time)
+        often = recorder.interval
+        # Samples alone tell of contact with what is no sphere.
+        if not all(flight.scene.floater.is_sphere for flight in self.flights):
+            often = self.flights[0].interval(self.duration)
+        piece = recorder.piece(part.integrator, self.values, self.time, self.state, end, scales.time, often)
         self.time, self.state, times, states = piece.time, piece.state, piece.times, piece.states
         self.steps, self.ended = self.steps + piece.steps, (DURATION, ())
         if piece.event is not None:
@@ -348,17 +352,19 @@ class JointFlight:
         found: list[tuple[int, tuple[int, ...]]] = []
         for k, (flight, state) in enumerate(zip(self.flights, there, strict=True)):
             if not self.degrees[k]:  # there are no bodies in a ball
-                gap = clearance(flight.scene, times, state.position, state.orientation)
-                found += [(int(n), (k,)) for n in np.flatnonzero(gap < -1e-9)[:1]]
+                first = first_contact(flight.scene, times, state.position, state.orientation)
+                found += [] if first is None else [(first, (k,))]
         for i, j in combinations(range(len(there)), 2):
             one, two = self.flights[i].scene.floater, self.flights[j].scene.floater
             if one.is_sphere and two.is_sphere:
                 continue
             apart = np.linalg.norm(there[i].position - there[j].position, axis=1)
+            ways: dict[int, Array] = {}
             for n in np.flatnonzero(apart < one.radius + two.radius):
-                first = one.placed(there[i].position[n], there[i].orientation[n])
-                second = two.placed(there[j].position[n], there[j].orientation[n])
-                if max(body_overlap(a, b) for a in first for b in second) > 1e-9:
+                parts = (f.placed(s.position[n], s.orientation[n]) for f, s in ((one, there[i]), (two, there[j])))
+                tried = [parting(a, b, ways.get(m)) for m, (a, b) in enumerate(product(*parts))]
+                ways = {m: way for m, way in enumerate(tried) if way is not None}
+                if len(ways) < len(tried):
                     found.append((int(n), (i, j)))
                     break
         return min(found, default=None)

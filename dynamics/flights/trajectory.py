@@ -3,7 +3,7 @@
 import hashlib
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ DURATION, STOPPED = "duration", "stopped"
 # The most turns and samples between two looks at the motion. A step ends where a piece does, so that pieces must not
 # depend on how fast the machine is.
 PIECE_TURNS, PIECE_SAMPLES = 256, 256
+PARTS, DIVISIONS = 16, 3  # Into so many parts the time between two samples is divided, so often, to find a border
 
 
 class IntegrationError(ComputationError):
@@ -252,15 +253,24 @@ class Recorder:
         self.interval, self.capacity = interval, capacity
         self.times, self.states = np.array([now]), state[None]  # (m,) and (m, n)
 
-    def grid(self, now: float, end: float, count: int) -> Array:
-        """Times to visit next: `now`, then at most `count` multiples of the interval, and `end` if they reach it."""
-        first = int(np.floor(now / self.interval + 1e-9)) + 1
-        times = self.interval * np.arange(first, first + count)
-        times = times[times < end - 1e-9 * self.interval]
+    @staticmethod
+    def grid(now: float, end: float, interval: float) -> Array:
+        """Times to visit next: `now`, then some multiples of an `interval`, and `end` if they reach it."""
+        count = int(np.clip(PIECE_TURNS * 2 * np.pi / interval, 1, PIECE_SAMPLES))
+        first = int(np.floor(now / interval + 1e-9)) + 1
+        times = interval * np.arange(first, first + count)
+        times = times[times < end - 1e-9 * interval]
         return np.concatenate([[now], times, [end] if len(times) < count else []])
 
     def piece(
-        self, integrator: Any, values: Array, time: tuple[float, float], state: Array, end: float, unit: float
+        self,
+        integrator: Any,
+        values: Array,
+        time: tuple[float, float],
+        state: Array,
+        end: float,
+        unit: float,
+        often: float,
     ) -> Piece:
         """Motion from a `time` and `state` to an event, or to `end` or so far as samples are looked at once.
 
@@ -271,11 +281,12 @@ class Recorder:
         integrator, values : of the motion, and its runtime parameters
         time, state : scaled, the first as the sum of two numbers
         end, unit : scaled, and the seconds of scaled time 1
+        often : scaled interval between looks at the motion
         """
         integrator.pars[:], integrator.state[:] = values[: len(integrator.pars)], state
         integrator.dtime = time
         integrator.reset_cooldowns()
-        times = self.grid(time[0], end, int(np.clip(PIECE_TURNS * 2 * np.pi / self.interval, 1, PIECE_SAMPLES)))
+        times = self.grid(time[0], end, often)
         outcome, _, _, steps, _, states = integrator.propagate_grid(times)
         if outcome == hy.taylor_outcome.err_nf_state:
             raise IntegrationError(
@@ -288,6 +299,12 @@ class Recorder:
             event = -outcome.value - 1
         return Piece(times, states, integrator.dtime, integrator.state.copy(), steps, event)
 
+    def doubled(self, now: float) -> "Recorder":
+        """With the interval that so many samples as there would have been until `now` had led to."""
+        while np.floor(now / self.interval + 1e-9) + 1 > self.capacity:
+            self.interval *= 2
+        return self
+
     def due(self, seen: float, now: float, end: float) -> Array:
         """Multiples of the interval after `seen`, up to `now` and before `end`."""
         first, last = (int(np.floor(time / self.interval + 1e-9)) for time in (seen, now))
@@ -295,9 +312,9 @@ class Recorder:
         return np.asarray(times[times < end - 1e-9 * self.interval])
 
     def add(self, times: Array, states: Array, last: bool) -> None:
-        """Keep `states` (m, n) at those of `times` that are multiples of the interval; of the `last` ones all."""
-        on_grid = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
-        kept = on_grid | last
+        """Keep `states` (m, n) at those of `times` that are multiples of the interval, and the very `last`."""
+        kept = np.abs(times / self.interval - np.round(times / self.interval)) < 1e-9
+        kept[-1:] |= last
         self.times, self.states = np.append(self.times, times[kept]), np.concatenate([self.states, states[kept]])
         while len(self.times) > self.capacity:
             self.interval *= 2
@@ -305,3 +322,25 @@ class Recorder:
             kept = np.abs(self.times - even) < 1e-6 * self.interval
             kept[-1] |= last
             self.times, self.states = self.times[kept], self.states[kept]
+
+
+def crossing(
+    integrator: Any, times: Array, states: Array, first_over: Callable[[Array, Array], int | None]
+) -> tuple[float, Array]:
+    """Time and state (s,) at which a motion crosses a border between `times` (2,), its `states` (2, s) being there.
+
+    Parameters
+    ----------
+    integrator : of the motion, with its runtime parameters
+    first_over : the first of times (n,) at which a state (n, s) is over the border; None: at none of them
+    """
+    for _ in range(DIVISIONS):
+        integrator.time, integrator.state[:] = times[0], states[0]
+        integrator.reset_cooldowns()
+        times = np.linspace(times[0], times[1], PARTS + 1)
+        outcome, *_, states = integrator.propagate_grid(times)
+        if outcome != hy.taylor_outcome.time_limit:
+            times, states = np.append(times[: len(states)], integrator.time), np.vstack([states, integrator.state])
+        first = first_over(times, states) or len(times) - 1
+        times, states = times[first - 1 : first + 1], states[first - 1 : first + 1]
+    return float(times[-1]), states[-1]

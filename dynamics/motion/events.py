@@ -10,7 +10,7 @@ import heyoka as hy
 import numpy as np
 
 from ...geometry.common import Array
-from ...geometry.overlap import body_overlap
+from ...geometry.overlap import TOUCHING, body_overlap, parting
 from ...geometry.scene.contents import Plate, Scene, Stretch
 from ...geometry.shapes import Box, Cylinder
 from ...geometry.solids import Solid
@@ -97,17 +97,41 @@ def clearance(scene: Scene, time: Array, position: Array, orientation: Array | N
     return found
 
 
+def first_contact(scene: Scene, time: Array, position: Array, orientation: Array) -> int | None:
+    """The first of instants one after another at which the floater overlaps something; None: at none of them.
+
+    See `clearance` for what is given. A body that is no sphere is near what it was near an instant before, so that few
+    gaps have to be searched for.
+    """
+    near = np.flatnonzero(clearance(scene, time, position) < -TOUCHING)
+    if scene.floater.is_sphere:
+        return int(near[0]) if len(near) else None
+    ways: dict[int, Array] = {}
+    for k in near.tolist():
+        for n, pair in enumerate(_pairs(scene, float(time[k]), position[k], orientation[k])):
+            way = parting(*pair, ways.get(n))
+            if way is None:
+                return int(k)
+            ways[n] = way
+    return None
+
+
 def _own_gap(scene: Scene, time: float, position: Array, orientation: Array) -> float:
     """Gap of a floater that is no sphere in one place, m."""
+    return min(-body_overlap(*pair) for pair in _pairs(scene, time, position, orientation))
+
+
+def _pairs(scene: Scene, time: float, position: Array, orientation: Array) -> list[tuple[Solid, Solid]]:
+    """Each body of a scene with each part of its floater in one place, always in one order."""
     parts = scene.floater.placed(position, orientation)
-    gaps = [-body_overlap(body, part) for body in scene.turning_bodies for part in parts]
+    found = [(body, part) for body in scene.turning_bodies for part in parts]
     if scene.standing_bodies:
         turn = scene.angle(time)
         seen = turned_about_z(position, turn) + plate_depth(scene.plate, np.array([time])) * [0.0, 0.0, 1.0]
         axes = turned_about_z(scene.floater.axes(orientation).T, turn).T
         floater = scene.floater.placed(seen, axes)
-        gaps += [-body_overlap(body, part) for body in scene.standing_bodies for part in floater]
-    return min(gaps)
+        found += [(body, part) for body in scene.standing_bodies for part in floater]
+    return found
 
 
 def rotor_gap(scene: Scene, position: Array, orientation: Array | None = None) -> float:

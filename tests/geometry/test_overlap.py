@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 
-from spinlev.geometry.overlap import apart, body_overlap, deepest_overlap_in_a_turn, sphere_overlap
+from spinlev.geometry.overlap import apart, body_overlap, deepest_overlap_in_a_turn, parting, sphere_overlap
 from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring, rotation_matrix
 from spinlev.geometry.solids import moved
 
@@ -44,6 +44,23 @@ def test_overlap_agrees_with_linear_programming(size, turn, center):
     depth = body_overlap(first, second)
     if abs(depth) > 1e-7:  # within the solver's own tolerance both answers are right
         assert (depth > 0) == (solved.status == 0)
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.sampled_from([Box((1.0, 1.5, 2.0)), Cylinder(0.7, 1.0), ring(0.8, 0.4, 1.0), Sphere(0.6)]),
+    st.tuples(angle, angle, angle),
+    st.tuples(shift, shift, shift),
+    st.tuples(shift, shift, shift),
+)
+def test_bodies_are_parted_where_they_do_not_overlap_whichever_way_is_tried_first(body, turn, center, way):
+    other = moved(Box((0.8, 1.1, 0.6)), np.array(center), rotation_matrix(turn))
+    depth = body_overlap(body, other)
+    first = np.array(way) / np.linalg.norm(way) if np.linalg.norm(way) > 1e-3 else None
+    for tried in (None, first):
+        found = parting(body, other, tried)
+        if abs(depth) > 1e-7:
+            assert (found is None) == (depth > 0)
 
 
 def test_sphere_outside_a_face_an_edge_and_a_corner():

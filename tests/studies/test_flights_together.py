@@ -9,9 +9,10 @@ from spinlev.fem.rotor.table import RotorTable
 from spinlev.studies.cli.options import Models, combinations
 from spinlev.studies.question import Question
 
+ROTOR = sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305, recoil_permeability=1.0)
 SCENE = sl.scene(
     frequency_hz=110.0,
-    rotor=sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305, recoil_permeability=1.0),
+    rotor=ROTOR,
     floater=sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0, recoil_permeability=1.0),
     start={"offset_mm": [0.0, 0.0, 0.2]},
 )
@@ -70,3 +71,22 @@ def test_a_flight_that_cannot_begin_leaves_the_others(long_table, tmp_path):
     )
     np.testing.assert_array_equal(np.isfinite(found["levitated"]), [True, False, True])
     assert "inside one of them" in found.attrs["failed_points"]
+
+
+def test_cubes_of_a_sweep_are_simulated_together():
+    """At two frequencies and from two places each: code with runtime parameters in it, where each alone has numbers."""
+    cube = {"shape": "cuboid", "size_mm": [10.0, 10.0, 10.0], "remanence_T": 1.305, "density_kg_m3": 7500.0}
+    begin = {"position_mm": [0.6, 0.0, -19.0], "velocity_mm_s": [0.0, 400.0, 0.0], "moment": [0.24, 0.0, 0.97]}
+    scene = sl.scene(frequency_hz=110.0, rotor=ROTOR, floater=cube, start=begin)
+    question = Question(
+        scene, "scene", "flight", Models("dipole", "none", interaction="rigid"), 0.0, 0.03, (0, 0, -0.02)
+    )
+    points = combinations({"frequency_hz": [105.0, 110.0], "start.position_mm.2": [-19.0, -19.5]})
+    jobs = question.prepared(points)
+    for point, job in zip(points, jobs, strict=True):
+        alone, found = question.levitation(point).flight(0.03), job.args[1].simulated[0.03]
+        assert found.ended_by == alone.ended_by == "duration"
+        np.testing.assert_array_equal(found.time, alone.time)
+        assert np.abs(found.lab.position - alone.lab.position).max() < 1e-12
+        assert np.abs(found.lab.axes - alone.lab.axes).max() < 1e-10
+        assert found.energy_error < 1e-12

@@ -63,11 +63,6 @@ def test_what_is_no_pose_is_told(pose, said):
         sl.floater_force(made(), *pose, model="cuboid")
 
 
-def test_many_discs_are_refused():
-    with pytest.raises(InputError, match="where many are simulated as one batch"):
-        sl.ensemble(made(DISC), {"position_mm": [[0.0, 0.0, -30.0]]}, 0.1, model="dipole")
-
-
 @pytest.mark.parametrize("keys", [pytest.param(BRICK, marks=pytest.mark.slow), DISC], ids=["brick", "disc"])
 def test_a_plates_currents_act_on_other_shapes(keys):
     """By their dipole: energy is balanced, the plate changes the motion, and the result says what is left out."""

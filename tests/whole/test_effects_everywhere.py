@@ -110,10 +110,7 @@ def live_motion(text, asked):
 
 
 USES = (equilibria, modes, trajectory, ensemble, sweep, live_motion)
-REFUSED = {
-    (name, "ensemble"): "many are simulated as one batch"
-    for name in ("a floater that is no sphere", "a floater that is not round")
-} | {("other coils", name): "field does not stand still" for name in ("equilibria", "modes", "sweep")}
+REFUSED = {("other coils", name): "field does not stand still" for name in ("equilibria", "modes", "sweep")}
 """What is refused in a sentence; all else answers, and otherwise than without the effect, but for what is left out."""
 LEFT_OUT = {("eddy currents in a plate", "ensemble")}
 

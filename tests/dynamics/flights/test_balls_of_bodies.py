@@ -44,7 +44,7 @@ def in_balls(scene, table, duration):
 def first_ball(scene, table, state):
     """Its number, and its centre (3,) m and radius m."""
     flight = in_balls(scene, table, 1.0)
-    values = flight.begin(state, 1.0).values
+    values = flight.begin(state, 1.0, offset=flight.offset).values
     first = balls_module.DEGREE + 1
     return flight.degree(values), values[first : first + 3], 1 / values[first + 3]
 
@@ -115,7 +115,7 @@ def test_a_cube_costs_what_its_steps_cost(start):
 def test_numbers_in_the_code_are_the_parameters(start):
     """A cube's rates with its numbers written in, and with all of them as runtime parameters: round-off."""
     flight = in_balls(LEVITATING, TABLE, 1.0)
-    course = flight.begin(start, 1.0)
+    course = flight.begin(start, 1.0, offset=flight.offset)
     number = flight.degree(course.values)
     whole = balls_module.in_ball(flight.whole, BallField(balls_module.DEGREE + 1, abs(number), number < 0))
     found = []
