@@ -30,7 +30,11 @@ from ..harmonics.solid import FOUR_PI, entries, gauss_legendre
 # Nodes of the rule for distances from the mantle of at least so many radii: round-off
 RULES = ((0.8, 16), (0.1, 24), (1e-2, 32), (1e-5, 64), (0.0, 160))
 WIDEST, NARROWEST = 3.0, 1e-14
+TOGETHER = 500  # points at once beside all segments
 CHUNK = 400_000  # points times nodes at once
+# The same for both halves of a mantle at once, where field and slope outside are asked to 1e-9 from BESIDE radii off
+AROUND = ((0.8, 24), (0.3, 32), (0.05, 48), (0.0, 64))
+BESIDE = 1e-2
 
 
 def round_tensor(body: Cylinder | Sphere, points: Array) -> Array:
@@ -99,8 +103,7 @@ def _mantle(radius: float, half: float, points: Array, slopes: bool = False) -> 
     rho, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
     places, owner = np.unique(np.round(np.stack([rho, z]) / radius, 15), axis=1, return_inverse=True)
     rho, z = places * radius
-    apart = np.hypot(rho - radius, np.maximum(np.abs(z) - half, 0.0))
-    width = np.clip(apart / np.sqrt(np.maximum(rho, 0.1 * radius) * radius), NARROWEST, WIDEST)
+    width = _width(radius, half, rho, z)
     tensor, slope = np.empty((len(rho), 3, 3)), np.empty((len(rho) if slopes else 0, 3, 3, 3))
     upper = np.inf
     for least, nodes in RULES:
@@ -115,6 +118,12 @@ def _mantle(radius: float, half: float, points: Array, slopes: bool = False) -> 
                 slope[part] = _symmetric_slope(*sums[4:])
         upper = least
     return tensor[owner.ravel()], slope[owner.ravel()] if slopes else slope
+
+
+def _width(radius: float, half: float, rho: Array, z: Array) -> Array:
+    """(n,) about the angle over which the segments beside a point do most of its field."""
+    apart = np.hypot(rho - radius, np.maximum(np.abs(z) - half, 0.0))
+    return np.clip(apart / np.sqrt(np.maximum(rho, 0.1 * radius) * radius), NARROWEST, WIDEST)
 
 
 def _symmetric_slope(xxx: Array, xyy: Array, xxz: Array, yyz: Array, xzz: Array) -> Array:
@@ -172,14 +181,8 @@ def _segment(half: float, rho: Array, z: Array, radius: float, sine: Array, slop
 
 Expression = Any  # A heyoka expression
 RESOLVED = 0.4  # distance from the surface from which on the segments do, in edges of a cube of the magnet's volume
-TOGETHER = 500  # points at once beside all segments
 MOST = 64  # segments of a mantle; at a quarter of its radius they still do to 1e-6
 DIGITS = np.log(1e11)
-
-
-def resolved_distance(body: Cylinder) -> float:
-    """Distance (m) from the surface from which on the segments' field is exact to 1e-10."""
-    return float(max(radius * np.expm1(DIGITS / _count(body, radius)) for radius, _ in mantles(body)))
 
 
 def _count(body: Cylinder, radius: float) -> int:
@@ -191,7 +194,7 @@ def _count(body: Cylinder, radius: float) -> int:
 def segments_field(
     position: Sequence[Expression], body: Cylinder, polarization: Array
 ) -> tuple[list[Expression], list[list[Expression]]]:
-    """B and its gradient in the body's own axes from `resolved_distance` on.
+    """B and its gradient in the body's own axes, to 1e-10 from where the segments do on.
 
     Parameters
     ----------
@@ -209,8 +212,10 @@ def segments_field(
     )
 
 
-def segments_derivatives(points: Array, body: Cylinder, polarization: Array, order: int) -> Array:
-    """B and its derivatives up to `order` - 1, by their `entries` (n, k), in the body's own axes.
+def outside_derivatives(points: Array, body: Cylinder, polarization: Array, order: int) -> Array:
+    """B and its derivatives up to `order` - 1, by their `entries` (n, k), in the body's own axes, outside it.
+
+    B and its slope to 1e-9 of the largest from `BESIDE` radii off.
 
     Parameters
     ----------
@@ -218,15 +223,42 @@ def segments_derivatives(points: Array, body: Cylinder, polarization: Array, ord
     body, polarization : as of `segments_field`
     order : 1 for B alone
     """
-    rows = _segments(body, polarization).T
-    found = np.empty((len(points), order * (order + 2)))
-    for start in range(0, len(points), TOGETHER):
-        block = points[start : start + TOGETHER]
-        given = np.empty((3 + len(rows), len(block), rows.shape[1]))
-        given[:3], given[3:] = block.T[:, :, None], rows[:, None]
-        values = _segment_kernel(order)(given.reshape(len(given), -1))
-        found[start : start + TOGETHER] = values.reshape(-1, len(block), rows.shape[1]).sum(axis=2).T
+    turn, rho = np.arctan2(points[:, 1], points[:, 0])[:, None], np.hypot(points[:, 0], points[:, 1])
+    found = np.zeros((len(points), order * (order + 2)))
+    for radius, share in mantles(body):
+        width, upper = _width(radius, body.height / 2, rho, points[:, 2]), np.inf
+        for least, nodes in AROUND:
+            chosen, upper = np.flatnonzero((width >= least) & (width < upper)), least
+            u, weights = gauss_legendre(nodes)
+            for start in range(0, len(chosen), TOGETHER):
+                block = chosen[start : start + TOGETHER]
+                wide = width[block, None]
+                end = np.arcsinh(np.pi / wide)
+                given = np.empty((12, len(block), nodes))
+                given[:3] = points[block].T[:, :, None]
+                given[3], given[4], given[5] = turn[block], wide, u * end
+                given[6] = share * radius / FOUR_PI * weights * end
+                given[7:] = np.array([body.height, radius, *polarization])[:, None, None]
+                sums = _outside_kernel(order)(given.reshape(12, -1)).reshape(-1, len(block), nodes).sum(axis=2)
+                found[block] += sums.T
     return found
+
+
+@cache
+def _outside_kernel(order: int) -> Any:
+    """Compiled field of a segment with its derivatives: (k, n).
+
+    For places (3, n), where on a mantle a segment is and its strength (4, n), and a body and its polarisation (5, n).
+    """
+    variables = hy.make_vars(*(f"v_{k}" for k in range(12)))
+    turn, width, u, strength, length, radius, x, y, z = variables[3:]
+    angle, strength = turn + width * hy.sinh(u), strength * width * hy.cosh(u)
+    cos, sin = hy.cos(angle), hy.sin(angle)
+    segment = [length, radius, cos, sin, strength * (x * cos + y * sin), strength * z]
+    outputs = _straight_segment(variables[:3], segment)
+    known = dict(zip(entries(2), outputs[3:], strict=True))
+    outputs += differentiated(known, variables[:3], order)
+    return hy.cfunc(outputs[: order * (order + 2)], variables, fast_math=True)
 
 
 def _segments(body: Cylinder, polarization: Array) -> Array:
@@ -240,16 +272,6 @@ def _segments(body: Cylinder, polarization: Array) -> Array:
         length, radii, current = (np.full(count, number) for number in (body.height, radius, z))
         found.append(np.column_stack([length, radii, cos, sin, x * cos + y * sin, current]))
     return np.concatenate(found)
-
-
-@cache
-def _segment_kernel(order: int) -> Any:
-    """Compiled field of a segment with its derivatives: (k, n) for places and segments (9, n)."""
-    variables = hy.make_vars(*(f"v_{k}" for k in range(9)))
-    outputs = _straight_segment(variables[:3], variables[3:])
-    known = dict(zip(entries(2), outputs[3:], strict=True))
-    outputs += differentiated(known, variables[:3], order)
-    return hy.cfunc(outputs[: order * (order + 2)], variables, fast_math=True)
 
 
 def _straight_segment(position: Sequence[Expression], segment: Sequence[Any]) -> list[Expression]:

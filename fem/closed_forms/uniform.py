@@ -33,7 +33,7 @@ from ...geometry.solids import Part, Solid
 from ..harmonics.expansion import MultipoleExpansion, turned_expressions, turned_field, uniform_moments
 from ..harmonics.expressions import FieldExpressions, differentiated
 from ..harmonics.solid import FOUR_PI, contracted, entries, tensors, turned_entries
-from .round import resolved_distance, round_slope, round_tensor, segments_derivatives, segments_field
+from .round import BESIDE, outside_derivatives, round_slope, round_tensor, segments_field
 
 Expression = Any  # A heyoka expression
 SIGNS = (-1, 1)
@@ -295,7 +295,7 @@ class UniformField:
     def derivatives(self, points: Array, order: int) -> Array:
         """B (T) outside, μ0 H inside, and its derivatives up to `order` - 1, by their `entries` (n, k), at (n, 3) m.
 
-        1e-13 at any distance of cuboids and spheres, outside; of cylinders and rings 1e-10 from `resolved_distance` on.
+        1e-13 at any distance of cuboids and spheres, outside; of cylinders and rings 1e-9 from 0.01 radii on.
         """
         body, polarization = self.magnet.body, self.magnet.polarization
         if isinstance(body, Sphere):
@@ -314,7 +314,7 @@ class UniformField:
                 given[:3], given[3:] = local.T, body.half_edges[:, None]
                 found[~far] = _box_kernel(order)(given)[: len(weights)].T @ weights
             else:
-                near = segments_derivatives(local, body, polarization, order)
+                near = outside_derivatives(local, body, polarization, order)
                 turned = not np.array_equal(body.rotation, np.eye(3))
                 found[~far] = turned_entries(near, body.rotation) if turned else near
         return found
@@ -346,7 +346,7 @@ class UniformField:
         body = self.magnet.body
         if isinstance(body, Box | Part):
             return self.derivatives(points, order), np.zeros(len(points), bool)
-        close = np.asarray(body.distance(points) < (0.0 if isinstance(body, Sphere) else resolved_distance(body)))
+        close = np.asarray(body.distance(points) < (0.0 if isinstance(body, Sphere) else BESIDE * body.radius))
         found = np.zeros((len(points), order * (order + 2)))
         found[~close] = self.derivatives(points[~close], order)
         return found, close

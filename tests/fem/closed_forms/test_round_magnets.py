@@ -1,12 +1,13 @@
 """Cylinders, rings and spheres: against magpylib, the exact sphere, and laws of the field."""
 
+import heyoka as hy
 import magpylib
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from spinlev.fem.closed_forms.round import round_slope, round_tensor
-from spinlev.fem.closed_forms.uniform import remanent_field
+from spinlev.fem.closed_forms.uniform import UniformField, remanent_field
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.shapes import Cylinder, Sphere, ring, rotation_matrix
@@ -22,10 +23,6 @@ BODIES = {
     "thin ring": ring(10e-3, 9.5e-3, 2e-3),
     "sphere": Sphere(9.5e-3, (1e-3, 2e-3, 0.0), TURN),
 }
-
-
-SLOW = {"cylinder", "disc of 20 : 1", "ring", "thin ring"}  # the compiler takes ten seconds for each
-TABLES = [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in BODIES]
 
 
 def of_magpylib(magnet):
@@ -45,15 +42,14 @@ def places(body, nearest, count=3000, size=0.03):
     return points[distance >= nearest], points[distance < -1e-4]
 
 
-@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize("name", BODIES)
 def test_outside_from_1_mm_on_the_closed_form_is_that_of_magpylib(name):
     """1e-6 is asked for; within a twentieth of the radius of the axis magpylib has a series that errs by 1e-9."""
     magnet = Magnet(BODIES[name], POLARIZATION)
     outside, _ = places(magnet.body, 1e-3)
     field = rotor_table((magnet,), "cuboid").evaluate(outside)[0]
     theirs = of_magpylib(magnet).getB(outside)
-    error = np.linalg.norm(field - theirs, axis=1) / np.linalg.norm(theirs, axis=1)
-    assert error.max() < 1e-8
+    assert error(field, theirs) < 1e-8
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -87,17 +83,42 @@ def test_the_gradient_is_that_of_the_field_symmetric_and_without_trace(name):
     assert np.abs(slope - numeric).max() < 1e-6 * np.abs(slope).max()
 
 
-@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize("name", BODIES)
 def test_the_expressions_of_the_motion_agree_with_the_quadrature(name):
-    """Beyond `resolved_distance` the table evaluates segments, and far away moments: three ways, one field."""
+    """Its segments are the same for all places; the quadrature's are dense beside each."""
     magnet = Magnet(BODIES[name], POLARIZATION)
     outside, _ = places(magnet.body, 0.5 * magnet.body.volume ** (1 / 3), 1500, 0.08)
-    field, gradient = rotor_table((magnet,), "cuboid").evaluate(outside)
-    exact = remanent_field((magnet,), outside)
-    slope = round_slope(magnet.body, outside) @ magnet.polarization_in_rotor
-    size = np.linalg.norm(exact, axis=1)
-    assert (np.linalg.norm(field - exact, axis=1) / size).max() < 3e-9  # a thin ring is a small difference of cylinders
-    assert (np.linalg.norm(gradient - slope, axis=(1, 2)) / np.linalg.norm(slope, axis=(1, 2))).max() < 1e-7
+    position = hy.make_vars("x", "y", "z")
+    field, gradient = UniformField(magnet).expressions(position)
+    values = hy.cfunc([*field, *(part for row in gradient for part in row)], position)(
+        np.ascontiguousarray(outside.T)
+    ).T
+    assert error(values[:, :3], exact(magnet, outside)[0]) < 3e-9  # a thin ring is a small difference of cylinders
+    assert error(values[:, 3:], exact(magnet, outside)[1].reshape(-1, 9)) < 1e-7
+
+
+@pytest.mark.parametrize("distance", [0.0101, 0.05, 0.3, 1.5])
+@pytest.mark.parametrize("name", sorted(BODIES.keys() - {"sphere"}))
+def test_beside_a_magnet_the_table_has_the_field_that_the_quadrature_has(name, distance):
+    """At these distances, in radii; by one compiled rule, where the quadrature's is another in half of the plane."""
+    magnet = Magnet(BODIES[name], POLARIZATION)
+    radius = (1 + distance) * magnet.body.circumradius
+    points = magnet.body.center + np.random.default_rng(5).uniform(-radius, radius, (100_000, 3))
+    apart = magnet.body.distance(points) / magnet.body.radius
+    outside = points[(apart > distance) & (apart < 1.2 * distance)]
+    assert len(outside) > 30
+    field, gradient = UniformField(magnet).evaluate(outside)
+    size = np.array([[np.abs(part).max()] for part in exact(magnet, outside)])
+    assert (np.abs(field - exact(magnet, outside)[0]) / size[0]).max() < 1e-9
+    assert (np.abs(gradient - exact(magnet, outside)[1]) / size[1]).max() < 1e-9
+
+
+def exact(magnet, points):
+    return remanent_field((magnet,), points), round_slope(magnet.body, points) @ magnet.polarization_in_rotor
+
+
+def error(given, right):
+    return (np.linalg.norm(given - right, axis=1) / np.linalg.norm(right, axis=1)).max()
 
 
 def test_on_the_axis_and_in_line_with_the_mantle_nothing_is_singular():
