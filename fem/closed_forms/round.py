@@ -30,8 +30,7 @@ from ..harmonics.solid import FOUR_PI, entries, gauss_legendre
 # Nodes of the rule for distances from the mantle of at least so many radii: round-off
 RULES = ((0.8, 16), (0.1, 24), (1e-2, 32), (1e-5, 64), (0.0, 160))
 WIDEST, NARROWEST = 3.0, 1e-14
-TOGETHER = 500  # points at once beside all segments
-CHUNK = 400_000  # points times nodes at once
+TOGETHER = 500  # points at once, beside all segments of each
 # The same for both halves of a mantle at once, where field and slope outside are asked to 1e-9 from BESIDE radii off
 AROUND = ((0.8, 24), (0.3, 32), (0.05, 48), (0.0, 64))
 BESIDE = 1e-2
@@ -101,23 +100,18 @@ def _turned(tensor: Array, points: Array) -> Array:
 def _mantle(radius: float, half: float, points: Array, slopes: bool = False) -> tuple[Array, Array]:
     """H of polarisations across the axis, and B of one along it, at points turned to φ = 0; the same of the slopes."""
     rho, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
-    places, owner = np.unique(np.round(np.stack([rho, z]) / radius, 15), axis=1, return_inverse=True)
-    rho, z = places * radius
-    width = _width(radius, half, rho, z)
-    tensor, slope = np.empty((len(rho), 3, 3)), np.empty((len(rho) if slopes else 0, 3, 3, 3))
-    upper = np.inf
+    width, upper = _width(radius, half, rho, z), np.inf
+    tensor, slope = np.zeros((len(rho), 3, 3)), np.zeros((len(rho) if slopes else 0, 3, 3, 3))
     for least, nodes in RULES:
-        chosen = np.flatnonzero((width >= least) & (width < upper))
-        for part in np.array_split(chosen, max(1, len(chosen) * nodes // CHUNK)):
-            sums = _sums(radius, half, rho[part], z[part], width[part], nodes, slopes)
-            xx, yy, xz, zz = sums[:4]
-            nothing = np.zeros_like(xx)
-            rows = [[xx, nothing, xz], [nothing, yy, nothing], [xz, nothing, zz]]
-            tensor[part] = np.moveaxis(np.array(rows), -1, 0)
+        chosen, upper = np.flatnonzero((width >= least) & (width < upper)), least
+        for start in range(0, len(chosen), TOGETHER):
+            part = chosen[start : start + TOGETHER]
+            xx, yy, xz, zz, *bends = _sums(radius, half, rho[part], z[part], width[part], nodes, slopes)
+            tensor[part, 0, 0], tensor[part, 1, 1], tensor[part, 2, 2] = xx, yy, zz
+            tensor[part, 0, 2] = tensor[part, 2, 0] = xz
             if slopes:
-                slope[part] = _symmetric_slope(*sums[4:])
-        upper = least
-    return tensor[owner.ravel()], slope[owner.ravel()] if slopes else slope
+                slope[part] = _symmetric_slope(*bends)
+    return tensor, slope
 
 
 def _width(radius: float, half: float, rho: Array, z: Array) -> Array:
@@ -135,48 +129,45 @@ def _symmetric_slope(xxx: Array, xyy: Array, xxz: Array, yyz: Array, xzz: Array)
     return slope
 
 
-def _sums(
-    radius: float, half: float, rho: Array, z: Array, width: Array, nodes: int, slopes: bool
-) -> tuple[Array, ...]:
+def _sums(radius: float, half: float, rho: Array, z: Array, width: Array, nodes: int, slopes: bool) -> Array:
     """Sums over the mantle for points on the half plane φ = 0, where what is odd in φ vanishes.
 
     xx, yy, xz, zz of the tensor, and xxx, xyy, xxz, yyz, xzz of its slope.
     """
     u, weights = gauss_legendre(nodes)
     end = np.arcsinh(np.pi / width)[:, None]
-    u = (u + 1) / 2 * end
-    angle = width[:, None] * np.sinh(u)
-    weight = weights * end / 2 * width[:, None] * np.cosh(u) * 2 * radius / FOUR_PI
-    c, s, sine = np.cos(angle), np.sin(angle), np.sin(angle / 2)
-    p, q, *bends = _segment(half, rho[:, None], z[:, None], radius, sine, slopes)
-    dx, dy = (rho[:, None] - radius) + 2 * radius * sine**2, -radius * s
+    given = np.empty((7, len(rho), nodes))
+    given[:3], given[3], given[4] = np.array([rho, z, width])[:, :, None], (u + 1) / 2 * end, weights * end * radius
+    given[5:] = np.array([radius, half])[:, None, None]
+    return np.asarray(_half_kernel(slopes)(given.reshape(7, -1)).reshape(-1, len(rho), nodes).sum(axis=2))
+
+
+@cache
+def _half_kernel(slopes: bool) -> Any:
+    """Compiled: what `_sums` adds of a segment, by place (2, n), angle and strength (3, n) and body (2, n)."""
+    variables = hy.make_vars(*(f"v_{k}" for k in range(7)))
+    rho, z, width, u, strength, radius, half = variables
+    angle, weight = width * hy.sinh(u), strength / FOUR_PI * width * hy.cosh(u)
+    c, s, sine = hy.cos(angle), hy.sin(angle), hy.sin(0.5 * angle)
+    chord = 2.0 * radius * sine * sine
+    square, above, below = (rho - radius) ** 2 + 2.0 * rho * chord, z - half, z + half
+    a, b = hy.sqrt(square + above**2), hy.sqrt(square + below**2)
+    # ends + sides, which cancel beside the segment, free of that: ends - |sides| is small / (ends + |sides|)
+    sides, ends, reach, length = above * below, a * b, a + b, 2.0 * half
+    size = hy.sqrt(sides * sides)
+    gap = 2.0 * (square + square * (square + above**2 + below**2) / (ends + size) + sides + size)
+    p, q = 2.0 * length * reach / (ends * gap), 2.0 * length * z / (ends * reach)  # P, and 1/a - 1/b
+    dx, dy = (rho - radius) + chord, -radius * s
     wc, ws = weight * c, weight * s
-    charge = [wc * dx * p, ws * dy * p, wc * q, -weight * (c * dx + s * dy) * p]
-    if slopes:
-        steep, u_slope, v_slope = bends
-        charge += [wc * (p + dx * dx * steep), wc * (p + dy * dy * steep)]
-        charge += [wc * dx * u_slope, ws * dy * u_slope, wc * v_slope]
-    return tuple(part.sum(axis=1) for part in charge)
-
-
-def _segment(half: float, rho: Array, z: Array, radius: float, sine: Array, slopes: bool) -> tuple[Array, ...]:
-    """P and Q, and (dP/dD)/D, (dQ/dD)/D and dQ/dz, of segments at an angle with sin(φ/2), free of cancellation."""
-    square = (rho - radius) ** 2 + 4 * rho * radius * sine**2
-    above, below = z - half, z + half
-    a, b = np.sqrt(square + above**2), np.sqrt(square + below**2)
-    sides, ends = above * below, a * b
-    beside = sides < 0
-    # a b + above·below, where both cancel: (D⁴ + D² (above² + below²)) / (a b - above·below)
-    rest = square * (square + above**2 + below**2) / np.where(beside, ends - sides, 1.0)
-    gap = 2 * square + 2 * np.where(beside, rest, sides + ends)
-    reach, length = a + b, 2 * half
-    p = 2 * length * reach / (ends * gap)
-    q = length * 2 * z / (ends * reach)  # 1/a - 1/b
-    if not slopes:
-        return p, q
-    bend = 2 * reach**2 / gap
-    steep = -2 * length / (ends * gap) * ((b / a + bend) / a + (a / b + bend) / b)
-    return p, q, steep, -1 / a**3 + 1 / b**3, -above / a**3 + below / b**3
+    outputs = [wc * dx * p, ws * dy * p, wc * q, -weight * (c * dx + s * dy) * p]
+    if slopes:  # by (dP/dD)/D, (dQ/dD)/D and dQ/dz
+        bend = 2.0 * reach**2 / gap
+        steep = -2.0 * length / (ends * gap) * ((b / a + bend) / a + (a / b + bend) / b)
+        cubes = 1.0 / a**3, 1.0 / b**3
+        u_slope, v_slope = cubes[1] - cubes[0], below * cubes[1] - above * cubes[0]
+        outputs += [wc * (p + dx * dx * steep), wc * (p + dy * dy * steep)]
+        outputs += [wc * dx * u_slope, ws * dy * u_slope, wc * v_slope]
+    return hy.cfunc(outputs, variables)
 
 
 Expression = Any  # A heyoka expression
