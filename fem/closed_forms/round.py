@@ -136,26 +136,28 @@ def _sums(radius: float, half: float, rho: Array, z: Array, width: Array, nodes:
     """
     u, weights = gauss_legendre(nodes)
     end = np.arcsinh(np.pi / width)[:, None]
-    given = np.empty((7, len(rho), nodes))
-    given[:3], given[3], given[4] = np.array([rho, z, width])[:, :, None], (u + 1) / 2 * end, weights * end * radius
-    given[5:] = np.array([radius, half])[:, None, None]
-    return np.asarray(_half_kernel(slopes)(given.reshape(7, -1)).reshape(-1, len(rho), nodes).sum(axis=2))
+    given = np.empty((8, len(rho), nodes))
+    beyond = np.maximum((z - half) * (z + half), 0.0)
+    given[:4] = np.array([rho, z, beyond, width])[:, :, None]
+    given[4], given[5] = (u + 1) / 2 * end, weights * end * radius
+    given[6:] = np.array([radius, half])[:, None, None]
+    return np.asarray(_half_kernel(slopes)(given.reshape(8, -1)).reshape(-1, len(rho), nodes).sum(axis=2))
 
 
 @cache
 def _half_kernel(slopes: bool) -> Any:
-    """Compiled: what `_sums` adds of a segment, by place (2, n), angle and strength (3, n) and body (2, n)."""
-    variables = hy.make_vars(*(f"v_{k}" for k in range(7)))
-    rho, z, width, u, strength, radius, half = variables
+    """Compiled: what `_sums` adds of a segment, by place (3, n), angle and strength (3, n) and body (2, n)."""
+    variables = hy.make_vars(*(f"v_{k}" for k in range(8)))
+    rho, z, beyond, width, u, strength, radius, half = variables
     angle, weight = width * hy.sinh(u), strength / FOUR_PI * width * hy.cosh(u)
     c, s, sine = hy.cos(angle), hy.sin(angle), hy.sin(0.5 * angle)
     chord = 2.0 * radius * sine * sine
     square, above, below = (rho - radius) ** 2 + 2.0 * rho * chord, z - half, z + half
     a, b = hy.sqrt(square + above**2), hy.sqrt(square + below**2)
-    # ends + sides, which cancel beside the segment, free of that: ends - |sides| is small / (ends + |sides|)
     sides, ends, reach, length = above * below, a * b, a + b, 2.0 * half
-    size = hy.sqrt(sides * sides)
-    gap = 2.0 * (square + square * (square + above**2 + below**2) / (ends + size) + sides + size)
+    # ends - |sides|, which cancel, and sides + |sides|, `beyond` twice, which a fused product would not let cancel
+    rest = square * (square + above**2 + below**2) / (ends + hy.sqrt(sides * sides))
+    gap = 2.0 * (square + rest + 2.0 * beyond)
     p, q = 2.0 * length * reach / (ends * gap), 2.0 * length * z / (ends * reach)  # P, and 1/a - 1/b
     dx, dy = (rho - radius) + chord, -radius * s
     wc, ws = weight * c, weight * s

@@ -226,38 +226,40 @@ def solve_rotor(
     known = cells or [cells_of(body.body, np.inf) for body in bodies]
     meshed = [symmetry.to_frame(shifted_magnet(p, s)) for whole, s in zip(cut, shifts, strict=True) for p in whole]
     mesh, system, layers = _meshed_system(meshed, refinement, planes, [magnet.body for magnet in seen])
-    total: list[Coefficients] = []
     solutions = []
     owners = [k for k, whole in enumerate(cut) for _ in whole]
     groups = [[magnet.polarization_in_rotor for magnet in group] for group in (magnets, carriers or magnets)]
     for signs, (own, sourced) in parity_parts(seen, planes, np.array(groups) @ symmetry.axes):
         sources = [Magnet(m.body, m.body.rotation.T @ j) for m, j in zip(seen, sourced, strict=True)]
         rest = (own - sourced)[owners]
-        solution = solve(system, sources, formulation, refinement.boundary_degree, signs, rest)
-        solutions.append(solution)
-        if formulation == "direct":
-            part = [rotated_harmonics(trace_moments(solution), symmetry.axes)]
-        else:
-            part = _of_cells(solution, symmetry, known, shifts[owners], degree)
-        total = [a + b for a, b in zip(total, part, strict=True)] if total else part
+        solutions.append(solve(system, sources, formulation, refinement.boundary_degree, signs, rest))
     spheres = tuple((c, float(r)) for own in known for c, r in zip(own.centers, own.radii, strict=True))
-    size = degree
     if formulation == "direct":
-        spheres, size = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
-    coefficients = tuple(total or [np.zeros((size + 1, size + 1), complex)] * len(spheres))
-    return RotorSolution(coefficients, spheres, mesh, system.unknowns, layers, symmetry, tuple(solutions))
+        spheres, degree = ((symmetry.center + symmetry.axes @ mesh.center, mesh.unit),), refinement.boundary_degree
+    if not solutions:
+        total = [np.zeros((degree + 1, degree + 1), complex)] * len(spheres)
+    elif formulation == "direct":
+        total = [rotated_harmonics(np.sum([trace_moments(one) for one in solutions], axis=0), symmetry.axes)]
+    else:
+        total = _of_cells(solutions, symmetry, known, shifts[owners], degree)
+    return RotorSolution(tuple(total), spheres, mesh, system.unknowns, layers, symmetry, tuple(solutions))
 
 
 def _of_cells(
-    solution: Solution, symmetry: Symmetry, cells: Sequence[Cells], shifts: Array, degree: int
+    solutions: Sequence[Solution], symmetry: Symmetry, cells: Sequence[Cells], shifts: Array, degree: int
 ) -> list[Coefficients]:
-    """Coefficients (T) of -(μ - 1) ∇ψ of every cell of every piece, about its centre, in the rotor's frame."""
-    whole, found = reaction_moments(solution, degree), list[Coefficients]()
+    """Coefficients (T) of -(μ - 1) ∇ψ of every cell of every piece, about its centre, in the rotor's frame.
+
+    Of the sum of solutions on one mesh, whose integration points are the same.
+    """
+    undivided, found = any(len(own.radii) == 1 for own in cells), list[Coefficients]()
+    parts = [reaction_moments(solution, degree) for solution in solutions] if undivided else []
     for k, (own, shift) in enumerate(zip(cells, shifts, strict=True)):
         if len(own.radii) == 1:
-            found.append(rotated_harmonics(whole[k], symmetry.axes))
+            found.append(rotated_harmonics(np.sum([part[k] for part in parts], axis=0), symmetry.axes))
             continue
-        points, weights, values = reaction_dipoles(solution, k)
+        points, weights, values = reaction_dipoles(solutions[0], k)
+        values = values + sum(reaction_dipoles(other, k)[2] for other in solutions[1:])
         places = symmetry.center + points @ symmetry.axes.T - shift
         found += by_cells(places, weights, values @ symmetry.axes.T, own, degree)
     return found

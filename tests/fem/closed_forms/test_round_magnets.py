@@ -126,3 +126,14 @@ def test_on_the_axis_and_in_line_with_the_mantle_nothing_is_singular():
     points = np.array([[0, 0, 0.02], [0, 0, 0.0], [5e-3, 0, -0.012], [0, 5e-3, 0.006], [0, 0, -5.1e-3]])
     field = remanent_field((magnet,), points) + np.outer(magnet.body.distance(points) < 0, POLARIZATION)
     assert np.abs(field - of_magpylib(magnet).getB(points)).max() < 1e-12
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_at_the_mantle_the_field_of_either_side_goes_on(side):
+    body, angle = BODIES["ring"], np.linspace(0.1, 3.0, 5)
+    around = np.column_stack([np.cos(angle), np.sin(angle)])
+    near, far = (
+        round_tensor(body, np.column_stack([(body.radius + side * off) * around, np.full(5, 1e-3)])) @ POLARIZATION
+        for off in (1e-11, 1e-8)
+    )
+    assert np.abs(near - far).max() < 1e-5
