@@ -61,7 +61,7 @@ class Effort(NamedTuple):
 
 # With the weights fitted, few magnets' force and torque are met to 1e-3 of all that is added, many magnets' to 2e-2.
 # With 10 nodes the response of a cube with μr = 1.05 to a dipole errs by at most 7e-4 at any distance, with 14 by 6e-4.
-FEW_MAGNETS = Effort(7.2, 2, 2, (10, 14), 16, 2, True, 2, 1e-4, 1e-5)
+FEW_MAGNETS = Effort(7.2, 2, 2, (10, 14), 16, 2, True, 2, 3e-4, 1e-5)
 MANY_MAGNETS, MANY = Effort(5.5, 0, 0, (4, 6), 6, 1, False, 1, 1e-3, 1e-4), 4
 
 
