@@ -248,17 +248,22 @@ def _rotor_fit(
     whole = (unit_dipole_fields(np.concatenate(inner), places) * size[:, None, None]).reshape(len(size), -1)
     # a lone magnet's points do it alone; the coupling is symmetric, and counted once
     a, b = np.triu_indices(whole.shape[1] if len(grids) > 1 else 0)
-    rows = np.concatenate([*columns, np.empty((len(first), len(a)))], axis=1)
-    alone = rows.shape[1] - len(a)
-    for start in range(0, len(rows), CHUNK):  # together they would take a gigabyte
-        one, other = (whole[ends[start : start + CHUNK]] for ends in (first, second))
-        rows[start : start + CHUNK, alone:] = one[:, a] * other[:, b] + (a != b) * one[:, b] * other[:, a]
-    rows *= counts[:, None]
     direct, beyond = (part[first, second] * size[first] * size[second] * counts for part in (direct, beyond))
-    small = np.arange(rows.shape[1]) >= alone
-    ends = np.cumsum([column.shape[1] for column in columns])
-    found = least_squares(rows, beyond, small)
-    found[:alone] += least_squares(rows[:, :alone], direct, small[:alone])
+    alone = np.concatenate(columns, axis=1) * counts[:, None]
+    ends, number = np.cumsum([column.shape[1] for column in columns]), alone.shape[1]
+    if len(a):
+        square, right = np.zeros([number + len(a)] * 2), np.zeros(number + len(a))
+        for start in range(0, len(alone), CHUNK):  # all rows would take hundreds of megabytes
+            some = slice(start, start + CHUNK)
+            one, other = whole[first[some]], whole[second[some]]
+            coupled = one[:, a] * other[:, b] + (a != b) * one[:, b] * other[:, a]
+            rows = np.concatenate([alone[some], counts[some, None] * coupled], axis=1)
+            square += rows.T @ rows
+            right += beyond[some] @ rows
+        found = _held(square, right, len(alone), np.arange(len(square)) >= number)
+    else:
+        found = least_squares(alone, beyond, np.zeros(number, bool))
+    found[:number] += least_squares(alone, direct, np.zeros(number, bool))
     parts = iter(np.split(found, ends))
     made = [
         replace(grid, strengths=np.stack([kind @ next(parts) for _ in range(3)], axis=1))
@@ -438,12 +443,20 @@ def least_squares(columns: Array, values: Array, small: Array, cost: float = PEN
     small : (k,) which weights are kept small: by themselves they are hardly determined
     cost : of one that is, by an error of the size of all values
     """
-    square = columns.T @ columns
+    if not small.any() and len(small) <= FEW_WEIGHTS:
+        size = np.linalg.norm(columns, axis=0)
+        size[size == 0] = 1.0
+        return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
+    return _held(columns.T @ columns, columns.T @ values, len(values), small, cost)
+
+
+def _held(square: Array, right: Array, values: int, small: Array, cost: float = PENALTY) -> Array:
+    """`least_squares` by the normal equations (k, k), which it overwrites, and (k,) of so many `values`."""
     size = np.sqrt(np.diag(square))
     size[size == 0] = 1.0
-    if not small.any() and len(size) <= FEW_WEIGHTS:
-        return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
-    square /= np.outer(size, size)  # a copy of the columns would take hundreds of megabytes
-    free = FREE if len(values) >= ENOUGH * np.count_nonzero(np.logical_not(small)) else FEW
+    square /= size
+    square /= size[:, None]
+    free = FREE if values >= ENOUGH * np.count_nonzero(np.logical_not(small)) else FEW
     square[np.diag_indices_from(square)] += np.where(small, cost, free) ** 2
-    return np.asarray(scipy.linalg.solve(square, columns.T @ values / size, assume_a="pos") / size)
+    factor = scipy.linalg.cho_factor(square.T, overwrite_a=True, check_finite=False)  # columns first, as it wants them
+    return np.asarray(scipy.linalg.cho_solve(factor, right / size) / size)
