@@ -51,10 +51,10 @@ FORMATS = {
     "slab": 3,
     "edges": 2,
     "rotor-losses": 2,
-    "floater-currents": 1,
+    "floater-currents": 2,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 7,
+    "equilibria": 8,
     "experiment": 2,
     "code": 1,
 }

@@ -21,11 +21,12 @@ from ..dynamics.motion.floater_effects import (
     swinging,
 )
 from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS
-from ..fem.floater_metal import current_shape
+from ..fem.floater_metal import DIPOLE, current_shape
 from ..fem.rotor.floater import floater_sources, shares
 from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
 from ..geometry.common import MAGNET_CONDUCTIVITY, ComputationError
 from ..geometry.scene.contents import Scene
+from ..geometry.scene.floater import Floater
 from .levitation import Levitation
 from .words import spoken_time
 
@@ -108,13 +109,22 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
     there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
     try:
         doubt = slow_error(there)
-        missed = 0.0 if floater.is_sphere else current_shape(floater).error
+        missed = 0.0 if floater.is_sphere else _missed(floater, doubt)
     except ComputationError as error:  # it cannot be meshed
         return ListedEffect(FLOATER_CURRENTS, False, None, None, f"no floater.conductivity_S_m; not known: {error}")
     if first and scene.frequency and doubt <= SLOW_ENOUGH:
         growth = growth_by_floater(there, levitation.table, first, bool(floater.conductivity))
     why = _why("floater.conductivity_S_m", bool(floater.conductivity), growth, doubt)
     return ListedEffect(FLOATER_CURRENTS, bool(floater.conductivity), 0.0, growth, why, doubt + missed)
+
+
+def _missed(floater: Floater, doubt: float) -> float:
+    """Relative error of the currents' effect by a shape's tensors and delays, where they are slow to `slow_error`.
+
+    That is the square of 2ωμ0σR² over 105, and by the slowest delay, (2/21) μ0σR², an effect of delays is 2ω of it.
+    """
+    shape = current_shape(floater)
+    return shape.error + min(1.0, DIPOLE * float(np.sqrt(105 * doubt))) * shape.delay_error
 
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:

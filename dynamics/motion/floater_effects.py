@@ -38,8 +38,8 @@ large against R all is that of a thin field, a loss κ |Ḃ|² + (2/21) R² κ |
 torque are.  A body of another shape has tensors of field and gradient in place of κ and (2/21) R² κ, and where it has
 no centre of symmetry one between the two (`fem.floater_metal`).  Each part of a uniform field's has the shares c of a
 ball and delays τ that are longer or shorter by one ratio, such that B̈ has the right factor; so it is exact for a
-slow turn up to the second order, and a gradient's delays are right in the mean.  Degree 3 is left out; it changes the
-growth rates of modes by 1 to 2 % of this effect's at 14 to 22 mm, more nearer by.
+slow turn up to the second order; delays of the gradient, and of what joins it to the field, are right in the mean.
+Degree 3 is left out; it changes the growth rates of modes by 1 to 2 % of this effect's at 14 to 22 mm, more nearer by.
 """
 
 from collections.abc import Sequence
@@ -51,7 +51,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...fem.closed_forms.eddy_bodies import skin_number
-from ...fem.floater_metal import GRADIENTS, current_shape
+from ...fem.floater_metal import DIPOLE, GRADIENTS, QUADRUPOLE, current_shape
 from ...fem.harmonics.interior import LocalField
 from ...fem.rotor.floater import FloaterSources, force_and_torque, polarizability_tensor
 from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable
@@ -371,6 +371,7 @@ class FloaterCurrents:
     gradient: Numbers = ()  # (5, 5) by `GRADIENTS`; a ball's has none
     gradient_delay: float = 1.0
     coupling: Numbers = ()  # (3, 5) of field and gradient; none of a body with a centre of symmetry
+    coupling_delay: float = 1.0  # by a ball's of the field
 
     @classmethod
     def of(cls, scene: Scene) -> "FloaterCurrents | None":
@@ -386,13 +387,14 @@ class FloaterCurrents:
             gradient=tuple(shape.gradient.ravel().tolist()),
             gradient_delay=shape.gradient_delay,
             coupling=tuple(shape.coupling.ravel().tolist()) if shape.coupling.any() else (),
+            coupling_delay=shape.coupling_delay,
         )
 
     @property
     def compiled_in(self) -> Numbers:
         """Numbers in the code of the equations, see `Rates.elsewhere`."""
         tensors = (number for tensor in self.tensors for number in tensor)
-        return (*self.delays, *tensors, *self.gradient, self.gradient_delay, *self.coupling)
+        return (*self.delays, *tensors, *self.gradient, self.gradient_delay, *self.coupling, self.coupling_delay)
 
     def added(self, motion: Motion) -> Added:
         length, inertia = hy.par[Parameter.LENGTH], hy.par[Parameter.INERTIA]
@@ -405,11 +407,16 @@ class FloaterCurrents:
             change = _changed_field(lag, motion.field, moving, delay)
             dipole = add(dipole, by_tensor(np.reshape(tensor, (3, 3)), change, motion))
         sheared = _turned_gradient(lag, gradient, self.gradient_delay)
-        changes = [[dot(bend[i][j], drift) - sheared[i][j] for j in range(3)] for i in range(3)]
-        share, changed = GRADIENT, changes
+        bent = [[dot(bend[i][j], drift) for j in range(3)] for i in range(3)]
+        changed = [[bent[i][j] - sheared[i][j] for j in range(3)] for i in range(3)]
+        share, coupled = GRADIENT, None
+        if self.coupling:
+            change = _changed_field(lag, motion.field, moving, self.coupling_delay)
+            sheared = _turned_gradient(lag, gradient, self.coupling_delay * DIPOLE / QUADRUPOLE)
+            coupled = _Coupled(change, [[bent[i][j] - sheared[i][j] for j in range(3)] for i in range(3)])
         if self.gradient:
             share = 1.0
-            dipole, changed = self._of_shape(dipole, change, changes, motion)
+            dipole, changed = self._of_shape(dipole, changed, coupled, motion)
         pull = [hy.sum([changed[i][j] * bend[i][j][k] for i in range(3) for j in range(3)]) for k in range(3)]
         force = [
             -tilt * inertia * (dot([gradient[i][k] for i in range(3)], dipole) + share * pull[k]) for k in range(3)
@@ -434,21 +441,26 @@ class FloaterCurrents:
         return [w + less * m for w, m in zip(motion.lag, motion.moment, strict=True)]
 
     def _of_shape(
-        self, dipole: Vector, change: Vector, changes: Matrix, motion: Motion
+        self, dipole: Vector, changes: Matrix, coupled: "_Coupled | None", motion: Motion
     ) -> tuple[list[hy.expression], Matrix]:
-        """The dipole with what the gradient's change adds, and the quadrupole (3, 3), of their `changes`."""
+        """The dipole with what the gradient's change adds, and the quadrupole (3, 3), of the `changes`."""
         loss, mixed = np.reshape(self.gradient, (5, 5)), np.reshape(self.coupling or np.zeros(15), (3, 5))
         if motion.axes is None:
-            return _of_round(loss, mixed, dipole, change, changes, motion.moment)
+            return _of_round(loss, mixed, dipole, changes, coupled, motion.moment)
         axes, columns = motion.axes, [[row[k] for row in motion.axes] for k in range(3)]
-        halves = [[dot(changes[i], column) for i in range(3)] for column in columns]
-        own = [[dot(halves[j], columns[i]) for j in range(3)] for i in range(3)]
-        parts = [hy.sum([float(g[i, j]) * own[i][j] for i, j in np.argwhere(g)]) for g in GRADIENTS]
+
+        def along_axes(matrix: Matrix) -> list[hy.expression]:
+            halves = [[dot(matrix[i], column) for i in range(3)] for column in columns]
+            own = [[dot(halves[j], columns[i]) for j in range(3)] for i in range(3)]
+            return [hy.sum([float(g[i, j]) * own[i][j] for i, j in np.argwhere(g)]) for g in GRADIENTS]
+
+        parts = along_axes(changes)
         answers = [hy.sum([float(row[k]) * parts[k] for k in range(5)]) for row in loss]
-        if self.coupling:
+        if coupled:
+            parts = along_axes(coupled.gradient)
             more = [hy.sum([float(row[k]) * parts[k] for k in range(5)]) for row in mixed]
             dipole = add(dipole, [dot(row, more) for row in axes])
-            seen = [dot(column, change) for column in columns]
+            seen = [dot(column, coupled.field) for column in columns]
             answers = add(answers, [hy.sum([float(row[k]) * seen[k] for k in range(3)]) for row in mixed.T])
         whole = [[hy.sum([float(g[i, j]) * a for g, a in zip(GRADIENTS, answers, strict=True) if g[i, j]])
                   for j in range(3)] for i in range(3)]  # fmt: skip
@@ -456,29 +468,43 @@ class FloaterCurrents:
         return list(dipole), [[dot(halves[j], axes[i]) for j in range(3)] for i in range(3)]
 
 
+@dataclass(frozen=True, eq=False)
+class _Coupled:
+    """Changes of field (3) and gradient (3, 3) with the delay of what joins them."""
+
+    field: Vector
+    gradient: Matrix
+
+
 def _of_round(
-    loss: Array, mixed: Array, dipole: Vector, change: Vector, changes: Matrix, moment: Vector
+    loss: Array, mixed: Array, dipole: Vector, changes: Matrix, coupled: _Coupled | None, moment: Vector
 ) -> tuple[list[hy.expression], Matrix]:
     """See `FloaterCurrents._of_shape`, of a body that is round about its moment m̂ with `loss` and coupling `mixed`.
 
     Of the gradient's change C there are m̂·C m̂, C m̂ across m̂, and the rest.
     """
     rest, tilted, straight = (float(loss[k, k]) for k in (0, 3, 1))
-    pointed = [dot(row, moment) for row in changes]
-    along = dot(pointed, moment)
-    across = [p - along * m for p, m in zip(pointed, moment, strict=True)]
+    along, across = _pointed(changes, moment)
     lengthwise, sideways = 1.5 * (straight - rest) * along, [(tilted - rest) * a for a in across]
-    if mixed.any():
+    if coupled:
         one, two = float(mixed[2, 1]), float(mixed[0, 3])
+        along, across = _pointed(coupled.gradient, moment)
         dipole = [d + 1.5**0.5 * one * along * m + 2**0.5 * two * a
                   for d, m, a in zip(dipole, moment, across, strict=True)]  # fmt: skip
-        seen = dot(change, moment)
+        seen = dot(coupled.field, moment)
         lengthwise = lengthwise + 1.5**0.5 * one * seen
-        sideways = add(sideways, [0.5**0.5 * two * (c - seen * m) for c, m in zip(change, moment, strict=True)])
+        sideways = add(sideways, [0.5**0.5 * two * (c - seen * m) for c, m in zip(coupled.field, moment, strict=True)])
     whole = [[rest * changes[i][j] + lengthwise * moment[i] * moment[j] + sideways[i] * moment[j]
               + moment[i] * sideways[j] - (lengthwise / 3.0 if i == j else 0.0) for j in range(3)]
              for i in range(3)]  # fmt: skip
     return list(dipole), whole
+
+
+def _pointed(changes: Matrix, moment: Vector) -> tuple[hy.expression, list[hy.expression]]:
+    """m̂·C m̂ and C m̂ across m̂ (3) of a matrix C."""
+    pointed = [dot(row, moment) for row in changes]
+    along = dot(pointed, moment)
+    return along, [p - along * m for p, m in zip(pointed, moment, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,29 +88,36 @@ def test_a_ball_that_is_meshed_is_a_ball():
     assert found.delays == pytest.approx([1.0], abs=2e-3)
     assert found.gradient_delay == pytest.approx(1.0, abs=5e-3)
     assert not found.coupling.any()
-    assert max(found.error, found.delay_error) < 2e-3
+    assert found.error < 2e-3
+    assert found.delay_error < 1e-2
 
 
-def self_inductance(radius, height):
-    """(1/4π) ∫∫ J·J'/|r - r'| of a cylinder with J = ρ/2 about its axis, as coaxial loops (J. C. Maxwell), m⁷."""
-    (x, w), (u, v) = np.polynomial.legendre.leggauss(200), np.polynomial.legendre.leggauss(6)
-    loops, current, heights = radius * (x + 1) / 2, w * radius**2 * (x + 1) / 8, u * height / 2
-    total = 0.0
-    for above, more in zip(heights, v * height / 2, strict=True):
-        for below, less in zip(heights, v * height / 2, strict=True):
-            apart = above - below or 1e-3 * height
-            square = 4 * np.outer(loops, loops) / (np.add.outer(loops, loops) ** 2 + apart**2)
-            k = np.sqrt(square)
-            mutual = (2 / k - k) * scipy.special.ellipk(square) - 2 / k * scipy.special.ellipe(square)
-            total += more * less * current @ (np.sqrt(np.outer(loops, loops)) * mutual) @ current
-    return total
+def own_field(radius, height):
+    """(1/4π) ∫∫ J·J'/|r - r'| of a cylinder with J = ρ/2 about its axis, m⁷.
+
+    By Hankel's transform of J, R² J₂(kR)/2k, in whose sheets the potential falls as exp(-k|z|); over a sheet's π ∫ dk.
+    """
+    edges = np.concatenate([np.arange(0.0, 400.0, 2.0), np.geomspace(400.0, 1e6, 400)])
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    x = edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2  # k R
+    depth = x * height / radius
+    sheets = np.where(depth < 1e-3, depth**2 * (1 - depth / 3) / 2, depth - 1 + np.exp(-depth))
+    values = scipy.special.jv(2, x) ** 2 * sheets / x**4
+    return np.pi / 2 * radius**7 * np.sum(np.diff(edges)[:, None] / 2 * weights * values)
 
 
-@pytest.mark.parametrize(("height", "tolerance"), [(10e-3, 1e-2), (2e-3, 5e-3), (0.5e-3, 2e-2)])
-def test_the_own_field_of_currents_about_the_axis(height, tolerance):
-    """Of a disc and a cylinder."""
-    own = loss_and_delay([(Cylinder(RADIUS, height), 1.0)])[2]
-    assert own[2, 2] == pytest.approx(self_inductance(RADIUS, height), rel=tolerance)
+FLAT = [pytest.param(height, marks=pytest.mark.slow) for height in (0.5e-3, 0.2e-3, 0.1e-3, 0.05e-3)]
+
+
+@pytest.mark.parametrize("height", [10e-3, 2e-3, *FLAT])
+def test_the_own_field_of_currents_about_the_axis(height):
+    """Of cylinders and discs of 12.7 mm: within what is stated."""
+    body = Cylinder(6.35e-3, height)
+    (_, _, own, _), stated = loss_and_delay([(body, 1.0)]), current_shape(floater(body)).delay_error
+    missed = own[2, 2] / own_field(6.35e-3, height) - 1
+    print(f"\n{1e3 * height:g} mm: {missed:+.2%}, stated {stated:.2%} of the mean delay in a field in any direction")
+    assert abs(missed) * own[2, 2] < stated * np.trace(own[:3, :3]) / 3
+    assert missed == pytest.approx(0.0, abs=1e-3 if height > 1e-3 else 0.1)
 
 
 def test_the_delay_of_a_long_rod():

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import spinlev as sl
-from spinlev.geometry.common import InputError
+from spinlev.dynamics.motion.floater_effects import FLOATER_CURRENTS, slow_error
+from spinlev.fem.floater_metal import current_shape
+from spinlev.geometry.common import MU_0, InputError
 from spinlev.studies.effects import listed_effects
 
 MATERIAL = {"remanence_T": 1.305, "recoil_permeability": 1.0, "density_kg_m3": 7500.0}
@@ -61,6 +63,19 @@ def test_force_is_that_which_moves_the_energy_of_a_brick():
 def test_what_is_no_pose_is_told(pose, said):
     with pytest.raises(InputError, match=said):
         sl.floater_force(made(), *pose, model="cuboid")
+
+
+def test_the_error_shown_with_a_discs_currents_has_that_of_their_delays():
+    """By the part that delays have: 2ω of the slowest one."""
+    scene = made({**DISC, "conductivity_S_m": 6.7e6}, start=HELD)
+    listed = listed_effects(sl.Levitation(scene, sl.Models("dipole", "none")), ())
+    shown = next(effect for effect in listed if effect.name == FLOATER_CURRENTS)
+    shape = current_shape(scene.floater)
+    slowest = 2 / 21 * MU_0 * 6.7e6 * scene.floater.radius**2 * shape.delays.max()
+    part = 2 * scene.angular_velocity * slowest
+    rest = shown.motion_error - slow_error(scene) - shape.error
+    assert rest == pytest.approx(part * shape.delay_error, rel=1e-9)
+    assert part > 0.01
 
 
 @pytest.mark.parametrize("keys", [pytest.param(BRICK, marks=pytest.mark.slow), DISC], ids=["brick", "disc"])

@@ -17,7 +17,7 @@ from spinlev.dynamics.motion.equations import equations_of_motion, parameters
 from spinlev.dynamics.motion.floater_effects import FLOATER_CURRENTS, SLOW_ENOUGH, FloaterCurrents, slow_error
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales, State, matrices_of
-from spinlev.fem.floater_metal import GRADIENTS, conducting, loss_and_delay
+from spinlev.fem.floater_metal import GRADIENTS, conducting, current_shape, loss_and_delay, round_part
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0, InputError
 from spinlev.geometry.magnets import Magnet, horizontal, tilt
@@ -152,6 +152,49 @@ def test_a_meshed_ball_feels_what_a_sphere_does():
     assert late > 1.5
     for part in (slice(3), slice(3, 6)):
         assert found[1][part] == pytest.approx(found[0][part], abs=2e-3 * np.linalg.norm(found[0][part]))
+
+
+HALVES = [Box((9e-3, 10e-3, 5e-3), (0.0, 0.0, height)) for height in (-2.5e-3, 2.5e-3)]
+UNEVEN = {
+    "half of copper": [piece(half, conductivity) for half, conductivity in zip(HALVES, (5.8e7, 0.0), strict=True)],
+    "a step": [piece(Box((10e-3, 10e-3, 4e-3)), 5.8e7), piece(Box((4e-3, 10e-3, 6e-3), (3e-3, 0.0, 5e-3)), 5.8e7)],
+    "round": [piece(Cylinder(5e-3, 4e-3), 5.8e7), piece(Cylinder(3e-3, 4e-3, np.array([0.0, 0.0, 4e-3])), 2e7)],
+}
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+def test_what_is_late_in_a_body_without_a_centre_is_the_own_field_of_its_currents(name):
+    """A slow turn at rest: L ü of field and gradient, with one delay for the gradient, and one for what joins the two.
+
+    What that misses of L is within what is stated.
+    """
+    body, lag, small = Floater.composed(UNEVEN[name]), np.array([30.0, -800.0, -490.0]), 1e-4
+    state, shape = state_of(body, np.zeros(3), lag), current_shape(body)
+    axes, scene = body.axes(state.moment) if body.round else state.axes, scene_of(body)
+    found = (wrench(scene, state, late=small) - wrench(scene, state)) / small
+
+    def seen(place, turn):
+        return field_seen(body, state.position + place, Rotation.from_rotvec(turn).as_matrix() @ axes)
+
+    zero, step = np.zeros(3), 1e-5
+    now, ends = seen(zero, zero), [seen(zero, sign * step * lag) for sign in (-1, 1)]
+    change = (ends[0] - 2 * now + ends[1]) / step**2
+    slopes = [(seen(h, zero) - seen(-h, zero)) / 2e-7 for h in 1e-7 * np.eye(3)]
+    slopes = np.array(slopes + [(seen(zero, h) - seen(zero, -h)) / 2e-6 for h in 1e-6 * np.eye(3)])
+    loss, _, own, _ = loss_and_delay(conducting(body))
+    own, loss = (round_part(matrix) if body.round else matrix for matrix in (own, loss))
+    known = own.copy()
+    known[3:, 3:] = np.trace(own[3:, 3:]) / np.trace(loss[3:, 3:]) * loss[3:, 3:]
+    mixed = np.sum(own[:3, 3:] * loss[:3, 3:]) / np.sum(loss[:3, 3:] ** 2) * loss[:3, 3:]
+    known[:3, 3:], known[3:, :3] = mixed, mixed.T
+    unit = MU_0 * body.conductivity**2
+    expected, exact = (unit * slopes @ matrix @ change for matrix in (known, own))
+    units, in_radii = np.repeat([1.0, body.radius], 3), np.repeat([1.0, body.radius], [3, 5])
+    many = np.linalg.norm(slopes * in_radii, axis=1) * np.linalg.norm(change * in_radii)
+    sizes = unit * np.trace(own[:3, :3]) / 3 * many
+    print(f"\n{name}: {np.abs(found - exact) / sizes} of what a field does, stated {shape.delay_error:.3f}")
+    assert found / units == pytest.approx(expected / units, abs=5e-3 * np.linalg.norm(expected / units))
+    assert (np.abs(found - exact) < (shape.delay_error + 5e-3) * sizes).all()
 
 
 def test_a_brick_that_turns_freely_loses_as_it_says():
