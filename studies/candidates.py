@@ -25,7 +25,7 @@ from ..dynamics.continuation.frequencies import (
     tracked_end,
 )
 from ..dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
-from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError, Survey, nearest_of
+from ..dynamics.equilibria.equilibrium import LOCKED, Equilibrium, EquilibriumError, Survey, nearest_of
 from ..dynamics.equilibria.path import NEAR, NEWTON_STEPS
 from ..dynamics.equilibria.search import FixedPoints, check_turning, field_doubts, survey_of
 from ..dynamics.motion.equations import parameters
@@ -94,15 +94,19 @@ class Candidate:
 
     @cached_property
     def ends(self) -> tuple[BranchPoint, BranchPoint]:
-        """The equilibria at which stable levitation ends below and above the frequency, without the plate."""
-        scene = replace(self.levitation.still, plate=None)
-        if scene.gravity[:2].any() or not scene.floater.round:
+        """The equilibria at which stable levitation ends below and above the frequency, without the plate.
+
+        Of a floater that is not round about its moment those of its mean over turns about that.
+        """
+        followed = self.levitation if self.levitation.scene.floater.round else self.levitation.mean
+        scene = replace(followed.still, plate=None)
+        if scene.gravity[:2].any() or self.bare.kind == LOCKED:
             raise InputError(
-                "Input margin must be asked for where gravity is along the axis and the floater round about its "
-                "moment; instead this scene's is not."
+                "Input margin must be asked for where gravity is along the axis and the equilibrium not frequency-"
+                "locked; instead this scene's is not so."
             )
-        family, found = by_frequency(scene, self.levitation.rates, self.levitation.spin), []
-        start = Scales.of(self.levitation.still).pack(self.bare.start)
+        family, found = by_frequency(scene, followed.rates, self.levitation.spin), []
+        start = Scales.of(scene).pack(self.bare.start)
         for number, border in enumerate((LOWEST, HIGHEST)):
             end = None
             if self.near is not None and "ends" in self.near.__dict__:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..dynamics.continuation.branch import BranchPoint
 from ..dynamics.continuation.frequencies import BORDER, CONTACT, stable_ranges
 from ..dynamics.equilibria.derivatives import Implicit, Nearby, Tangent
-from ..dynamics.equilibria.equilibrium import FOLD, LOCKED, Equilibrium, EquilibriumError
+from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, LOCKED, Equilibrium, EquilibriumError
 from ..dynamics.equilibria.search import of_whole_body
 from ..dynamics.motion.events import rotor_gap
 from ..dynamics.motion.rotor_effects import Mutual
@@ -303,11 +303,13 @@ def range_ends(gradient: Gradient, keys: Sequence[str]) -> tuple[Array, Array, A
 
 
 def equilibrium_at(levitation: Levitation, point: BranchPoint) -> Equilibrium:
-    """The equilibrium of a point of a branch, at whose frequency the scene is."""
-    scales = Scales.of(levitation.still)
-    return Equilibrium(
-        scales.unpack(point.state), point.spin, residual=0.0, position_error=0.0, **point.motion.in_seconds(scales.time)
-    )
+    """The equilibrium of a point of a branch, at whose frequency the scene is, of the mean if that is not round."""
+    scene, kind = levitation.still, ""
+    if not scene.floater.round:
+        scene, kind = replace(scene, floater=scene.floater.averaged), AVERAGED
+    scales = Scales.of(scene)
+    motion, state = point.motion.in_seconds(scales.time), scales.unpack(point.state)
+    return Equilibrium(state, point.spin, residual=0.0, position_error=0.0, kind=kind, **motion)
 
 
 def axial_stiffness(fixed: Equilibrium) -> float:

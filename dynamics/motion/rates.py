@@ -60,7 +60,7 @@ class Rates:
         whole, first = interaction_of(table), self._local.first + self._local.count
         # what effects have in their code beside their kind, as places of dipoles, must be the same
         kinds = [[(one.name, getattr(one, "compiled_in", None)) for one in e] for e in (self._effects, whole.effects)]
-        if kinds[0] != kinds[1]:
+        if kinds[0] != kinds[1] or whole.turning != self.turning:
             return Rates(table, bool(self._level))
         found = copy(self)
         found.__dict__.pop("rough", None)

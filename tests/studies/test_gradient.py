@@ -18,10 +18,12 @@ import spinlev as sl
 from spinlev.dynamics.continuation.frequencies import stable_ranges
 from spinlev.dynamics.equilibria import derivatives
 from spinlev.dynamics.equilibria.balance import Balance, solve
+from spinlev.dynamics.equilibria.equilibrium import AVERAGED, LOCKED
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.scene.contents import Drag
 from spinlev.geometry.scene.files import changed
+from spinlev.studies.candidates import Candidate
 from spinlev.studies.cli.main import run
 from spinlev.studies.gradient import Gradient, range_ends
 from spinlev.studies.levitation import Levitation
@@ -288,3 +290,26 @@ def test_the_command_line_has_them(tmp_path):
     assert first["unit"] == "mm"
     with xr.open_dataset(tmp_path / "gradient.nc") as kept:
         assert 1e3 * float(kept.distance[0].sel(key="rotor.displacement_mm")) == pytest.approx(first["distance_mm"])
+
+
+@pytest.mark.slow
+def test_a_rigid_cube_has_derivatives_of_its_mean():
+    """Of its place, and of the range of frequencies and the margin of a design, against differences of the whole."""
+    body = {"shape": "cuboid", "size_mm": [10.0, 10.0, 10.0], "remanence_T": 1.305, "density_kg_m3": 7500.0}
+    whole, key = scene(110.0, sl.horizontal(displacement_mm=2.0, **CUBE), body), "floater.size_mm.2"
+
+    def candidate(there):
+        levitation = Levitation(there, sl.Models("dipole", "none", interaction="rigid"))
+        known = next(e for e in levitation.equilibria if e.kind == AVERAGED and e.stable)
+        return Candidate(levitation, known, ("frequency_hz", key))
+
+    here, ends = candidate(whole), [candidate(changed(whole, {key: 10.0 + step})) for step in (0.02, -0.02)]
+    for name in ("margin", "distance_mm"):
+        one, other = (end.values(name) for end in ends)
+        assert here.slopes(name)[:, 1] == pytest.approx((one - other) / 0.04, rel=1e-4)
+    found = sl.gradient(whole, ["distance", "lowest_frequency"], [key], model="dipole", interaction="rigid")
+    low, high = (end.ends[0].parameter for end in ends)
+    assert float(found.lowest_frequency[0]) == pytest.approx((low - high) / 0.04, rel=1e-4)
+    locked = next(e for e in here.levitation.equilibria if e.kind == LOCKED)
+    with pytest.raises(sl.InputError, match="not frequency-locked"):
+        _ = Candidate(here.levitation, locked, ()).ends
