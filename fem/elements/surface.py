@@ -38,6 +38,7 @@ from ..harmonics.solid import FOUR_PI, gauss_legendre, members, orthonormal
 INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
 DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and columns that are made at once
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
+TURNS = 25  # of responses to each other, in which those of χ up to a half settle so far
 # Distance from a face, in edges by the nodes along them, from which on the nodes' own rule does: nodes are at most
 # h = 1.2 of that apart, so that it errs by exp(-2π 4/1.2) = 1e-9
 APART = 4.0
@@ -529,6 +530,18 @@ class SurfaceCharges:
         right = self.contrast[:, None] * field
         if len(right) <= DENSE:
             return np.asarray(scipy.linalg.lu_solve(self._factors, right))
+        blocks = np.array_split(right, max(1, right.shape[1] // BLOCK), axis=1)
+        return np.concatenate([self._settled(block) for block in blocks], axis=1)
+
+    def _settled(self, right: Array) -> Array:
+        """`solved` of several columns at once, by turns that each leave a part of χ/2, or else one by one."""
+        share = 1 / (1 + self.contrast / 2)[:, None]
+        found = share * right
+        for _ in range(TURNS):
+            before = found
+            found = share * (right + self.contrast[:, None] * self.normal_field(before))
+            if np.abs(found - before).max() <= SOLVED * np.abs(found).max():
+                return np.asarray(found)
         return np.stack([self.solved(column) for column in right.T], axis=1)
 
     def solved(self, right: Array) -> Array:

@@ -192,7 +192,7 @@ def summed_derivatives(expansions: Sequence[MultipoleExpansion], points: Array, 
     return total
 
 
-@lru_cache(maxsize=32)  # a table is asked for by thousands of calls, of one point often
+@lru_cache(maxsize=128)  # a table and each of its magnets are asked for by thousands of calls, of one point often
 def _joined(
     expansions: tuple[MultipoleExpansion, ...], order: int
 ) -> list[tuple[OuterSums, Array, Array, NDArray[np.intp]]]:

@@ -42,6 +42,7 @@ ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.
 # Gaps between the bodies at which samples are taken, in floater radii; the last for several magnets
 NEAR_GAPS = (0.1, 0.13, 0.16, 0.2, 0.25, 0.35, 0.5, 1.0)
 FIELDS = 200_000  # points in the magnets times dipoles' places at once: their fields take some megabytes
+DIPOLES = 100  # places at once of which the charges' responses are known, likewise
 MOST_RETURNED = 24  # degrees of the rotor's response to the sphere's
 
 
@@ -434,13 +435,13 @@ def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Arra
         some = slice(start, start + step)
         fields = unit_dipole_fields(points[some], places)
         direct += np.einsum("pni,qnj,nij->pq", fields, fields, tensors[some], optimize=True)
-    normal = np.empty((len(charges.places), 3 * len(places)))
-    for start in range(0, len(normal), step):
-        some = slice(start, start + step)
-        fields = unit_dipole_fields(charges.places[some], places)
-        normal[some] = np.einsum("pni,ni->np", fields, charges.normals[some])
     # ∫ M·b dV = -∮ σ ψ dS
-    found = -unit_dipole_potentials(charges.places, places).T @ (charges.areas[:, None] * rotor.beyond(normal))
+    weighted = -unit_dipole_potentials(charges.places, places) * charges.areas[:, None]
+    found = np.empty_like(direct)
+    for start in range(0, len(places), DIPOLES):
+        fields = unit_dipole_fields(charges.places, places[start : start + DIPOLES])
+        beyond = rotor.beyond(np.einsum("pni,ni->np", fields, charges.normals))
+        found[:, 3 * start : 3 * (start + DIPOLES)] = weighted.T @ beyond
     return direct / MU_0, (found + found.T) / (2 * MU_0)
 
 
