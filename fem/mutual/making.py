@@ -254,13 +254,13 @@ def _rotor_fit(
     alone = np.concatenate(columns, axis=1) * counts[:, None]
     ends, number = np.cumsum([column.shape[1] for column in columns]), alone.shape[1]
     if len(a):
-        square, right = np.zeros([number + len(a)] * 2), np.zeros(number + len(a))
+        square, right = np.zeros([number + len(a)] * 2, order="F"), np.zeros(number + len(a))
         for start in range(0, len(alone), CHUNK):  # all rows would take hundreds of megabytes
             some = slice(start, start + CHUNK)
             one, other = whole[first[some]], whole[second[some]]
             coupled = one[:, a] * other[:, b] + (a != b) * one[:, b] * other[:, a]
             rows = np.concatenate([alone[some], counts[some, None] * coupled], axis=1)
-            square += rows.T @ rows
+            square = scipy.linalg.blas.dsyrk(1.0, rows.T, beta=1.0, c=square, overwrite_c=True)
             right += beyond[some] @ rows
         found = _held(square, right, len(alone), np.arange(len(square)) >= number)
     else:
@@ -449,16 +449,19 @@ def least_squares(columns: Array, values: Array, small: Array, cost: float = PEN
         size = np.linalg.norm(columns, axis=0)
         size[size == 0] = 1.0
         return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
-    return _held(columns.T @ columns, columns.T @ values, len(values), small, cost)
+    return _held((columns.T @ columns).T, columns.T @ values, len(values), small, cost)
 
 
 def _held(square: Array, right: Array, values: int, small: Array, cost: float = PENALTY) -> Array:
-    """`least_squares` by the normal equations (k, k), which it overwrites, and (k,) of so many `values`."""
+    """`least_squares` by the normal equations (k, k) and (k,) of so many `values`.
+
+    Of the former the upper triangle counts; they are overwritten, columns first.
+    """
     size = np.sqrt(np.diag(square))
     size[size == 0] = 1.0
     square /= size
     square /= size[:, None]
     free = FREE if values >= ENOUGH * np.count_nonzero(np.logical_not(small)) else FEW
     square[np.diag_indices_from(square)] += np.where(small, cost, free) ** 2
-    factor = scipy.linalg.cho_factor(square.T, overwrite_a=True, check_finite=False)  # columns first, as it wants them
+    factor = scipy.linalg.cho_factor(square, overwrite_a=True, check_finite=False)
     return np.asarray(scipy.linalg.cho_solve(factor, right / size) / size)
