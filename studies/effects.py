@@ -9,6 +9,7 @@ import numpy as np
 from ..dynamics.equilibria.equilibrium import LOCKED, MARGINAL, Equilibrium
 from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_mutual
 from ..dynamics.motion.body_shape import HIGHEST
+from ..dynamics.motion.coils import COILS
 from ..dynamics.motion.effects import NOTHING_PERMEABLE
 from ..dynamics.motion.floater_effects import (
     FLOATER_CURRENTS,
@@ -149,8 +150,9 @@ def _shape(levitation: Levitation) -> ListedEffect:
     """The shape of a floater that is no sphere, and where it is left out."""
     floater = levitation.scene.floater
     left_out = shares(floater, floater_sources(floater), HIGHEST)
+    coils = f", {COILS}," if levitation.scene.other_coils else ""
     why = (
-        f"its multipoles and its polarizability in the rotor's field; plate, the magnets' response and the "
+        f"its multipoles and its polarizability in the rotor's field; plate, the magnets' response{coils} and the "
         f"rotor's currents have its dipole and a sphere of its volume, whose error is up to {left_out.sum():.1%} of "
         "what they do"
     )

@@ -133,8 +133,8 @@ class Levitation:
         floater = self.scene.floater
         if floater.is_sphere or floater.mean:
             return self
-        known = _first(self.without_plate.equilibria) if floater.round else None
-        if floater.round and (known is None or not of_whole_body(self.still, self.rates, known)):
+        known = _first(self.quiet.without_plate.equilibria) if floater.round else None
+        if floater.round and (known is None or not of_whole_body(self.quiet.still, self.quiet.rates, known)):
             return self
         return self.elsewhere(floater=floater.averaged)
 

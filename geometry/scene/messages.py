@@ -265,11 +265,11 @@ def _coil_faults(table: schema.SceneTable, coils: Sequence[schema.CoilTable]) ->
         yield "Input floater must be one table beside coils and a rotor; instead received a list."
         return
     others = [k for k, coil in enumerate(coils) if any(coil.center_mm[:2]) or changing[k]]
-    if others and (floater.conductivity_S_m or floater.composite or floater.shape != "sphere"):
+    if others and (floater.conductivity_S_m or any(part.conductivity_S_m for part in floater.tables)):
         yield (
-            f"Input floater must be a sphere without conductivity_S_m beside coils[{others[0]}], which is off the "
-            "rotor's axis or has a current that changes: other floaters are not computed there; instead it is none. "
-            "Steady currents about the axis act on any floater."
+            f"Input floater must have no conductivity_S_m beside coils[{others[0]}], which is off the rotor's axis or "
+            "has a current that changes: what it drives in the floater is not computed; instead it has. Steady "
+            "currents about the axis may stand beside any floater."
         )
     for k, plate in table.plates:
         name = f"plate[{k}]" if k >= 0 else "plate"

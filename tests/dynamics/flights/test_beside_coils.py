@@ -1,5 +1,6 @@
 """Coils beside a rotor: force and equilibria against magpylib, motion against SciPy's, energy, and what is refused."""
 
+import heyoka as hy
 import magpylib
 import numpy as np
 import pytest
@@ -8,14 +9,20 @@ from scipy.integrate import solve_ivp
 
 import spinlev as sl
 from spinlev.dynamics.equilibria.balance import EVERY, Balance, solve
-from spinlev.dynamics.flights.flight import simulate
+from spinlev.dynamics.flights.flight import Flight, initial_state, simulate
+from spinlev.dynamics.motion.body_shape import HIGHEST
+from spinlev.dynamics.motion.coils import COILS as COILS_OFF
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import parameters
+from spinlev.dynamics.motion.floater_effects import FLOATER_SHAPE
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.closed_forms.coil import CoilField
 from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.floater import floater_sources, shares
 from spinlev.geometry.common import MU_0
+from spinlev.geometry.shapes import Box
+from spinlev.studies.effects import listed_effects
 from spinlev.studies.levitation import Levitation
 
 ROTOR = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305, recoil_permeability=1.0)
@@ -144,6 +151,57 @@ def test_a_floater_of_any_shape_feels_the_coil_all_over():
     assert force == pytest.approx(expected, rel=1e-4, abs=1e-4 * np.linalg.norm(expected))
 
 
+def all_over(body):
+    """Places (n, 3) m in a body's own axes, of a rule of Gauss, and their shares (n,)."""
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    if isinstance(body, Box):
+        grid = np.stack(np.meshgrid(*[nodes] * 3, indexing="ij"), -1).reshape(-1, 3) * body.size / 2
+        return grid, np.einsum("i,j,k->ijk", *[weights / 2] * 3).ravel()
+    angles = 2 * np.pi * np.arange(12) / 12
+    out = body.radius * np.sqrt((nodes + 1) / 2)
+    places = [[r * np.cos(a), r * np.sin(a), body.height / 2 * h] for r in out for a in angles for h in nodes]
+    return np.array(places), np.array([s / 24 * w / 2 for s in weights for _ in angles for w in weights])
+
+
+SHAPES = {
+    "cube": {"shape": "cuboid", "size_mm": [10.0] * 3},
+    "disc": {"shape": "cylinder", "diameter_mm": 14.0, "height_mm": 5.0},
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_coil_off_the_axis_acts_on_the_dipole_of_a_body(name):
+    """Against its force on the polarisation all over the body: within what results say; and energy is balanced."""
+    off = {"current_A": 2.0, "center_mm": [9.0, 5.0, -40.0]}
+    begin = {"position_mm": [2.0, 1.0, -19.0], "moment": [0.28, 0.1, 0.95]}
+    body = {key: BALL[key] for key in ("remanence_T", "density_kg_m3")} | SHAPES[name]
+    found = []
+    for current in (2.0, 0.0):
+        given = scene({**off, "current_A": current}, floater={"diameter_mm": None, **body}, start=begin)
+        flight = Flight(given, rotor_table(given.rotor, "dipole"), 0.01, in_balls=False)
+        course, equations = flight.begin(initial_state(given, flight.whole)[0], 0.01), flight.equations(0)[0]
+        function = hy.cfunc(list(equations.rates[3:6]), list(equations.variables), compact_mode=True)
+        found.append(function(course.state[:-1], pars=course.values[: function.nparams], time=0.0))
+    force = (found[0] - found[1]) * given.floater.mass * flight.scales.length / flight.scales.time**2
+    state = initial_state(given, flight.whole)[0]
+    local, every = all_over(given.floater.bodies[0])
+    points = state.position + local @ given.floater.axes(state.orientation).T
+    known, step = CoilField(given.coils, [2.0]), 1e-4
+    slopes = [
+        (known.flux_density(points + step * e) - known.flux_density(points - step * e)) @ state.moment / (2 * step)
+        for e in np.eye(3)
+    ]
+    expected = given.floater.moment * np.array(slopes) @ every
+    apart = np.linalg.norm(force - expected) / np.linalg.norm(expected)
+    said = shares(given.floater, floater_sources(given.floater), HIGHEST).sum()
+    print(f"\n{name}: {apart:.2%} of the coil's force, stated up to {said:.1%}")
+    assert apart < said
+    sine = scene({**off, "frequency_hz": 70.0}, floater={"diameter_mm": None, **body}, start=begin)
+    assert simulate(sine, rotor_table(sine.rotor, "dipole"), 0.02).energy_error < 1e-10
+    (effect,) = (e for e in listed_effects(Levitation(sine, sl.Models("dipole")), ()) if e.name == FLOATER_SHAPE)
+    assert COILS_OFF in effect.why
+
+
 def test_a_coil_is_an_obstacle_with_a_hole():
     """Dropped through it the floater touches nothing; dropped on the winding it does, where the closed form says."""
     wide = {"current_A": 0.0, "width_mm": 4.0, "height_mm": 4.0}
@@ -169,7 +227,7 @@ WRONG = {
         {"plate": {"size_mm": [100, 100, 5], "center_mm": [0, 0, -60], "conductivity_S_m": 3e7}},
         {"frequency_hz": 50.0}, "plate must be left out beside",
     ),
-    "a sine on a conductor": ({"floater": {"conductivity_S_m": 6e5}}, {"frequency_hz": 50.0}, "must be a sphere"),
+    "a sine on a conductor": ({"floater": {"conductivity_S_m": 6e5}}, {"frequency_hz": 50.0}, "no conductivity_S_m"),
     "a winding in the rotor": ({}, {"center_mm": [0, 0, 0], "radius_mm": 5.0}, "must stay clear of all bodies"),
     "a start in the winding": ({"start": {"position_mm": [30, 0, -40]}}, {}, r"overlaps coils\[0\]"),
     "a table with a frequency": ({}, {"current_A": [[0, 0], [1, 1]], "frequency_hz": 5.0}, "must be a number beside"),

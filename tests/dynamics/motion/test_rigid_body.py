@@ -235,6 +235,25 @@ def test_a_locked_equilibrium_is_at_rest_in_the_rotors_frame():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("kind", "kick", "foldings"), [(LOCKED, 1e-9, 10.0), (AVERAGED, 1e-6, 8.0)])
+def test_an_unstable_equilibrium_of_either_kind_grows_as_it_says(kind, kick, foldings):
+    """Of the cube's trajectories from above and below along the axis: the difference of their heights."""
+    known = next(one for one in find_equilibria(LEVITATING, TABLE) if one.kind == kind and one.growth_per_s > 5)
+    assert [mode.name for mode in known.modes if mode.growth_per_s == known.growth_per_s] == ["bounce"]
+    seconds, state = foldings / known.growth_per_s, known.state
+    axes = CUBE.axes(state.moment) if state.axes is None else state.axes
+    flight, ends = Flight(LEVITATING, TABLE, seconds, in_balls=False if kind == LOCKED else None), []
+    for sign in (1.0, -1.0):
+        begun = replace(state, position=state.position + sign * kick * np.eye(3)[2], axes=axes)
+        ends.append(integrate(flight, begun, seconds))
+    apart = np.abs(ends[0].lab.position[:, 2] - ends[1].lab.position[:, 2])
+    late = ends[0].time > seconds / 2
+    slope = np.polyfit(ends[0].time[late], np.log(apart[late]), 1)[0]
+    print(f"\n{kind}, {1e3 * known.distance:.1f} mm: {known.growth_per_s:.2f} /s, simulated {slope:.2f} /s")
+    assert slope == pytest.approx(known.growth_per_s, rel=1e-2)
+
+
+@pytest.mark.slow
 def test_a_locked_cube_over_a_plate_stays_on_its_motion():
     """Of the true shape, over a slab that leans by 5° and so shakes it once a turn: 0.5 µm in eight turns."""
     box = Box((0.3, 0.3, 0.03), (0.0, 0.0, -0.0745), rotation_matrix((0.0, 5.0, 0.0)))
