@@ -105,8 +105,9 @@ class LiveFlight:
         Raises StartError: it would overlap a magnet or the plate, or the field of the plate's currents is not known
         there; nothing is changed.
         """
-        check_free("position", self.scene, np.asarray(position, float), self.time)
-        place = turned_about_z(position, self.scene.angle(self.time))
+        angle = self.scene.angle(self.time)
+        check_free("position", self.scene, np.asarray(position, float), self.time, self.now.to_rotor(angle).orientation)
+        place = turned_about_z(position, angle)
         self._check_range(place)
         turning = np.cross([0.0, 0.0, float(self.scene.rate(self.time))], place)
         self._course.ended_by = DURATION

@@ -14,6 +14,7 @@ from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.common import InputError
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Scene
 from spinlev.geometry.scene.floater import Floater
+from spinlev.geometry.shapes import Cylinder
 from spinlev.studies.cli.options import Models
 from spinlev.studies.levitation import Levitation
 
@@ -45,6 +46,17 @@ def test_a_push_is_a_change_of_velocity_along_the_laboratorys_axes():
     live.onward(0.02)
     velocity = before.velocity + np.array([0.1, -0.2, 0.3])
     assert live.now.position == pytest.approx(before.position + 0.02 * velocity + GRAVITY * 0.02**2 / 2, abs=1e-14)
+
+
+def test_a_disc_is_put_where_its_own_surface_is_free():
+    """2 mm below the magnet's face, where a ball about it would overlap; 1 mm farther up it does itself."""
+    disc = Cylinder(6e-3, 3e-3)
+    live = LiveFlight(replace(SCENE, floater=Floater(disc.circumradius, 0.0, 1.0, 7500.0, None, disc)), DIPOLE, ())
+    live.put(np.array([0.0, 0.0, -8.5e-3]))
+    assert live.now.position[2] == -8.5e-3
+    assert live.onward(1e-3).ended_by == "duration"
+    with pytest.raises(StartError, match="mm inside one of them"):
+        live.put(np.array([0.0, 0.0, -6e-3]))
 
 
 def test_a_floater_that_is_let_go_turns_with_the_rotor():
