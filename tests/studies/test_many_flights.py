@@ -1,5 +1,7 @@
 """`sl.ensemble`: flights as simulated one by one, the same bits from a seed in any number of workers, wrong input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,9 +9,10 @@ import xarray as xr
 import spinlev as sl
 
 AT = {"position_mm": [1.0, 0.0, -19.8], "velocity_mm_s": [0.0, 690.0, 0.0], "moment": [-0.1, 0.0, 1.0]}
+ROTOR = sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305)
 SCENE = sl.scene(
     frequency_hz=110.0,
-    rotor=sl.horizontal(displacement_mm=2.0, edge_mm=10.0, remanence_T=1.305),
+    rotor=ROTOR,
     floater=sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0),
     start={**AT, "spin_hz": [0.0, 0.0, 110.0]},
 )
@@ -46,6 +49,24 @@ def test_a_seed_gives_the_same_bits_in_any_number_of_workers():
     assert not np.any(other["start_position"].values == one["start_position"].values)
     narrow = sl.ensemble(SCENE, **{**asked, "spread": {"offset_mm": [0.1, 0.1, 0.3]}})
     np.testing.assert_array_equal(narrow["start_position"], one["start_position"])
+
+
+@pytest.mark.slow
+def test_cubes_drawn_and_given_have_axes_along_their_moments():
+    """The same bits in two workers; `body_x` turns a given one about its moment."""
+    cube = {"shape": "cuboid", "size_mm": [10.0, 10.0, 10.0], "remanence_T": 1.305, "density_kg_m3": 7500.0}
+    scene = replace(SCENE, floater=sl.scene(frequency_hz=1.0, rotor=ROTOR, floater=cube).floater)
+    asked = {"n": 24, "seed": 3, "spread": SPREAD, "duration_s": 0.03, "model": "dipole"}
+    one, two = sl.ensemble(scene, **asked), sl.ensemble(scene, **asked, workers=2)
+    xr.testing.assert_identical(one, two)
+    for begin, end in (("start_body_axes", "start_moment"), ("body_axes", "moment")):
+        axes = one[begin].values
+        np.testing.assert_allclose(axes.swapaxes(1, 2) @ axes, np.tile(np.eye(3), (24, 1, 1)), atol=1e-12)
+        np.testing.assert_allclose(axes[:, :, 2], one[end].values, atol=1e-12)
+    given = sl.ensemble(scene, {**AT, "body_x": [[0.0, 1.0, 0.0], [1.0, 0.0, 0.1]]}, 1e-3, model="dipole")
+    first = given.start_body_axes.values[:, :, 0]
+    assert first[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
+    assert first[1] == pytest.approx(np.array([1.0, 0.0, 0.1]) / 1.01**0.5, abs=1e-12)
 
 
 @pytest.mark.parametrize(
