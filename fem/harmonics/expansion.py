@@ -147,7 +147,7 @@ class MultipoleExpansion:
             own = MultipoleExpansion(np.zeros(3), self.radius, self.own_coefficients)
             return turned_field(self.axes, own.expressions(turned_expressions(self.axes.T, place)))
         scaled = [component * (1.0 / self.radius) for component in place]
-        parts = self._slopes(2, self.degree + 2)
+        parts = _slopes(self.coefficients, self.radius, 2)
         sums = harmonic_sums(scaled, [real_terms(part) for part in parts])
         return sums[:3], whole_gradient(sums[3:])
 
@@ -162,14 +162,6 @@ class MultipoleExpansion:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m."""
         field, gradient = tensors(self.derivatives(points, 2))
         return field, gradient
-
-    def _slopes(self, order: int, last: int) -> list[Coefficients]:
-        """Coefficients up to the `last` degree of what `derivatives` gives."""
-        found: dict[Entry, Coefficients] = {(i,): -derivative(self.coefficients, i) for i in range(3)}
-        for degree in range(2, order + 1):
-            for each in entries(degree):
-                found[each] = derivative(found[each[:-1]], each[-1]) / self.radius
-        return [np.pad(part, (0, last + 1 - len(part))) for part in found.values()]
 
     def root_mean_square(self, points: Array) -> tuple[Array, Array]:
         """Sizes (n,) of B (T) and of its gradient (T/m), as a mean over the spheres on which the points lie.
@@ -202,10 +194,25 @@ def _joined(
     for count in np.unique(steps):
         numbers = np.flatnonzero(steps == count)
         some = [expansions[k] for k in numbers]
-        slopes = [one._slopes(order, max(one.degree for one in some) + order) for one in some]
+        size = max(one.degree for one in some) + 1
+        whole = np.zeros((len(some), size, size), complex)
+        for one, coefficients in zip(some, whole, strict=True):
+            coefficients[: one.degree + 1, : one.degree + 1] = one.coefficients
         centers, radii = np.array([one.center for one in some]), np.array([one.radius for one in some])
-        found.append((OuterSums.of(np.array(slopes)), centers, radii, numbers))
+        slopes = _slopes(whole, radii[:, None, None], order)
+        found.append((OuterSums.of(np.stack(slopes, axis=1)), centers, radii, numbers))
     return found
+
+
+def _slopes(coefficients: Coefficients, radius: Array | float, order: int) -> list[Coefficients]:
+    """Of c_lm (T) [..., l, m] and radii m, the coefficients of what `derivatives` gives, up to `order` degrees more."""
+    found: dict[Entry, Coefficients] = {(i,): -derivative(coefficients, i) for i in range(3)}
+    for degree in range(2, order + 1):
+        for each in entries(degree):
+            found[each] = derivative(found[each[:-1]], each[-1]) / radius
+    size = coefficients.shape[-1] + order
+    nothing = [(0, 0)] * (coefficients.ndim - 2)
+    return [np.pad(part, [*nothing, *[(0, size - part.shape[-1])] * 2]) for part in found.values()]
 
 
 def turned_expressions(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:
@@ -446,5 +453,7 @@ class FittedExpansions:
         return self._made(whole), self._made(step)
 
     def _made(self, factors: Array) -> list[MultipoleExpansion]:
-        values = [(k, l, m, factor * value) for (k, l, m, value), factor in zip(self._parts, factors, strict=True)]
-        return [_with(one, values, k) for k, one in enumerate(self._empty)]
+        number, l, m, value = (np.array(column) for column in zip(*self._parts, strict=True))
+        whole = np.zeros((len(self._empty), *self._empty[0].coefficients.shape), complex)
+        np.add.at(whole, (number, l, m), factors * value)
+        return [replace(one, coefficients=mine) for one, mine in zip(self._empty, whole, strict=True)]

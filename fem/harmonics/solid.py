@@ -145,11 +145,11 @@ def _block(degree: int) -> int:
 
 
 def both_signs(coefficients: Coefficients) -> tuple[Coefficients, int]:
-    """[l, m] also of m < 0 by c_l(-m) = (-1)^m conj c_lm, with room for m ± 1; and the column of m = 0."""
-    size = len(coefficients)
-    full, orders = np.zeros((size, 2 * size + 3), complex), np.arange(size)
-    full[:, size + 1 - orders] = (-1.0) ** orders * np.conj(coefficients)
-    full[:, size + 1 + orders] = coefficients
+    """[..., l, m] also of m < 0 by c_l(-m) = (-1)^m conj c_lm, with room for m ± 1; and the column of m = 0."""
+    size = coefficients.shape[-1]
+    full, orders = np.zeros((*coefficients.shape[:-1], 2 * size + 3), complex), np.arange(size)
+    full[..., size + 1 - orders] = (-1.0) ** orders * np.conj(coefficients)
+    full[..., size + 1 + orders] = coefficients
     return full, size + 1
 
 
@@ -219,12 +219,12 @@ def outer_sums(coefficients: Sequence[Coefficients], points: Array) -> Array:
 
 
 def derivative(coefficients: Coefficients, axis: int) -> Coefficients:
-    """Coefficients of ∂f/∂x_axis of f = Σ c_lm Θ_lm: one degree more."""
+    """Coefficients [..., l, m] of ∂f/∂x_axis of f = Σ c_lm Θ_lm: one degree more."""
     full, zero = both_signs(coefficients)
-    orders = zero + np.arange(len(coefficients) + 1)
-    lower, upper = full[:, orders - 1], full[:, orders + 1]
-    found = ((lower - upper) / 2, (lower + upper) / 2j, -full[:, orders])[axis]
-    return np.vstack([np.zeros((1, len(orders))), found])
+    orders = zero + np.arange(coefficients.shape[-1] + 1)
+    lower, upper = full[..., orders - 1], full[..., orders + 1]
+    found = ((lower - upper) / 2, (lower + upper) / 2j, -full[..., orders])[axis]
+    return np.concatenate([np.zeros_like(found[..., :1, :]), found], axis=-2)
 
 
 Entry = tuple[int, ...]  # Indices i, j, ... of a tensor ∂_i ∂_j ... u
