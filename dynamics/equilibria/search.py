@@ -144,6 +144,8 @@ def survey(
     check_turning(scene)
     if not scene.floater.round:
         return _survey_of_any_body(scene, table, spin, farthest, rates, remembered, watch)
+    if scene.floater.mean:
+        return _survey_of_mean(scene, mean_over_turns(scene, table), spin, farthest, remembered, watch)
     scales = Scales.of(scene)
     equations = rates or Rates(with_effects(scene, table))
     top = _own_spin(scene) * scales.time * scales.spin_ratio
@@ -152,6 +154,29 @@ def survey(
     if np.any(scene.gravity[:2]) and any(of_whole_body(scene, equations, e) for e in upright(scene, balance, known)):
         balance = replace(balance, rates=Rates(mean_over_turns(scene, table)[1]))
     return survey_of(scene, balance, known)
+
+
+def _survey_of_mean(
+    scene: Scene,
+    means: tuple[Scene, Interaction, Interaction],
+    spin: float,
+    farthest: float,
+    remembered: Remembered,
+    watch: Watch,
+    quick: Rates | None = None,
+) -> Survey:
+    """Equilibria of a body's mean over turns about its moment, from those of its multipoles, which are quicker.
+
+    `means` are those of `mean_over_turns`, and `quick` the rates of the last; all else as in `survey`.
+    """
+    round_scene, exactly, roughly = means
+    scales, ratio = Scales.of(round_scene), round_scene.floater.spin_ratio
+    values, own = parameters(round_scene, scales, frozen_spin=True), _own_spin(scene) * scales.time * ratio
+    about = Balance(quick or Rates(roughly), values, spin * ratio, own)
+    seeds = remembered(lambda: _search(round_scene, exactly, about, farthest, watch), AVERAGED)
+    exact, points = _by_whole_body(scene, exactly, about, seeds.points, farthest)
+    here, doubts = field_doubts(exactly, points[:, :3] * scales.length)
+    return survey_of(round_scene, exact, FixedPoints.at(exact, points[here], doubts, seeds.curves))
 
 
 def _survey_of_any_body(
@@ -167,26 +192,22 @@ def _survey_of_any_body(
 
     See `survey`.
     """
-    round_scene, exactly, roughly = mean_over_turns(scene, table)
-    scales, ratio = Scales.of(round_scene), round_scene.floater.spin_ratio
-    values, quick = parameters(round_scene, scales, frozen_spin=True), Rates(roughly)
+    means = mean_over_turns(scene, table)
+    quick = Rates(means[2])
     found: list[Equilibrium] = []
     curves: tuple[ForceCurve, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     if scene.floater.turns_freely:
-        about = Balance(quick, values, spin * ratio, _own_spin(scene) * scales.time * ratio)
-        seeds = remembered(lambda: _search(round_scene, exactly, about, farthest, watch), AVERAGED)
-        exact, points = _by_whole_body(scene, table, about, seeds.points, farthest)
-        here, doubts = field_doubts(table, points[:, :3] * scales.length)
-        points = points[here]
-        known = survey_of(round_scene, exact, FixedPoints.at(exact, points, doubts, seeds.curves))
+        known = _survey_of_mean(scene, means, spin, farthest, remembered, watch, quick)
         found, curves, left_out = (
             [replace(one, kind=AVERAGED) for one in known.equilibria],
             known.curves,
             known.left_out,
         )
     if scene.frequency:
-        still = Balance(quick, values, ratio, still=True)
+        round_scene, exactly, _ = means
+        values = parameters(round_scene, Scales.of(round_scene), frozen_spin=True)
+        still = Balance(quick, values, round_scene.floater.spin_ratio, still=True)
         seeds = remembered(lambda: _search(round_scene, exactly, still, farthest, watch), LOCKED)
         rates = rates or Rates(with_effects(scene, table))
         locked = _survey(_locked(scene, with_effects(scene, table), seeds, farthest, rates), curves or seeds.curves)

@@ -8,6 +8,7 @@ import pytest
 from places import SCENES
 
 import spinlev as sl
+from spinlev.dynamics.equilibria.equilibrium import AVERAGED
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import of_true_moment
 from spinlev.studies.cli.options import Models
@@ -46,6 +47,29 @@ def test_the_table_has_what_each_model_answers_alone(spinlev, tmp_path):
         (tmp_path / "out" / f"compare.{figure}").unlink()
     assert spinlev("figure", "out/compare.nc")[0] == 0
     assert (tmp_path / "out" / "compare.png").exists()
+
+
+@pytest.mark.slow
+def test_a_floater_without_an_axis_is_compared_by_its_mean(spinlev, tmp_path):
+    """Each row of a cube's table is an equilibrium averaged over its own turn, as the same model finds it alone."""
+    text = """frequency_hz = 110.0
+    rotor = {configuration = "horizontal", displacement_mm = 2.0, edge_mm = 10.0, remanence_T = 1.305}
+    floater = {shape = "cuboid", size_mm = [10.0, 10.0, 10.0], remanence_T = 1.305, density_kg_m3 = 7500.0}"""
+    (tmp_path / "cube.toml").write_text(text)
+    status, out, err = spinlev("compare", "cube.toml", *ROUGH, "--json")
+    assert status == 0, err
+    assert "mean of the floater over turns about its moment" in err
+    rows = {row["name"]: row for row in json.loads(out)["models"]}
+    assert list(rows) == NAMES
+    for name, interaction in ((NAMES[0], "rigid"), (NAMES[3], "rigid"), (NAMES[4], "mutual")):
+        alone = sl.Levitation(
+            tmp_path / "cube.toml", Models(name.split()[0], "none", 1e-3, interaction=interaction)
+        ).stability
+        assert alone.kind == AVERAGED
+        assert rows[name]["distance_mm"] == pytest.approx(-1e3 * alone.position[2], abs=1e-6)
+        assert rows[name]["growth_per_s"] == pytest.approx(alone.growth_per_s, abs=1e-6)
+        low, high = rows[name]["stable_range_hz"]
+        assert low < 110.0 < high
 
 
 def test_the_ends_of_the_range_are_where_stability_ends():
