@@ -8,7 +8,7 @@ import numpy as np
 
 from ..dynamics.equilibria.equilibrium import LOCKED, MARGINAL, Equilibrium
 from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_mutual
-from ..dynamics.motion.body_shape import HIGHEST
+from ..dynamics.motion.body_shape import response_error
 from ..dynamics.motion.coils import COILS
 from ..dynamics.motion.effects import NOTHING_PERMEABLE
 from ..dynamics.motion.floater_effects import (
@@ -23,7 +23,6 @@ from ..dynamics.motion.floater_effects import (
 )
 from ..dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS
 from ..fem.floater_metal import DIPOLE, current_shape
-from ..fem.rotor.floater import floater_sources, shares
 from ..fem.rotor_metal import ball_losses, pieces_of, slow_error as metal_error
 from ..geometry.common import MAGNET_CONDUCTIVITY, ComputationError
 from ..geometry.scene.contents import Scene
@@ -149,12 +148,11 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
 def _shape(levitation: Levitation) -> ListedEffect:
     """The shape of a floater that is no sphere, and where it is left out."""
     floater = levitation.scene.floater
-    left_out = shares(floater, floater_sources(floater), HIGHEST)
     coils = f", {COILS}," if levitation.scene.other_coils else ""
     why = (
         f"its multipoles and its polarizability in the rotor's field; plate, the magnets' response{coils} and the "
-        f"rotor's currents have its dipole and a sphere of its volume, whose error is up to {left_out.sum():.1%} of "
-        "what they do"
+        f"rotor's currents have its dipole and a sphere of its volume, whose error is up to "
+        f"{response_error(floater):.0%} of their force, and of that times its radius for their torque"
     )
     return ListedEffect(FLOATER_SHAPE, True, None, None, why)
 

@@ -1,4 +1,4 @@
-"""A finite-element mesh of magnets and a floating sphere together in one ball of air."""
+"""A finite-element mesh of magnets and a floater together in one ball of air."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +11,8 @@ import numpy as np
 from spinlev.geometry.common import Array, frozen_array
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.solids import occ_solid
+from spinlev.geometry.shapes import Sphere
+from spinlev.geometry.solids import Solid
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,23 +42,26 @@ class TwoBodyMesh:
 def mesh_two_bodies(
     magnets: Sequence[Magnet], position: Array, radius: float, size: float = 0.3, ball_radius: float = 1.15
 ) -> TwoBodyMesh:
-    """Mesh magnets and a sphere, which must be apart.
+    """Mesh magnets and a sphere, which must be apart: `position`, `radius` m, else as `mesh_with`."""
+    return mesh_with(magnets, Sphere(radius, tuple(map(float, position))), size, ball_radius)
+
+
+def mesh_with(magnets: Sequence[Magnet], floater: Solid, size: float = 0.3, ball_radius: float = 1.15) -> TwoBodyMesh:
+    """Mesh magnets and a floater, which must be apart.
 
     Parameters
     ----------
-    position, radius : of the sphere, m
     size : largest element in the bodies, and in the air twice that, in radii of the ball about all bodies
     ball_radius : of the ball of air, in the same unit
     """
+    position, radius = floater.center, floater.circumradius
     corners = np.concatenate([magnet.box.corners for magnet in magnets])
     low = np.minimum(corners.min(axis=0), position - radius)
     high = np.maximum(corners.max(axis=0), position + radius)
     center = (low + high) / 2
     unit = max(float(np.linalg.norm(corners - center, axis=1).max()), float(np.linalg.norm(position - center)) + radius)
-    ball = occ.Sphere(occ.Pnt(*map(float, (position - center) / unit)), radius / unit)
-    bodies = {f"magnet{k}": occ_solid(magnet.body, center, unit) for k, magnet in enumerate(magnets)} | {
-        "floater": ball
-    }
+    bodies = {f"magnet{k}": occ_solid(magnet.body, center, unit) for k, magnet in enumerate(magnets)}
+    bodies["floater"] = occ_solid(floater, center, unit)
     air = occ.Sphere(occ.Pnt(0, 0, 0), ball_radius)
     air.faces.name = "outer"
     for name, solid in bodies.items():

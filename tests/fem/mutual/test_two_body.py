@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from article import PERMEABLE, RADIUS
-from second_opinions.both_bodies import solve_both_bodies
+from second_opinions.both_bodies import added_to_body, solve_both_bodies
 from second_opinions.magnet_elements import element_ladder
 from second_opinions.permeable_sphere import inner_field
 from second_opinions.two_bodies import mesh_two_bodies
@@ -24,8 +24,9 @@ from spinlev.fem.mutual.response import TwoBodyError, enough_degree, two_body, t
 from spinlev.fem.mutual.table import induced_sources
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
-from spinlev.geometry.magnets import horizontal, vertical
+from spinlev.geometry.magnets import Magnet, horizontal, vertical
 from spinlev.geometry.scene.floater import Floater
+from spinlev.geometry.shapes import Sphere
 
 BALL = Ball(np.array([0.001, -0.002, -0.015]), RADIUS)
 DIRECTION = np.array([0.48, 0.36, 0.8])
@@ -184,6 +185,19 @@ def test_both_bodies_solved_at_once_agree(rotors):
     assert np.linalg.norm(apart.force) < 5e-4 * np.linalg.norm(added.force)
     assert np.linalg.norm(apart.torque) < 2e-3 * np.linalg.norm(added.torque)
     assert np.linalg.norm(error.force) < 2e-3 * np.linalg.norm(added.force)
+
+
+@pytest.mark.slow
+def test_dipoles_in_one_mesh_of_both_agree(rotors):
+    """By the sums that serve floaters of any shape (`test_mutual`), of a sphere, whose answer is exact: to 1e-3."""
+    both = two_body(rotors[-1], PERMEABLE, PLACE, DIRECTION, None, 1e-8)
+    known = both.total - both.rigid
+    ball = Magnet(Sphere(RADIUS, PLACE), PERMEABLE.remanence * DIRECTION, PERMEABLE.recoil_permeability)
+    apart = added_to_body(rotors[-1].magnets, ball, 0.25) - known
+    force, torque = (np.linalg.norm(getattr(apart, n)) / np.linalg.norm(getattr(known, n)) for n in ("force", "torque"))
+    print(f"\nforce to {force:.1e}, torque to {torque:.1e} of what is added")
+    assert force < 1e-3
+    assert torque < 1e-3
 
 
 @pytest.mark.slow
