@@ -11,7 +11,7 @@ from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
-from .body_shape import BodyShape
+from .body_shape import BodyShape, response_error
 from .coils import with_coils
 from .effect import Interaction
 from .floater_effects import (
@@ -23,7 +23,7 @@ from .floater_effects import (
     check_floater_metal,
     scene_effects,
 )
-from .rotor_effects import MUTUAL, ROTOR_CURRENTS, STEP, RotorCurrents, rough_force
+from .rotor_effects import MUTUAL, ROTOR_CURRENTS, STEP, Mutual, RotorCurrents, rough_force
 
 NOTHING_PERMEABLE = "neither rotor nor floater is permeable"
 LARGEST = 5000  # Points in a magnet with which mutual magnetisation is computed at all: minutes
@@ -108,9 +108,11 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
         else:
             bodies = [magnet.body for magnet in scene.rotor]
             effects.append(BodyShape.of(scene.floater, whole.field, bodies))
-    mutual = {effect.name for effect in whole.effects} & {MUTUAL, INDUCED_SHAPE} == {MUTUAL}
-    if mutual and not scene.floater.is_sphere:
-        effects.append(InducedShape.of(scene.floater))
+    known = {effect.name: effect for effect in whole.effects}
+    if MUTUAL in known and INDUCED_SHAPE not in known and not scene.floater.is_sphere:
+        mutual = known[MUTUAL]
+        missed = response_error(scene.floater) if isinstance(mutual, Mutual) else 0.0
+        effects.append(InducedShape.of(scene.floater, mutual if isinstance(mutual, Mutual) else None, missed))
     if pieces := pieces_of(scene.rotor, scene.conductors):
         check_metal(pieces, scene.fastest, scene.floater.radius)
     if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:

@@ -61,6 +61,7 @@ from ...geometry.scene.contents import AIR_VISCOSITY, Scene
 from ...geometry.scene.floater import Floater
 from .coils import CoilForce
 from .effect import NOTHING, ZERO, Added, Effect, Motion, Poses, dissipative
+from .rotor_effects import Mutual
 from .state import Parameter, Vector, add, cross, dot
 
 REAL_AIR = "air beyond Stokes"
@@ -233,20 +234,30 @@ EVEN = 1e-6  # By which entries of a polarizability may differ that is the same 
 class InducedShape:
     """What the rotor's field at its centre induces in a floater beyond a sphere of its magnets' volume.
 
-    Its energy is -½ B·A B with the difference A of the two polarizabilities, which turns with the body.
+    Its energy is -½ B·A B with the difference A of the two polarizabilities, which turns with the body. It states what
+    `mutual` misses of such a body.
     """
 
     tensor: Array  # (3, 3) A m²/T, along the body's axes
     name: str = INDUCED_SHAPE
+    mutual: Mutual | None = None  # magnetisation of the rotor and a sphere of the floater's volume
+    missed: float = 0.0  # of its force, and of its torque by its force times the radius, see `response_error`
 
     @classmethod
-    def of(cls, floater: Floater) -> "InducedShape":
+    def of(cls, floater: Floater, mutual: Mutual | None = None, missed: float = 0.0) -> "InducedShape":
         """That of a floater; one that is round about its moment, or the mean of turns about it, has a round one."""
         tensor = polarizability_tensor(floater) - floater.polarizability * np.eye(3)
         if floater.round:
             across = (tensor[0, 0] + tensor[1, 1]) / 2
             tensor = np.diag([across, across, tensor[2, 2]])
-        return cls(tensor)
+        return cls(tensor, mutual=mutual, missed=missed)
+
+    def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
+        """See `Unsure`."""
+        if self.mutual is None:
+            return np.zeros(len(points)), np.zeros(len(points))
+        force = self.missed * self.mutual.sizes(points, field)[1]
+        return self.mutual.table.grids[0].radius * force, force
 
     @property
     def compiled_in(self) -> tuple[float, ...]:

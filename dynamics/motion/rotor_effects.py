@@ -214,14 +214,19 @@ class Mutual(_Near):
 
     def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
         """Errors of torque and force, over the moment, of the moment that turns the worst: (n,) T and (n,) T/m."""
+        of_force, of_torque = self.table.relative_error(points)
+        torque, force = self.sizes(points, field)
+        return torque * of_torque, force * of_force
+
+    def sizes(self, points: Array, field: Array) -> tuple[Array, Array]:
+        """Torque and force over the moment, as for `doubt`."""
         force, torque = np.zeros(len(points)), np.zeros(len(points))
         for direction in np.eye(3):
             moments = np.broadcast_to(self.moment * direction, points.shape)
             _, slope, _ = self.table.derivatives(points, moments + self.table.polarizability * field)
             force = np.maximum(force, np.linalg.norm(slope[:, :3], axis=1))
             torque = np.maximum(torque, np.linalg.norm(np.cross(moments, slope[:, 3:]), axis=1))
-        of_force, of_torque = self.table.relative_error(points)
-        return torque * of_torque / self.moment, force * of_force / self.moment
+        return torque / self.moment, force / self.moment
 
 
 def _pair(a: int, b: int) -> int:
