@@ -26,8 +26,8 @@ from .floater_effects import (
 from .rotor_effects import MUTUAL, ROTOR_CURRENTS, STEP, Mutual, RotorCurrents, rough_force
 
 NOTHING_PERMEABLE = "neither rotor nor floater is permeable"
-LARGEST = 5000  # Points in a magnet with which mutual magnetisation is computed at all: minutes
-MOST_POINTS = 1000  # In a magnet, up to which mutual magnetisation is chosen: a floater of 3 mm below a cube of 10 mm
+LARGEST = 5000  # Points in the magnets with which mutual magnetisation is computed at all: minutes
+MOST_POINTS = 1000  # In the magnets, up to which mutual magnetisation is chosen: a floater of 3 mm below a cube of 10 mm
 NEAR = 2.0  # Distance from the rotor, in floater radii, at which induced forces are compared with `rtol`
 
 
@@ -60,7 +60,7 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
         if points > LARGEST:
             raise InputError(
                 "Input --interaction must be rigid or auto for a floater so small beside its magnets; instead received "
-                f"mutual, for which a magnet would respond at {points} points ({LARGEST} at most)."
+                f"mutual, for which the magnets would respond at {points} points ({LARGEST} at most)."
             )
         return True, "as requested"
     if table.model not in PERMEABLE:
@@ -69,13 +69,13 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
         why = reasons[min(reasons)].split(".")[0]
         return False, f"what is induced in magnet {min(reasons)} is not known: it is {why}"
     if points > LARGEST:
-        return False, f"so small a floater would need {points} points in a magnet"
+        return False, f"so small a floater would need {points} points in the magnets"
     part = rough_part(scene, table)
     if part < rtol:
         return False, f"about {part:.0e} of the force near the rotor, less than --rtol asks for"
     said = f"about {part:.1%} of the force near the rotor"
     if points > MOST_POINTS:
-        why = f"so small a floater needs {points} points in a magnet, which takes minutes"
+        why = f"so small a floater needs {points} points in the magnets, which takes minutes"
         return False, f"{said}; {why}; --interaction mutual includes it"
     return True, said
 

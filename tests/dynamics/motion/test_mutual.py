@@ -115,7 +115,7 @@ def test_a_small_floater_is_compared_where_the_table_reaches():
     tiny = replace(small, floater=replace(PERMEABLE, radius=0.5e-3))
     included, why = mutual_choice(tiny, Far(), "auto", 1e-6)
     assert not included
-    assert "so small a floater needs 4096 points in a magnet" in why
+    assert "so small a floater needs 4096 points in the magnets" in why
     with pytest.raises(InputError, match="for a floater so small beside its magnets"):
         mutual_choice(replace(tiny, floater=replace(PERMEABLE, radius=1e-6)), Far(), "mutual", 1e-6)
 
@@ -272,3 +272,26 @@ def test_of_other_shapes_mutual_magnetisation_has_the_stated_error(name):
         )
     assert np.max(missed) < stated
     assert np.max(missed) > stated / 10
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_error_bars_have_what_the_response_misses_of_a_shape(name, mutual):
+    """That part of the force that mutual magnetisation adds to a sphere of the body's volume, over the moment."""
+    body = BODIES[name]
+    scene = replace(SCENE, floater=replace(PERMEABLE, radius=body.circumradius, body=body))
+    answers = Mutual(cached_mutual_table(scene.rotor, scene.floater.ball, print)[0], scene.floater.moment)
+    known = Interaction(mutual.field, (answers,))
+    places = np.array([[1e-3, 2e-3, -18e-3], [0.0, -4e-3, -22e-3]])
+    field, gradient = known.evaluate(places)
+    change = []
+    for axis in 1e-6 * np.eye(3):
+        energies = [
+            np.array([answers.table.derivatives(places + way * axis, inner)[0] for way in (1, -1)])
+            for inner in (m + answers.table.polarizability * field for m in answers.moment * np.eye(3))
+        ]
+        change.append([(ahead - behind) / 2e-6 for ahead, behind in energies])
+    force = np.linalg.norm(change, axis=0).max(axis=0)
+    of_field, of_gradient = np.subtract(with_effects(scene, known).relative_error(places), known.relative_error(places))
+    stated = response_error(scene.floater) * force / answers.moment
+    np.testing.assert_allclose(of_gradient * np.linalg.norm(gradient, axis=(1, 2)), stated, rtol=1e-5)
+    np.testing.assert_allclose(of_field * np.linalg.norm(field, axis=1), stated * scene.floater.ball.radius, rtol=1e-5)
