@@ -28,13 +28,21 @@ from ...fem.harmonics.interior import (
     sizes,
     turns,
 )
-from ...fem.rotor.floater import FloaterSources, floater_sources, shares, slopes_of, strength
+from ...fem.rotor.floater import (
+    FloaterSources,
+    floater_sources,
+    polarizability_tensor,
+    shares,
+    slopes_of,
+    strength,
+)
 from ...fem.rotor.table import DerivedField, FieldFormula, RangeError
 from ...geometry.common import Array, even_directions
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Solid
 from .effect import Added, Motion, Poses
-from .floater_effects import FLOATER_SHAPE
+from .floater_effects import FLOATER_SHAPE, by_tensor, is_even
+from .rotor_effects import Mutual
 from .state import Parameter, State, Vector, add, cross, dot, dotted, matrices_of, subtract
 
 HIGHEST = 7  # degree of the multipoles in a trajectory
@@ -343,6 +351,59 @@ def response_error(floater: Floater) -> float:
     if floater.is_sphere:
         return 0.0
     return MISSED * float(shares(floater, floater_sources(floater), HIGHEST).sum())
+
+
+INDUCED_SHAPE = "shape of what is induced in the floater"
+
+
+@dataclass(frozen=True, eq=False)
+class InducedShape:
+    """What the rotor's field at its centre induces in a floater beyond a sphere of its magnets' volume.
+
+    Its energy is -½ B·A B with the difference A of the two polarizabilities, which turns with the body. It states what
+    `mutual` misses of such a body.
+    """
+
+    tensor: Array  # (3, 3) A m²/T, along the body's axes
+    name: str = INDUCED_SHAPE
+    mutual: Mutual | None = None  # magnetisation of the rotor and a sphere of the floater's volume
+    missed: float = 0.0  # of its force, and of its torque by its force times the radius
+
+    @classmethod
+    def of(cls, floater: Floater, mutual: Mutual | None = None) -> "InducedShape":
+        """That of a floater; one that is round about its moment, or the mean of turns about it, has a round one."""
+        tensor = polarizability_tensor(floater) - floater.polarizability * np.eye(3)
+        if floater.round:
+            across = (tensor[0, 0] + tensor[1, 1]) / 2
+            tensor = np.diag([across, across, tensor[2, 2]])
+        return cls(tensor, mutual=mutual, missed=response_error(floater) if mutual else 0.0)
+
+    def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
+        """See `Unsure`."""
+        if self.mutual is None:
+            return np.zeros(len(points)), np.zeros(len(points))
+        force = self.missed * self.mutual.sizes(points, field)[1]
+        return self.mutual.table.grids[0].radius * force, force
+
+    @property
+    def compiled_in(self) -> tuple[float, ...]:
+        """Numbers in the code of the equations, see `Rates.elsewhere`."""
+        return tuple(self.tensor.ravel().tolist())
+
+    def added(self, motion: Motion) -> Added:
+        which = Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE
+        length, inertia, share = (motion.given[p] for p in which)
+        field, gradient, unit = motion.field, motion.gradient, share * share
+        induced = by_tensor(self.tensor, field, motion)
+        if is_even(self.tensor):
+            # as of a sphere, whatever its turn: there is no torque
+            energy = -0.5 * unit * dot(induced, field)
+            return Added(pulled=[unit * length * b for b in induced], energy=energy)
+        return Added(
+            force=[unit * length * dot(induced, [gradient[i][j] for i in range(3)]) for j in range(3)],
+            torque=[unit / inertia * t for t in cross(induced, field)],
+            energy=-0.5 * unit * dot(induced, field),
+        )
 
 
 def _combined(weights: Array, values: Vector) -> hy.expression:

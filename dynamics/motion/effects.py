@@ -11,15 +11,13 @@ from ...fem.rotor.table import FieldFormula, FieldTable
 from ...fem.rotor_metal import cached_rotor_losses, check_metal, pieces_of
 from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
-from .body_shape import BodyShape, response_error
+from .body_shape import INDUCED_SHAPE, BodyShape, InducedShape
 from .coils import with_coils
 from .effect import Interaction
 from .floater_effects import (
     FLOATER_CURRENTS,
     FLOATER_SHAPE,
-    INDUCED_SHAPE,
     FloaterShape,
-    InducedShape,
     check_floater_metal,
     scene_effects,
 )
@@ -27,7 +25,7 @@ from .rotor_effects import MUTUAL, ROTOR_CURRENTS, STEP, Mutual, RotorCurrents, 
 
 NOTHING_PERMEABLE = "neither rotor nor floater is permeable"
 LARGEST = 5000  # Points in the magnets with which mutual magnetisation is computed at all: minutes
-MOST_POINTS = 1000  # In the magnets, up to which mutual magnetisation is chosen: a floater of 3 mm below a cube of 10 mm
+MOST_POINTS = 1000  # In them, up to which mutual magnetisation is chosen: a floater of 3 mm below a cube of 10 mm
 NEAR = 2.0  # Distance from the rotor, in floater radii, at which induced forces are compared with `rtol`
 
 
@@ -111,8 +109,7 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     known = {effect.name: effect for effect in whole.effects}
     if MUTUAL in known and INDUCED_SHAPE not in known and not scene.floater.is_sphere:
         mutual = known[MUTUAL]
-        missed = response_error(scene.floater) if isinstance(mutual, Mutual) else 0.0
-        effects.append(InducedShape.of(scene.floater, mutual if isinstance(mutual, Mutual) else None, missed))
+        effects.append(InducedShape.of(scene.floater, mutual if isinstance(mutual, Mutual) else None))
     if pieces := pieces_of(scene.rotor, scene.conductors):
         check_metal(pieces, scene.fastest, scene.floater.radius)
     if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:

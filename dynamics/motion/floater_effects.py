@@ -53,7 +53,7 @@ from numpy.typing import ArrayLike
 from ...fem.closed_forms.eddy_bodies import skin_number
 from ...fem.floater_metal import DIPOLE, GRADIENTS, QUADRUPOLE, current_shape
 from ...fem.harmonics.interior import LocalField
-from ...fem.rotor.floater import FloaterSources, force_and_torque, polarizability_tensor
+from ...fem.rotor.floater import FloaterSources, force_and_torque
 from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable
 from ...fem.rotor_metal import ROUNDED
 from ...geometry.common import Array, InputError
@@ -61,7 +61,6 @@ from ...geometry.scene.contents import AIR_VISCOSITY, Scene
 from ...geometry.scene.floater import Floater
 from .coils import CoilForce
 from .effect import NOTHING, ZERO, Added, Effect, Motion, Poses, dissipative
-from .rotor_effects import Mutual
 from .state import Parameter, Vector, add, cross, dot
 
 REAL_AIR = "air beyond Stokes"
@@ -224,60 +223,7 @@ class FloaterShape:
         return np.asarray(np.linalg.norm([torque, force], axis=2).T / (self.floater.moment or 1.0))
 
 
-INDUCED_SHAPE = "shape of what is induced in the floater"
-
-
 EVEN = 1e-6  # By which entries of a polarizability may differ that is the same in all directions, as a cube's is
-
-
-@dataclass(frozen=True, eq=False)
-class InducedShape:
-    """What the rotor's field at its centre induces in a floater beyond a sphere of its magnets' volume.
-
-    Its energy is -½ B·A B with the difference A of the two polarizabilities, which turns with the body. It states what
-    `mutual` misses of such a body.
-    """
-
-    tensor: Array  # (3, 3) A m²/T, along the body's axes
-    name: str = INDUCED_SHAPE
-    mutual: Mutual | None = None  # magnetisation of the rotor and a sphere of the floater's volume
-    missed: float = 0.0  # of its force, and of its torque by its force times the radius, see `response_error`
-
-    @classmethod
-    def of(cls, floater: Floater, mutual: Mutual | None = None, missed: float = 0.0) -> "InducedShape":
-        """That of a floater; one that is round about its moment, or the mean of turns about it, has a round one."""
-        tensor = polarizability_tensor(floater) - floater.polarizability * np.eye(3)
-        if floater.round:
-            across = (tensor[0, 0] + tensor[1, 1]) / 2
-            tensor = np.diag([across, across, tensor[2, 2]])
-        return cls(tensor, mutual=mutual, missed=missed)
-
-    def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
-        """See `Unsure`."""
-        if self.mutual is None:
-            return np.zeros(len(points)), np.zeros(len(points))
-        force = self.missed * self.mutual.sizes(points, field)[1]
-        return self.mutual.table.grids[0].radius * force, force
-
-    @property
-    def compiled_in(self) -> tuple[float, ...]:
-        """Numbers in the code of the equations, see `Rates.elsewhere`."""
-        return tuple(self.tensor.ravel().tolist())
-
-    def added(self, motion: Motion) -> Added:
-        which = Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE
-        length, inertia, share = (motion.given[p] for p in which)
-        field, gradient, unit = motion.field, motion.gradient, share * share
-        induced = by_tensor(self.tensor, field, motion)
-        if is_even(self.tensor):
-            # as of a sphere, whatever its turn: there is no torque
-            energy = -0.5 * unit * dot(induced, field)
-            return Added(pulled=[unit * length * b for b in induced], energy=energy)
-        return Added(
-            force=[unit * length * dot(induced, [gradient[i][j] for i in range(3)]) for j in range(3)],
-            torque=[unit / inertia * t for t in cross(induced, field)],
-            energy=-0.5 * unit * dot(induced, field),
-        )
 
 
 def is_even(tensor: Array) -> bool:

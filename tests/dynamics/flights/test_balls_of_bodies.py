@@ -11,11 +11,10 @@ from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights import balls as balls_module
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
 from spinlev.dynamics.motion import floater_effects
-from spinlev.dynamics.motion.body_shape import BodyShape
+from spinlev.dynamics.motion.body_shape import BodyShape, InducedShape
 from spinlev.dynamics.motion.effect import SMALLEST, Interaction
 from spinlev.dynamics.motion.effects import with_effects
 from spinlev.dynamics.motion.equations import equations_of_motion
-from spinlev.dynamics.motion.floater_effects import InducedShape
 from spinlev.fem.harmonics.interior import Ball, BallField
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import tilt

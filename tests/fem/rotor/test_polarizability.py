@@ -8,8 +8,8 @@ import pytest
 from article import MAGNETS, NO_DRAG
 
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate
+from spinlev.dynamics.motion.body_shape import InducedShape
 from spinlev.dynamics.motion.effect import Interaction
-from spinlev.dynamics.motion.floater_effects import InducedShape
 from spinlev.fem.elements.surface import SurfaceCharges
 from spinlev.fem.harmonics.expansion import polynomial_rule
 from spinlev.fem.rotor.choice import rotor_table
