@@ -294,3 +294,14 @@ def test_errors_by_nodes(name):
     else:
         assert errors[2] < 5e-4
         assert errors[-1] < 2e-6 + 2 * stated
+
+
+@pytest.mark.parametrize("mu", [1.05, 1.5, 3.0])
+def test_too_many_nodes_to_factorise_have_the_charges_that_factors_give(monkeypatch, mu):
+    """In a few turns of responses to each other, or where these do not settle field by field."""
+    surfaces = SurfaceCharges(halbach(4, 1.0, mu), 3)
+    field = np.random.default_rng(6).normal(size=(len(surfaces.places), 7))
+    factorised = surfaces.response(field)
+    monkeypatch.setattr(surface, "DENSE", 0)
+    monkeypatch.setattr(surface, "BLOCK", 3)
+    np.testing.assert_allclose(surfaces.response(field), factorised, atol=1e-10 * np.abs(factorised).max())
