@@ -367,7 +367,7 @@ class InducedShape:
     tensor: Array  # (3, 3) A m²/T, along the body's axes
     name: str = INDUCED_SHAPE
     mutual: Mutual | None = None  # magnetisation of the rotor and a sphere of the floater's volume
-    missed: float = 0.0  # of its force, and of its torque by its force times the radius
+    floater: Floater | None = None  # that body
 
     @classmethod
     def of(cls, floater: Floater, mutual: Mutual | None = None) -> "InducedShape":
@@ -376,14 +376,14 @@ class InducedShape:
         if floater.round:
             across = (tensor[0, 0] + tensor[1, 1]) / 2
             tensor = np.diag([across, across, tensor[2, 2]])
-        return cls(tensor, mutual=mutual, missed=response_error(floater) if mutual else 0.0)
+        return cls(tensor, mutual=mutual, floater=floater)
 
     def doubt(self, points: Array, field: Array) -> tuple[Array, Array]:
-        """See `Unsure`."""
-        if self.mutual is None:
+        """See `Unsure`; of the torque as `response_error` has it."""
+        if self.mutual is None or self.floater is None:
             return np.zeros(len(points)), np.zeros(len(points))
-        force = self.missed * self.mutual.sizes(points, field)[1]
-        return self.mutual.table.grids[0].radius * force, force
+        force = response_error(self.floater) * self.mutual.sizes(points, field)[1]
+        return self.floater.radius * force, force
 
     @property
     def compiled_in(self) -> tuple[float, ...]:

@@ -106,10 +106,10 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
         else:
             bodies = [magnet.body for magnet in scene.rotor]
             effects.append(BodyShape.of(scene.floater, whole.field, bodies))
-    known = {effect.name: effect for effect in whole.effects}
+    known = {effect.name for effect in whole.effects}
     if MUTUAL in known and INDUCED_SHAPE not in known and not scene.floater.is_sphere:
-        mutual = known[MUTUAL]
-        effects.append(InducedShape.of(scene.floater, mutual if isinstance(mutual, Mutual) else None))
+        mutual = next((effect for effect in whole.effects if isinstance(effect, Mutual)), None)
+        effects.append(InducedShape.of(scene.floater, mutual))
     if pieces := pieces_of(scene.rotor, scene.conductors):
         check_metal(pieces, scene.fastest, scene.floater.radius)
     if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:

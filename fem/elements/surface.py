@@ -38,7 +38,7 @@ from ..harmonics.solid import FOUR_PI, gauss_legendre, members, orthonormal
 INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
 DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and columns that are made at once
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
-TURNS = 25  # of responses to each other, in which those of χ up to a half settle so far
+TURNS = 25  # of magnets' responses to each other; with χ up to 1/2 they settle to that in fewer
 # Distance from a face, in edges by the nodes along them, from which on the nodes' own rule does: nodes are at most
 # h = 1.2 of that apart, so that it errs by exp(-2π 4/1.2) = 1e-9
 APART = 4.0

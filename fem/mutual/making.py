@@ -64,7 +64,7 @@ CHUNK = 512  # rows of equations at once, so that they take some megabytes
 # Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
 SINGLE = 250
 GAPS = (0.03, 0.08, 0.16, 0.5, 1.5)  # at which both are compared, in floater radii
-DIPOLES = 500  # places of them at most, of which many magnets' responses are fitted
+MOST_PLACES = 500  # of dipoles, the responses to which are fitted; many magnets would have thousands
 SAFETY = 4.0  # for the poses that were not looked at
 MEANS = 0.2  # of what is added, by the difference of two permeabilities whose mean the charges have: 0.09 measured
 CHARGED = 1.0  # error of the finer charges by what the coarser ones differ from them
@@ -179,7 +179,7 @@ def mutual_table(
     pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.permeable:
         places = places_around(magnets, floater.radius, ROTOR_GAPS, taken.dipoles, 1)
-        places = places[:: -(-len(places) // DIPOLES)]
+        places = places[:: max(1, -(-len(places) // MOST_PLACES))]
         grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, places), places)
     if floater.recoil_permeability != 1:
         facing = places_facing(magnets, floater.radius, SPHERE_GAPS)

@@ -213,7 +213,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
         if left * size <= accuracy.rtol / 4:
             break
     fitted, beside, alone = any(fits), None, len(tail)
-    fits.clear()  # hundreds of megabytes
+    fits.clear()  # hundreds of megabytes, of which `beside` would keep a part
     causes = {"discretisation": steps[:alone], "tail": tail, PIECES: pieces, CHARGES: steps[alone:]}
     known = {cause: parts for cause, some in causes.items() if (parts := nonzero(some))}
     polarized = tuple(one for one in carriers if one.polarization.any())

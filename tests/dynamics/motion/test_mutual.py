@@ -294,4 +294,4 @@ def test_error_bars_have_what_the_response_misses_of_a_shape(name, mutual):
     of_field, of_gradient = np.subtract(with_effects(scene, known).relative_error(places), known.relative_error(places))
     stated = response_error(scene.floater) * force / answers.moment
     np.testing.assert_allclose(of_gradient * np.linalg.norm(gradient, axis=(1, 2)), stated, rtol=1e-5)
-    np.testing.assert_allclose(of_field * np.linalg.norm(field, axis=1), stated * scene.floater.ball.radius, rtol=1e-5)
+    np.testing.assert_allclose(of_field * np.linalg.norm(field, axis=1), stated * scene.floater.radius, rtol=1e-5)
