@@ -228,11 +228,14 @@ def _all_curves(balance: Balance, where: SearchRange, watch: Watch) -> list[Curv
         # Four balances do not fix a curve in a field of revolution about the axis.
         traced = whole_curves(_Lateral(balance), seeds[chosen], STEPS, lambda points: where.holds(points[:, :3]))
         for seed, one in zip(seeds[chosen], traced, strict=True):
-            if one is None or len(one[0]) < 2 or any(known.passes(seed) for known in curves):
+            if one is None or len(one[0]) < 2 or any(curve.passes(seed) for curve in curves):
                 continue
             points, tangents = one
             value, slope = balance(points[:, :3], points[:, 3:])
             slope = AtRest.extended(value, slope, points[:, 3:])[1][:, AXIAL]
+            # dipoles of a flat floater may meet an edge of a magnet
+            known = np.isfinite(value).all(axis=1) & np.isfinite(slope).all(axis=1)
+            points, tangents, value, slope = (part[known] for part in (points, tangents, value, slope))
             arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
             curves.append(Curve(arc, points, tangents, value[:, AXIAL], np.sum(slope * tangents, axis=1)))
         seeds = np.array([seed for seed in seeds[~chosen] if not any(curve.passes(seed) for curve in curves)])

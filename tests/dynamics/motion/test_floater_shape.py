@@ -123,6 +123,33 @@ def test_a_flight_is_that_of_a_rigid_body_with_charges():
     assert np.linalg.norm(end.spin - spin) < 1e-3 * np.linalg.norm(spin)
 
 
+@pytest.mark.parametrize("height", [4e-3, 1e-3, 0.5e-3])
+def test_a_flat_disc_keeps_its_energy(height):
+    """Of 16 mm, however flat, thrown at the rotor: of 1 mm with dipoles within it, which cancel, it kept it to 1e-7."""
+    body, moment = Cylinder(8e-3, height), np.array([-0.98, 0.02, 0.2])
+    disc = Floater(body.circumradius, 1.305, 1.0, 7500.0, None, body)
+    spin = SCENE.angular_velocity * np.array([0.0, 0.3, 1.0])
+    start = AbsoluteStart(np.array([1e-3, 5e-4, -25e-3]), np.array([0.0, 0.0, 0.02]), moment, spin)
+    flown = simulate(replace(SCENE, floater=disc, start=start), rotor_table((CUBE,), "cuboid"), 0.01)
+    assert flown.ended_by == "duration"
+    assert flown.energy_error < 1e-12
+
+
+@pytest.mark.slow
+def test_dipoles_of_a_flat_disc_may_meet_an_edge_of_a_magnet():
+    """Where they do a curve of balances has no numbers; equilibria are where the whole body balances."""
+    body, table = Cylinder(8e-3, 4e-3), rotor_table((CUBE,), "cuboid")
+    disc = Floater(body.circumradius, 1.305, 1.0, 7500.0, None, body)
+    scene = replace(SCENE, frequency=240.0, floater=disc)
+    found = [e for e in survey(scene, table).equilibria if 0.02 < e.distance < 0.05]
+    assert found
+    for equilibrium in found:
+        axes = disc.axes(equilibrium.state.moment)[None]
+        force = force_and_torque(floater_sources(disc), table, equilibrium.position[None], axes)[0][0]
+        whirl = -(scene.angular_velocity**2) * equilibrium.position * [1, 1, 0]
+        assert np.linalg.norm(force + disc.mass * (scene.gravity - whirl)) < 1e-6 * disc.mass * 9.81
+
+
 def test_a_free_disc_precesses_as_a_symmetrical_top():
     """Without remanence and gravity: about its angular momentum L at the rate L/I (Euler)."""
     disc = replace(DISC, remanence=0.0)
