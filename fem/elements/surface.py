@@ -22,6 +22,7 @@ from itertools import combinations, product
 import numpy as np
 import scipy.linalg
 import scipy.sparse.linalg
+from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from ...geometry.common import MU_0, Array, ComputationError
@@ -330,7 +331,7 @@ class _RoundSurface(Surface):
         """K (n, n), which around the axis is a convolution."""
         count, turns = self.count, 2 * self.count
         orders = np.arange(count + 1)
-        modes = np.concatenate([self._modes(line, orders) for line in self.lines], axis=1)  # (targets, nodes, orders)
+        modes = np.concatenate([self._modes(line) for line in self.lines], axis=1)  # (targets, nodes, orders)
         apart = 2 * np.pi * (np.arange(turns)[:, None] - np.arange(turns)) / turns
         shares = np.where((orders == 0) | (orders == count), 1.0, 2.0) / turns
         kernel = np.empty((len(modes), turns, modes.shape[1], turns))
@@ -338,7 +339,7 @@ class _RoundSurface(Surface):
             kernel[:, first] = modes @ (shares[:, None] * np.cos(orders[:, None] * ways))
         return kernel.reshape(len(self.places), -1)
 
-    def _modes(self, line: tuple[Array, Array, Array], orders: NDArray[np.intp]) -> Array:
+    def _modes(self, line: tuple[Array, Array, Array]) -> Array:
         """(targets, n, orders): n·h at the section's nodes by cos mφ times the polynomials of one line's nodes."""
         middle, way, normal = line
         half, count, result = float(np.linalg.norm(way)), self.count, []
@@ -361,7 +362,7 @@ class _RoundSurface(Surface):
             # r - r' cos φ with what cancels taken together
             beside = place[0] - r + 2 * r * np.sin(angle / 2) ** 2
             kernel = (own[0] * beside + own[1] * (place[1] - sources[:, 1:])) / square**1.5
-            around = np.einsum("sk,skm->sm", kernel * step, np.cos(angle[..., None] * orders))
+            around = np.einsum("sk,skm->sm", kernel * step, chebvander(np.cos(angle), count))
             around *= (2 * width * sources[:, 0])[:, None] / FOUR_PI
             result.append(_lagrange(s / half, count).T @ around)
         return np.array(result)

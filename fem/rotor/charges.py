@@ -83,10 +83,11 @@ def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
 
 def _spread(points: Array, spacing: float, most: int) -> Array:
     """Some of the points (n, 3) m, evenly: at a spacing (m) from each other at least, and no more than the `most`."""
-    chosen, farthest, apart = list[int](), 0, np.full(len(points), np.inf)
-    while apart[farthest] > spacing and len(chosen) < most:
+    chosen, farthest, apart, along = list[int](), 0, np.full(len(points), np.inf), np.ascontiguousarray(points.T)
+    while apart[farthest] > spacing**2 and len(chosen) < most:
         chosen.append(farthest)
-        apart = np.minimum(apart, np.linalg.norm(points - points[farthest], axis=1))
+        away = along - along[:, farthest, None]
+        np.minimum(apart, np.einsum("an,an->n", away, away), out=apart)
         farthest = int(np.argmax(apart))
     return np.asarray(points[chosen])
 
