@@ -41,8 +41,8 @@ from ..geometry.files import MOST, closed, hdf5_fault, ours, regular_file, seal,
 # Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
-    "rotor": 10,
-    "mutual": 14,
+    "rotor": 11,
+    "mutual": 15,
     "map": 3,
     "plate": 2,
     "driven-plate": 3,

@@ -5,6 +5,7 @@ By finite elements, or by charges on surfaces ("surface"). Or by so many nodes o
 straight, and turned: a reference without a tilted mesh."""
 
 import sys
+from functools import partial
 from importlib.metadata import version
 
 import numpy as np
@@ -16,14 +17,16 @@ from spinlev.fem.closed_forms.uniform import remanent_field
 from spinlev.fem.elements.surface import SurfaceCharges
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import Box, Magnet
+from spinlev.geometry.shapes import Cylinder
 
 case, resolution = sys.argv[1], float(sys.argv[2])
 points = points_below()
 bodies, way = matrices(case), np.eye(3)
 if "turned" in sys.argv:
     bodies, way = np.eye(3)[None], bodies[0]
+body = partial(Cylinder, EDGE / 2, EDGE) if case == "cylinder" else partial(Box, (EDGE,) * 3)
 rotor = tuple(
-    Magnet(Box((EDGE,) * 3, np.array(center), turn), REMANENCE * np.array(axis), RECOIL)
+    Magnet(body(np.array(center), turn), REMANENCE * np.array(axis), RECOIL)
     for (center, axis), turn in zip(CUBES[case], bodies, strict=True)
 )
 

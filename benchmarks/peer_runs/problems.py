@@ -13,11 +13,22 @@ CUBES = {
     "tilted": [((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))],
 }
 """Centres and axes of magnetisation, the axes in the frame of the body."""
-RING, RING_RADIUS = 2 * np.pi * np.arange(8) / 8, 0.022
-CUBES["ring of 8"] = [
-    ((RING_RADIUS * np.cos(t), RING_RADIUS * np.sin(t), 0.0), (np.cos(t), np.sin(t), 0.0)) for t in RING.tolist()
-]
-"""A Halbach ring: each cube is turned by its place's angle, its magnetisation by twice that."""
+CUBES["cylinder"] = CUBES["cube"]
+"""One that stands where the cube does, as wide and high, and is magnetised across."""
+RINGS = {"ring of 8": (8, 0.022, 0.0), "ring of 64": (64, 0.14, -0.14)}
+"""Halbach rings, by number, radius and place along x of their centre (m): each cube is turned by its place's angle, its
+magnetisation by twice that. The large one's first cube is at the origin."""
+
+
+def _angles(case):
+    return 2 * np.pi * np.arange(RINGS[case][0]) / RINGS[case][0]
+
+
+for _ring, (_, _radius, _middle) in RINGS.items():
+    CUBES[_ring] = [
+        ((_middle + _radius * np.cos(t), _radius * np.sin(t), 0.0), (np.cos(t), np.sin(t), 0.0))
+        for t in _angles(_ring).tolist()
+    ]
 
 
 def turned(case):
@@ -27,8 +38,8 @@ def turned(case):
 
 def turns(case):
     """Rotation vectors (n, 3) of the cubes, rad; about one axis each."""
-    if case == "ring of 8":
-        return np.outer(RING, [0.0, 0.0, 1.0])
+    if case in RINGS:
+        return np.outer(_angles(case), [0.0, 0.0, 1.0])
     return np.tile([0.0, -turned(case), 0.0], (len(CUBES[case]), 1))
 
 

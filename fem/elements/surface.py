@@ -50,9 +50,9 @@ ROWS = 1 << 20  # numbers at once in such a rule
 TOGETHER = 1e-14  # square of a distance, by those from the axes' origin, below which two nodes are one
 ROUND_OFF = 1e-13  # of a line's half: no place is nearer to a node than that
 WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near the axis, too
-# Distance of two bodies' centres, in the sum of their circumradii, from which on few places on each stand for all:
-# those of Gauss's rule, COARSE along an edge. What is charged beyond the carriers has hardly a field there.
-FAR, COARSE = 1.5, 4
+# Distances of two bodies' centres, in the sum of their circumradii, from which on few places on each stand for all, and
+# how many of Gauss's rule along an edge do. What is charged beyond the carriers has hardly a field there.
+FAR, COARSE = (1.5, 6.0), (4, 2)
 
 
 @cache
@@ -122,11 +122,9 @@ def _far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Ar
     return np.asarray(inverse * (areas / FOUR_PI))
 
 
-def _from_gauss(places: Array) -> Array:
-    """(n, COARSE): Lagrange's polynomials at Gauss's COARSE nodes, at places x (n,)."""
-    x, weights = gauss_legendre(COARSE)
-    shares = (np.arange(COARSE) + 0.5)[:, None] * np.polynomial.legendre.legvander(x, COARSE - 1).T * weights
-    return np.asarray(np.polynomial.legendre.legvander(places, COARSE - 1) @ shares)
+def _from_gauss(places: Array, count: int) -> Array:
+    """(n, count): Lagrange's polynomials at so many of Gauss's nodes, at places x (n,)."""
+    return np.asarray(np.polynomial.legendre.legvander(places, count - 1) @ _to_nodes(count))
 
 
 def _around(angles: Array, count: int) -> Array:
@@ -155,8 +153,12 @@ class Surface:
         raise NotImplementedError
 
     @cached_property
-    def coarse(self) -> tuple[Array, Array, Array]:
-        """Places and normals (k, 3) that stand for all from afar, and the nodes' values by those there (n, k)."""
+    def coarse(self) -> list[tuple[Array, Array, Array]]:
+        """Places and normals (k, 3) that stand for all from each of `FAR`, and the nodes' values by those (n, k)."""
+        return [self._fewer(count) for count in COARSE]
+
+    def _fewer(self, count: int) -> tuple[Array, Array, Array]:
+        """One of `coarse`, with so many places along an edge."""
         raise NotImplementedError
 
     def rows_nearby(self, places: Array, normals: Array) -> Array:
@@ -234,14 +236,13 @@ class _BoxSurface(Surface):
                     result[np.ix_(turned[chosen], turned[face])] = rows
         return result
 
-    @cached_property
-    def coarse(self) -> tuple[Array, Array, Array]:
-        x, _ = gauss_legendre(COARSE)
+    def _fewer(self, count: int) -> tuple[Array, Array, Array]:
+        x, _ = gauss_legendre(count)
         places, normals, shares = [], [], []
         for axis, side in self.numbers:
             places.append(self._grid(axis, side, x, x))
             normals.append(np.broadcast_to(side * np.eye(3)[axis], places[-1].shape))
-            along, across = (_from_gauss(graded(self.counts[k])[0]) for k in self._order(axis)[:2])
+            along, across = (_from_gauss(graded(self.counts[k])[0], count) for k in self._order(axis)[:2])
             shares.append(np.kron(along, across))
         return np.concatenate(places), np.concatenate(normals), np.asarray(scipy.linalg.block_diag(*shares))
 
@@ -305,11 +306,10 @@ class _RoundSurface(Surface):
         self.areas = np.repeat(widths * self.section[:, 0] * 2 * np.pi / turns, turns)
         self.reach = INSET * body.circumradius  # of bodies that touch
 
-    @cached_property
-    def coarse(self) -> tuple[Array, Array, Array]:
-        few = _RoundSurface(self.body, COARSE, gauss_legendre(COARSE))
-        along = scipy.linalg.block_diag(*[_from_gauss(graded(self.count)[0])] * len(self.lines))
-        return few.places, few.normals, np.kron(along, _around(np.pi * np.arange(2 * self.count) / self.count, COARSE))
+    def _fewer(self, count: int) -> tuple[Array, Array, Array]:
+        few = _RoundSurface(self.body, count, gauss_legendre(count))
+        along = scipy.linalg.block_diag(*[_from_gauss(graded(self.count)[0], count)] * len(self.lines))
+        return few.places, few.normals, np.kron(along, _around(np.pi * np.arange(2 * self.count) / self.count, count))
 
     def rows_nearby(self, places: Array, normals: Array) -> Array:
         """As of `Surface`: the nodes' own rule, and the charges' own jump on flat faces that touch."""
@@ -375,9 +375,8 @@ class _SphereSurface(Surface):
         self.normals, areas = sphere(count)
         self.places, self.areas, self.count = body.radius * self.normals, body.radius**2 * areas, count
 
-    @cached_property
-    def coarse(self) -> tuple[Array, Array, Array]:
-        keys, (normals, areas) = members(COARSE), sphere(COARSE)
+    def _fewer(self, count: int) -> tuple[Array, Array, Array]:
+        keys, (normals, areas) = members(count), sphere(count)
         shares = orthonormal(keys, self.normals) @ (orthonormal(keys, normals).T * areas)
         return float(np.linalg.norm(self.places[0])) * normals, normals, shares
 
@@ -459,13 +458,14 @@ class SurfaceCharges:
         centers = np.array([magnet.body.center for magnet in self.magnets])
         radii = np.array([magnet.body.circumradius for magnet in self.magnets])
         distances = np.linalg.norm(centers[:, None] - centers, axis=2)
-        self._far = distances > FAR * (radii[:, None] + radii)
+        # of each pair whether they are near each other, 0, or far, 1 and more
+        self._distance = np.searchsorted(FAR, distances / (radii[:, None] + radii))
         self._near = [self._rows(k) for k in range(len(self.magnets))]
 
     def _rows(self, number: int) -> tuple[NDArray[np.intp], Array]:
         """Nodes of bodies that are not far from a magnet, and n·h there by its charges."""
         magnet, surface = self.magnets[number], self._surfaces[number]
-        at = np.flatnonzero(~self._far[number, self.owner] & (self.owner != number))
+        at = np.flatnonzero((self._distance[number, self.owner] == 0) & (self.owner != number))
         mine, rows = self.owner == number, np.zeros((len(at), len(surface.places)))
         close = magnet.body.distance(self.places[at]) < surface.reach
         rows[~close] = _far_rows(self.places[at[~close]], self.normals[at[~close]], self.places[mine], self.areas[mine])
@@ -477,20 +477,25 @@ class SurfaceCharges:
     def numbers_at(self, count: int) -> float:
         """Of all matrices, with `count` nodes along an edge, about."""
         nodes = (count / self.count) ** 2 * np.bincount(self.owner)
-        return float(np.sum(~self._far * np.outer(nodes, nodes)))
+        return float(np.sum((self._distance == 0) * np.outer(nodes, nodes)))
 
     @cached_property
-    def _from_afar(self) -> Array:
-        """n·h at the coarse places of all bodies by charges at those of bodies that are far from them."""
-        owner = np.repeat(np.arange(len(self.magnets)), [len(surface.coarse[0]) for surface in self._surfaces])
-        of = [(magnet.body, surface.coarse) for magnet, surface in zip(self.magnets, self._surfaces, strict=True)]
-        places = np.concatenate([body.center + few[0] @ body.rotation.T for body, few in of])
-        normals = np.concatenate([few[1] @ body.rotation.T for body, few in of])
-        result = np.zeros((len(places), len(places)))
-        for k in range(len(self.magnets)):
-            far, mine = self._far[k, owner], owner == k
-            result[np.ix_(far, mine)] = _far_rows(places[far], normals[far], places[mine], np.ones(mine.sum()))
-        return result
+    def _from_afar(self) -> list[list[tuple[NDArray[np.intp], Array]]]:
+        """For each of `FAR` and each body: coarse places of bodies so far from it, and n·h there by charges at its."""
+        found = []
+        for far in range(len(FAR)):
+            of = [
+                (magnet.body, surface.coarse[far]) for magnet, surface in zip(self.magnets, self._surfaces, strict=True)
+            ]
+            owner = np.repeat(np.arange(len(of)), [len(few[0]) for _, few in of])
+            places = np.concatenate([body.center + few[0] @ body.rotation.T for body, few in of])
+            normals = np.concatenate([few[1] @ body.rotation.T for body, few in of])
+            blocks = []
+            for k in range(len(of)):
+                at, mine = np.flatnonzero(self._distance[k, owner] == far + 1), places[owner == k]
+                blocks.append((at, _far_rows(places[at], normals[at], mine, np.ones(len(mine)))))
+            found.append(blocks)
+        return found
 
     def normal_field(self, charges: Array) -> Array:
         """K σ (n, ...) T of charges (n, ...) T."""
@@ -499,14 +504,15 @@ class SurfaceCharges:
         for surface, mine, (at, rows) in zip(self._surfaces, of, self._near, strict=True):
             found[mine] += surface.kernel @ charges[mine]
             found[at] += rows @ charges[mine]
-        if self._far.any():
-            amounts = (self.areas * charges.T).T
-            seen = self._from_afar @ np.concatenate(
-                [surface.coarse[2].T @ amounts[mine] for surface, mine in zip(self._surfaces, of, strict=True)]
-            )
-            parts = np.split(seen, np.cumsum([len(surface.coarse[0]) for surface in self._surfaces])[:-1])
-            for surface, mine, part in zip(self._surfaces, of, parts, strict=True):
-                found[mine] += surface.coarse[2] @ part
+        amounts = (self.areas * charges.T).T
+        for far, blocks in enumerate(self._from_afar if self._distance.any() else ()):
+            shares = [surface.coarse[far][2] for surface in self._surfaces]
+            ends = np.cumsum([share.shape[1] for share in shares])
+            seen = np.zeros((ends[-1], *charges.shape[1:]))
+            for share, mine, (at, rows) in zip(shares, of, blocks, strict=True):
+                seen[at] += rows @ (share.T @ amounts[mine])
+            for share, mine, part in zip(shares, of, np.split(seen, ends[:-1]), strict=True):
+                found[mine] += share @ part
         return found
 
     def refined(self, number: int, charges: Array) -> tuple[Array, Array]:
