@@ -1,18 +1,16 @@
 """Fields of magnets that differ from those of a table: smooth functions of the magnets' numbers, and as exact."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ...geometry.magnets import Magnet
 from ...geometry.solids import Part
 from ..closed_forms.moments import carrier
 from ..elements.surface import SurfaceCharges
 from ..harmonics.expansion import MultipoleExpansion, uniform_moments
-from ..harmonics.solid import rotated_harmonics
 from .charges import charged_expansion, converging, without_charges
 from .models import (
     DEGREE,
@@ -46,7 +44,9 @@ def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> Chan
     table = getattr(table, "origin", table)
     before = table.magnets
     if sizes := magnified(before, rotor):
-        return _transformed(table, before[0], rotor[0], *sizes, doubts)
+        bare = table if doubts else replace(table, doubts={})
+        whole = bare.transformed(before[0].body, rotor[0], *sizes)
+        return ChangedTable(**{part.name: getattr(whole, part.name) for part in fields(RotorTable)}, origin=table)
     simple = {"dipole": lambda m: ((), tuple(uniform_moments(one, 1) for one in m))}.get(table.model, _closed)
     charged = table.model in ("fem", "surface") and _bear_charges(before) and _bear_charges(rotor)
     (minus, less), (plus, more) = ((_with_charges if charged else simple)(m) for m in (before, rotor))
@@ -137,19 +137,3 @@ def magnified(rotor: Rotor, other: Rotor) -> tuple[float, float] | None:
     strong = float(np.linalg.norm(after.polarization) / (np.linalg.norm(before.polarization) or 1.0))
     alike = [(numbers[0] * size, numbers[1]), (before.polarization * strong, after.polarization)]
     return (size, strong) if all(np.allclose(a, b, rtol=1e-13, atol=1e-15) for a, b in alike) else None
-
-
-def _transformed(
-    table: RotorTable, before: Magnet, after: Magnet, size: float, strong: float, doubts: bool
-) -> ChangedTable:
-    turn = after.body.rotation @ before.body.rotation.T
-
-    def there(part: MultipoleExpansion) -> MultipoleExpansion:
-        center = after.body.center + size * turn @ (part.center - before.body.center)
-        coefficients = strong * rotated_harmonics(part.coefficients, turn)
-        return MultipoleExpansion(center, size * part.radius, coefficients, turn @ part.axes)
-
-    forms = tuple(replace(form, body=after.body, polarization=strong * form.polarization) for form in table.uniform)
-    known = {cause: tuple(map(there, parts)) for cause, parts in table.doubts.items()} if doubts else {}
-    parts = tuple(map(there, table.expansions))
-    return ChangedTable(table.model, (after,), forms, parts, known, table.provenance, table)

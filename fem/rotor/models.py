@@ -386,13 +386,8 @@ def extrapolated_tail(expansions: Sequence[MultipoleExpansion], ratio: float = C
 
 def of_true_moment(rotor: Rotor, table: RotorTable) -> Rotor:
     """The `rotor`'s magnets with μr = 1, polarised so that each has the dipole moment that it has in a `table`."""
-    parts = [(magnet.body.center, magnet.moment) for magnet in table.uniform]
-    parts += [(expansion.center, expansion.moment) for expansion in table.expansions]
-    centers = np.array([center for center, _ in parts])
-    owners = np.argmin([magnet.body.distance(centers) for magnet in rotor], axis=0)
     found = []
-    for k, magnet in enumerate(rotor):
-        moment = sum((m for (_, m), owner in zip(parts, owners, strict=True) if owner == k), np.zeros(3))
+    for magnet, moment in zip(rotor, replace(table, magnets=rotor).moments, strict=True):
         along = MU_0 / magnet.body.volume * magnet.body.rotation.T @ moment
         found.append(replace(magnet, polarization=along, recoil_permeability=1.0, transverse_permeability=None))
     return tuple(found)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import Array, InputError, counted, html_table
 from ...geometry.magnets import Magnet
-from ...geometry.solids import moved
+from ...geometry.solids import Solid, moved
 from ..cache import TableKind
 from ..closed_forms.uniform import UniformField, squared_distance
 from ..harmonics.expansion import MultipoleExpansion, summed_derivatives, without_noise
@@ -148,14 +148,10 @@ class RotorTable:
                 return self
             lowest = [replace(part, coefficients=part.coefficients[: LOW + 1, : LOW + 1]) for part in self.expansions]
         else:
-            centers = np.array([part.center for part in self.expansions])
-            owner = np.argmin([magnet.body.distance(centers) for magnet in self.magnets], axis=0)
             balls = [Ball(magnet.body.center, magnet.body.circumradius) for magnet in self.magnets]
-            moments = [sum((e.moment for e, k in zip(self.expansions, owner, strict=True) if k == number), np.zeros(3))
-                       for number in range(len(balls))]  # fmt: skip
             lowest = [
                 MultipoleExpansion(ball.center, ball.radius, dipole_sources(moment, ball, 1))
-                for ball, moment in zip(balls, moments, strict=True)
+                for ball, moment in zip(balls, replace(self, uniform=()).moments, strict=True)
             ]
         return replace(self, expansions=tuple(lowest), doubts={})
 
@@ -199,8 +195,16 @@ class RotorTable:
     @property
     def moment(self) -> Array:
         """(3,) dipole moment of the whole rotor, A m²."""
-        parts = [magnet.moment for magnet in self.uniform] + [expansion.moment for expansion in self.expansions]
-        return np.asarray(np.sum(parts, axis=0))
+        return np.asarray(sum((e.moment for e in self.expansions), sum(m.moment for m in self.uniform)))
+
+    @property
+    def moments(self) -> Array:
+        """(k, 3) dipole moments of the magnets, A m²; what is not about a magnet's centre is of the nearest."""
+        parts = [(magnet.body.center, magnet.moment) for magnet in self.uniform]
+        parts += [(expansion.center, expansion.moment) for expansion in self.expansions]
+        centers, moments = np.reshape(parts, (-1, 2, 3)).swapaxes(0, 1)
+        owner = np.argmin([magnet.body.distance(centers) for magnet in self.magnets], axis=0)
+        return np.array([moments[owner == k].sum(axis=0) for k in range(len(self.magnets))])
 
     @keeps_shape
     def relative_error(self, points: Array) -> tuple[Array, Array]:
@@ -254,22 +258,33 @@ class RotorTable:
         """The table of a rotor from that of `alike(rotor)`: the same field and errors, moved, but for round-off."""
         if len(rotor) != 1:
             return replace(self, magnets=rotor)
-        body = rotor[0].body
+        return self.transformed(canonical(rotor)[0].body, rotor[0])
+
+    def transformed(self, before: Solid, after: Magnet, size: float = 1.0, strength: float = 1.0) -> "RotorTable":
+        """The field of a lone magnet from that of one with the body `before`.
+
+        It is like that but for its pose, `size` times as large, and polarised `strength` times as much.
+        """
+        body = after.body
+        turn = body.rotation @ before.rotation.T
 
         def there(parts: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
             found = []
             for part in parts:
-                turned = rotated_harmonics(part.coefficients, body.rotation)
+                turned = rotated_harmonics(part.coefficients, turn)
                 if turned is not part.coefficients:  # what symmetry forbids and round-off makes costs time
                     turned = without_noise(turned, 1e-15)
-                center = body.center + body.rotation @ part.center
-                found.append(replace(part, center=center, coefficients=turned, axes=body.rotation @ part.axes))
+                center = body.center + size * turn @ (part.center - before.center)
+                axes = turn @ part.axes
+                found.append(
+                    replace(part, center=center, radius=size * part.radius, coefficients=strength * turned, axes=axes)
+                )
             return tuple(found)
 
         return replace(
             self,
-            magnets=rotor,
-            uniform=tuple(replace(form, body=body) for form in self.uniform),
+            magnets=(after,),
+            uniform=tuple(replace(form, body=body, polarization=strength * form.polarization) for form in self.uniform),
             expansions=there(self.expansions),
             doubts={cause: there(parts) for cause, parts in self.doubts.items()},
         )
