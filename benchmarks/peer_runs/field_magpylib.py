@@ -1,4 +1,6 @@
-"""magpylib with its material response: every cube in n³ cells (a cylinder in about 8 n³) that magnetise each other, then the field of all."""
+"""magpylib with its material response: every cube in n³ cells that magnetise each other, then the field of all.
+
+Or a cylinder in about 8 n³."""
 
 import sys
 from importlib.metadata import version
@@ -23,11 +25,12 @@ def field():
         common = {"position": center, "orientation": Rotation.from_rotvec(turn)}
         common["polarization"] = [REMANENCE * a for a in axis]
         if case == "cylinder":
-            body, mesh, cells = magpylib.magnet.Cylinder(dimension=[EDGE] * 2, **common), mesh_Cylinder, (4 * n, n, 2 * n)
+            body = magpylib.magnet.Cylinder(dimension=[EDGE] * 2, **common)
+            mesh, parts = mesh_Cylinder, (4 * n, n, 2 * n)
         else:
-            body, mesh, cells = magpylib.magnet.Cuboid(dimension=[EDGE] * 3, **common), mesh_Cuboid, (n, n, n)
+            body, mesh, parts = magpylib.magnet.Cuboid(dimension=[EDGE] * 3, **common), mesh_Cuboid, (n, n, n)
         body.susceptibility = RECOIL - 1
-        cubes.append(mesh(body, cells))
+        cubes.append(mesh(body, parts))
     cells = magpylib.Collection(cubes)
     apply_demag(cells, inplace=True, interaction=interaction, solver_tol=1e-8)
     return cells.getB(points)
@@ -35,4 +38,5 @@ def field():
 
 values, seconds = measure(field)
 packages = ("magpylib", "magpylib-material-response")
-say(values, seconds, 8 * n**3 if case == "cylinder" else len(CUBES[case]) * n**3, {p: version(p) for p in packages}, h=1 / n)
+cells = (8 if case == "cylinder" else len(CUBES[case])) * n**3
+say(values, seconds, cells, {p: version(p) for p in packages}, h=1 / n)

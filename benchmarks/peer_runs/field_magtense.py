@@ -46,4 +46,5 @@ def of_cylinder():
 
 
 values, seconds = measure(field)
-say(values, seconds, 8 * n**3 if case == "cylinder" else len(centres) * n**3, {"magtense": version("magtense")}, h=1 / n)
+tiles = (8 if case == "cylinder" else len(centres)) * n**3
+say(values, seconds, tiles, {"magtense": version("magtense")}, h=1 / n)
