@@ -122,7 +122,8 @@ class MovedEffect:
         position = [x / length for x in place]
         found = self.effect.added(Motion(position=position, gradient=gradient, turn=motion.turn, **seen))
         vectors = ("force", "torque", "pulled", "turning")
-        return replace(found, **{name: move.back(getattr(found, name), measure) for name in vectors})
+        back: dict[str, Any] = {name: move.back(getattr(found, name), measure) for name in vectors}
+        return replace(found, **back)
 
     def placed(self, first: int) -> "MovedEffect":
         """See `Placeable`."""

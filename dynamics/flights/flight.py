@@ -174,7 +174,7 @@ class Flight:
         equations = equations_of_motion(whole, self.tilted, self.memory, self.first, driven, moving, given)
         position, turn = equations.variables[:3], DRIVEN if driven else STEADY
         if degree:
-            away = ball.offset([hy.par[Parameter.LENGTH] * x for x in position])
+            away = ball.offset([given[Parameter.LENGTH] * x for x in position])  # as the field has it
             events = [(1.0 - hy.sum([a * a for a in away]), LEFT)]
         else:
             events = flight_events(self.scene, position, turn)
@@ -362,14 +362,14 @@ class Course:
         self.steps, self.ended_by = self.steps + piece.steps, DURATION
         if piece.event is not None:
             self.ended_by = part.meanings[piece.event]
-        if watched and (first := self._touching(times, states)) is not None:
+        if watched and (first := self.touching(times, states)) is not None:
             self.ended_by = CONTACT
             times, states = times[: first + 1], states[: first + 1]
             if first:
-                times[-1], states[-1] = crossing(part.integrator, times[-2:], states[-2:], self._touching)
+                times[-1], states[-1] = crossing(part.integrator, times[-2:], states[-2:], self.touching)
         return times, flight.balanced(self.values, times, states)
 
-    def _touching(self, times: Array, states: Array) -> int | None:
+    def touching(self, times: Array, states: Array) -> int | None:
         """The first of scaled times (n,) at which the floater overlaps something in its state (n, s)."""
         there = self.flight.scales.unpack(states)
         return first_contact(self.flight.scene, times * self.flight.scales.time, there.position, there.orientation)

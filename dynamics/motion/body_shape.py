@@ -203,33 +203,26 @@ class BodyShape:
             force=shape.force,
             torque=add(shape.torque, dipole.torque),
             pulled=dipole.pulled,
-            turning=dipole.turning,
+            more=dipole.more,
             energy=shape.energy + dipole.energy,
             states=states,
             rates=rates,
         )
 
     def _dipole(self, motion: Motion) -> Added:
-        """What the `rest` does: the part along the moment as that itself, which spares the product of vectors."""
-        if not self.rest.any():
-            return Added()
+        """What the `rest` does."""
+        along = float(self.rest @ self.floater.pointing)
+        across = self.rest - along * self.floater.pointing
+        if np.linalg.norm(across) <= ROUND_OFF * strength(self.floater):
+            return Added(more=along)
         assert motion.axes is not None
         length, inertia, share = (motion.given[p] for p in WHICH)
-        along, unit = float(self.rest @ self.floater.pointing), share * share
-        across = self.rest - along * self.floater.pointing
-        added = Added(
-            pulled=[unit * length * along * m for m in motion.moment],
-            turning=[unit / inertia * along * b for b in motion.field],
-            energy=-unit * along * dot(motion.moment, motion.field),
-        )
-        if np.linalg.norm(across) <= ROUND_OFF * strength(self.floater):
-            return added
-        side = [_combined(across, row) for row in motion.axes]
-        return replace(
-            added,
+        unit, side = share * share, [_combined(across, row) for row in motion.axes]
+        return Added(
             torque=[unit / inertia * t for t in cross(side, motion.field)],
-            pulled=add(added.pulled, [unit * length * s for s in side]),
-            energy=added.energy - unit * dot(side, motion.field),
+            pulled=[unit * length * s for s in side],
+            more=along,
+            energy=-unit * dot(side, motion.field),
         )
 
     def _in_ball(self, motion: Motion, states: Vector, turned: Sequence[Vector]) -> Added:

@@ -50,6 +50,7 @@ class Added:
     torque: Vector = NOTHING
     pulled: Vector = NOTHING  # (3,) a moment on which the rotor's gradient acts: scaled force by a gradient of 1 T/m
     turning: Vector = NOTHING  # (3,) a field that turns the floater's moment: scaled torque by a unit moment across it
+    more: float = 0.0  # A m² along the floater's moment, which it is larger by
     energy: hy.expression = ZERO  # term of the Jacobi integral
     power: hy.expression = ZERO  # rate of change of the Jacobi integral by this effect
     motor: hy.expression | None = None  # torque about the axis that it takes from the motor; None: that on the floater

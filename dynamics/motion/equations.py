@@ -210,9 +210,7 @@ def equations_of_motion(
         given[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
     )
     field, gradient = table.expressions([length * p for p in position])
-    strength = torque * inertia * length
     force, turn = [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
-    pulled, turning = [strength * m for m in moment], [torque * b for b in field]
     axial, lateral = _gravity(tilted_gravity, rotor.angle) if not moving else (NOTHING, rotor.gravity)
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
     drift = subtract(velocity, turned(position, rotor.rate, rotor.across))
@@ -222,7 +220,7 @@ def equations_of_motion(
     jacobi = [
         0.5 * dot(velocity, velocity),
         inertia * attitude.energy,
-        -inertia * torque * dot(moment, field),
+        NOTHING[0],  # of the magnet, below
         -axial[2] * position[2],
         -rotor.rate * momenta[2],
     ]
@@ -238,6 +236,10 @@ def equations_of_motion(
         by_plate, their_rates = memory_terms(memory, first, position, moment, currents, driven)
         parts.append(by_plate)
         states, state_rates = [*states, *currents], [*state_rates, *their_rates]
+    if more := sum(added.more for added in parts):
+        torque = torque + given[Parameter.PLATE_SHARE] * given[Parameter.PLATE_SHARE] / inertia * more
+    pulled, turning = [torque * inertia * length * m for m in moment], [torque * b for b in field]
+    jacobi[2] = -inertia * torque * dot(moment, field)
     for added in parts:
         force, turn = add(force, added.force), add(turn, added.torque)
         pulled, turning = add(pulled, added.pulled), add(turning, added.turning)

@@ -9,6 +9,7 @@ every operation costs, so that this saves time as well as compilation.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import heyoka as hy
@@ -76,9 +77,24 @@ def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], moni
 def regular_harmonics(degree: int, position: Sequence[hy.expression]) -> list[hy.expression]:
     """S_m Q_lm with r² for r⁻², regular at the origin, at a position (three expressions); in the order of `members`."""
     x, y, z = position
-    sectoral = _sectoral((x, y), (hy.expression(1.0), hy.expression(0.0)), degree)
+    powers = _powers_across(x, y, degree)
     zonal = _zonal(z, hy.sum([t * t for t in position]), dict.fromkeys(range(degree + 1), degree))
-    return [sectoral[m][part] * zonal[l, m] for l, m, part in members(degree)]
+    return [powers[m][part] * zonal[l, m] for l, m, part in members(degree)]
+
+
+def _powers_across(x: hy.expression, y: hy.expression, highest: int) -> list[tuple[hy.expression, hy.expression]]:
+    """Real and imaginary parts of (x + iy)^m up to an order, by two or three products each."""
+    xx, yy = x * x, y * y
+    found = [(hy.expression(1.0), hy.expression(0.0)), (x, y), (xx - yy, 2.0 * (x * y))]
+    found.append((x * (xx - 3.0 * yy), y * (3.0 * xx - yy)))
+    for m in range(4, highest + 1):
+        re, im = found[m // 2 if m % 2 == 0 else m - 1]
+        if m % 2 == 0:
+            found.append(((re - im) * (re + im), 2.0 * (re * im)))
+        else:
+            first, second = x * re, y * im
+            found.append((first - second, (x + y) * (re + im) - (first + second)))
+    return found
 
 
 def _sectoral(
@@ -93,16 +109,37 @@ def _sectoral(
 
 
 def _zonal(z: hy.expression, square: hy.expression, highest: dict[int, int]) -> dict[tuple[int, int], hy.expression]:
-    """Q_lm of each m up to its highest l."""
+    """Q_lm of each m up to its highest l; short ones as products of factors, which takes fewer than the recurrence."""
     found: dict[tuple[int, int], hy.expression] = {}
+    even = z * z, square
+    odd = z * even[0], z * square
     for m, last in highest.items():
-        found[m, m] = hy.expression(1.0)
-        for l in range(m + 1, last + 1):
-            found[l, m] = z * found[l - 1, m]
-            if l - 2 >= m:
-                factor = ((l - 1) ** 2 - m * m) / ((2 * l - 1) * (2 * l - 3))
-                found[l, m] = found[l, m] - factor * (square * found[l - 2, m])
+        for l in range(m, last + 1):
+            if l - m < 2:
+                found[l, m] = z if l > m else hy.expression(1.0)
+            elif l - m < 6:
+                first, *others = np.roots(_leading(l, m)).tolist()
+                whole, part = odd if (l - m) % 2 else even
+                found[l, m] = whole - first * part
+                for root in others:
+                    found[l, m] = found[l, m] * (even[0] - root * square)
+            else:
+                found[l, m] = z * found[l - 1, m] - _factor(l, m) * (square * found[l - 2, m])
     return found
+
+
+def _factor(l: int, m: int) -> float:
+    """Of Q_(l-2)m in the recurrence of Q_lm."""
+    return ((l - 1) ** 2 - m * m) / ((2 * l - 1) * (2 * l - 3))
+
+
+@cache
+def _leading(l: int, m: int) -> Array:
+    """Coefficients of Q_lm by powers of z², the highest first, r = 1, without a factor of z where l - m is odd."""
+    if l - m < 2:
+        return np.ones(1)
+    above = np.append(_leading(l - 1, m), [0.0] * ((l - m) % 2 == 0))
+    return np.polysub(above, _factor(l, m) * _leading(l - 2, m))
 
 
 class CompiledField:
