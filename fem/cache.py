@@ -35,7 +35,7 @@ import xarray as xr
 from filelock import FileLock, Timeout
 from xarray.backends import H5NetCDFStore
 
-from ..geometry.common import ComputationError, InputError
+from ..geometry.common import ComputationError, InputError, Report
 from ..geometry.files import MOST, closed, hdf5_fault, ours, regular_file, seal, sealed, user, write_whole
 
 # Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
@@ -193,9 +193,7 @@ class TableKind(Generic[Table]):
         except CodecError as error:
             raise TableFileError(f"Input {path} must be a '{self.format}'; instead: {error}") from error
 
-    def cached(
-        self, inputs: tuple[Any, ...], make: Callable[[], Table], report: Callable[[str], None]
-    ) -> tuple[Table, bool]:
+    def cached(self, inputs: tuple[Any, ...], make: Callable[[], Table], report: Report) -> tuple[Table, bool]:
         """The table of some inputs, from the cache if it is there, and whether it was.
 
         A damaged entry, or one that was kept under another key, is reported, computed anew and replaced; a cache that
@@ -368,7 +366,7 @@ def make_room(folder: Path, limit: int) -> None:
 
 
 @contextmanager
-def alone(path: Path, report: Callable[[str], None]) -> Iterator[None]:
+def alone(path: Path, report: Report) -> Iterator[None]:
     """Be the only process in this block with the same lock file; the system frees it if the process dies.
 
     Where no lock can be had, the block runs without: at worst a table is made twice.

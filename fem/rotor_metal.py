@@ -24,7 +24,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..geometry.common import MU_0, Array, InputError, Watch, unwatched, watched
+from ..geometry.common import MU_0, Array, InputError, Report, Watch, unwatched, watched
 from ..geometry.cutting import cut_magnets
 from ..geometry.magnets import Conductor, Magnet
 from ..geometry.meshes.plate import skin_depth
@@ -482,9 +482,7 @@ def losses_key(scene: Scene) -> str:
     return LOSSES.key(*_deciding(scene))
 
 
-def cached_rotor_losses(
-    scene: Scene, report: Callable[[str], None], watch: Watch = unwatched
-) -> tuple[RotorLosses, bool]:
+def cached_rotor_losses(scene: Scene, report: Report, watch: Watch = unwatched) -> tuple[RotorLosses, bool]:
     """The losses in a scene's rotor, from the cache if they are there, and whether they were.
 
     `report` gets messages, `watch` is a progress callback.  At which frequencies they hold, `check_metal` says.

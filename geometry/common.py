@@ -23,6 +23,12 @@ def frozen_array(values: ArrayLike, shape: tuple[int, ...]) -> Array:
     return array
 
 
+def freeze(owner: object, **shapes: tuple[int, ...]) -> None:
+    """Read-only float arrays of these shapes in fields of a frozen dataclass."""
+    for name, shape in shapes.items():
+        object.__setattr__(owner, name, frozen_array(getattr(owner, name), shape))
+
+
 def spread_points(lower: ArrayLike, upper: ArrayLike, number: int) -> Array:
     """Points (`number`, 3) evenly between `lower` and `upper` ends: multiples of irrational numbers (H. Weyl, 1916)."""
     parts = np.arange(1, number + 1)[:, None] * np.sqrt([2.0, 3.0, 5.0]) % 1.0
@@ -131,6 +137,7 @@ def html_table(title: str, rows: Mapping[str, str]) -> str:
     return f"<table><caption>{escape(title)}</caption>{lines}</table>"
 
 
+Report = Callable[[str], None]  # Takes a message of work
 Watch = Callable[[str, float], None]  # Takes the name of a stage and the share of it that is done
 Item = TypeVar("Item")
 P = ParamSpec("P")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .common import MU_0, Array, frozen_array, listed, millimetres
+from .common import MU_0, Array, freeze, listed, millimetres
 from .shapes import Box, rotation_matrix
 from .solids import Solid, moved
 
@@ -40,7 +40,7 @@ class Magnet:
     coercivity: float | None = field(default=None, metadata={"units": "A/m"})
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "polarization", frozen_array(self.polarization, (3,)))
+        freeze(self, polarization=(3,))
         if not self.isotropic and not self.polarization.any():
             raise ValueError(
                 "Input polarization must not be zero where the permeability has an easy axis; instead it is zero."

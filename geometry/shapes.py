@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .common import Array, frozen_array, millimetres
+from .common import Array, freeze, millimetres
 
 ROUND_OFF = 4e-16  # Of the entries of a rotation
 INSIDE = 1 - 1e-9  # Just inside of a surface, in radii
@@ -73,8 +73,7 @@ class Body:
         def area(self) -> float: ...  # of the surface, m²
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
-        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
+        freeze(self, center=(3,), rotation=(3, 3))
 
     @property
     def mirrors(self) -> tuple[int, ...]:
@@ -176,7 +175,7 @@ class Box(Body):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "size", frozen_array(self.size, (3,)))
+        freeze(self, size=(3,))
 
     @cached_property
     def box(self) -> "Box":

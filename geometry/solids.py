@@ -11,7 +11,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .common import Array, frozen_array, millimetres
+from .common import Array, freeze, millimetres
 from .shapes import METRES, Body, Box, Cylinder, Sphere, at_origin, ring, unturned
 
 CHUNK = 100_000  # Points times triangles at once
@@ -48,9 +48,7 @@ class Part(Body):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("extent", "origin", "centroid"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (3,)))
-        object.__setattr__(self, "triangles", frozen_array(self.triangles, (len(self.triangles), 3, 3)))
+        freeze(self, extent=(3,), origin=(3,), centroid=(3,), triangles=(len(self.triangles), 3, 3))
 
     @property
     def size(self) -> Array:

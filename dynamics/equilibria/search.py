@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...fem.cache import TableKind
 from ...fem.rotor.table import ROUND_OFF, FieldTable, RangeError, RotorTable
-from ...geometry.common import Array, Watch, unwatched
+from ...geometry.common import Array, Report, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..motion.body_shape import BodyShape
 from ..motion.coils import BesideCoils
@@ -77,7 +77,7 @@ FIXED_POINTS = TableKind("equilibria", FixedPoints, "Fixed points of a scene wit
 
 
 def cached_points(
-    scene: Scene, equations: str, spin: float, make: Callable[[], FixedPoints], report: Callable[[str], None]
+    scene: Scene, equations: str, spin: float, make: Callable[[], FixedPoints], report: Report
 ) -> tuple[FixedPoints, bool]:
     """Result of a search `make`, from the cache if it is there, and whether it was.
 

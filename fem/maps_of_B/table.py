@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.common import Array, counted, frozen_array, millimetres
+from ...geometry.common import Array, counted, freeze, millimetres
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import MapReading
 from ...geometry.shapes import Sphere
@@ -206,7 +206,7 @@ class GriddedTable:
     region: Array = field(metadata={"units": "m"})
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "region", frozen_array(self.region, (2, 3)))
+        freeze(self, region=(2, 3))
 
     def __repr__(self) -> str:
         parts = [f"degree {part.degree} about {millimetres(part.center)}" for part in self.expansions.expansions]

@@ -1,7 +1,7 @@
 """Which model of the plate a scene needs."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.common import MU_0, Array, InputError, Watch, unwatched
+from ...geometry.common import MU_0, Array, InputError, Report, Watch, unwatched
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Plate, Scene
 from ...geometry.shapes import Box
@@ -20,7 +20,7 @@ from .currents import cached_currents
 from .rotor_share import DOWN
 from .slab import cached_edge_error, edge_error
 from .table import PlateTable, Region, RotorShare
-from .tables import CHANGED, DRIVEN, SLAB, changed_shares, deciding, plate_and_rotor_table, slab_and_rotor_table
+from .tables import CHANGED, DRIVEN, SLAB, changed_shares, deciding, plate_and_rotor_table
 
 NEGLIGIBLE = 1e-6  # Part of the floater's weight below which the largest conceivable force of the plate is left out
 REACH = 0.003  # The floater may move so far from where it begins, along each axis, m
@@ -44,13 +44,15 @@ PLUMB = 1e-9  # Cosine of the angle between a slab's normal and the vertical bel
 class PlateChoice(NamedTuple):
     """Model of a plate, the reason in words, and the relative error by edges that the model leaves out."""
 
+    """Model of a plate."""
+
     model: str
-    reason: str
-    edges: float = 0.0
+    reason: str  # in words
+    edges: float = 0.0  # relative error by edges that the model leaves out
 
 
 def resolve_plate_model(
-    scene: Scene, model: str, place: Array | None, rtol: float, report: Callable[[str], None] = lambda text: None
+    scene: Scene, model: str, place: Array | None, rtol: float, report: Report = lambda text: None
 ) -> PlateChoice:
     """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` is called with what is worked out.
 
@@ -110,20 +112,15 @@ class PlateAround:
     def key(self) -> str:
         return self._kind.key(*deciding(*self._requested))
 
-    def made(self, report: Callable[[str], None], watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
+    def made(self, report: Report, watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
         """The table, the rotor's share in it, and whether they were cached. Raises what the models raise."""
-        make = partial(slab_and_rotor_table, *self._requested)
-        if self.model != "slab":
-            solve = partial(cached_currents, report=report, watch=watch)
-            make = partial(plate_and_rotor_table, *self._requested, solve=solve, watch=watch)
+        solve = partial(cached_currents, report=report, watch=watch)
+        make = partial(plate_and_rotor_table, *self._requested, solve=solve, slab=self.model == "slab", watch=watch)
         (table, share), cached = self._kind.cached(deciding(*self._requested), make, report)
         return table, share, cached
 
     def changed_shares(
-        self,
-        known: tuple[PlateTable, RotorShare],
-        others: Sequence[tuple[Plate, RotorTable]],
-        report: Callable[[str], None],
+        self, known: tuple[PlateTable, RotorShare], others: Sequence[tuple[Plate, RotorTable]], report: Report
     ) -> Array:
         """`tables.changed_shares` of what was `made`, from the cache if they are there; `report` gets messages."""
         solve, slab = partial(cached_currents, report=report), self.model == "slab"

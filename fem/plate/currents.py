@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ...geometry.common import MU_0, Array, Watch, spread_points, unwatched, watched
+from ...geometry.common import MU_0, Array, Report, Watch, spread_points, unwatched, watched
 from ...geometry.meshes.plate import PLANES, MeshRule
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box
@@ -59,24 +59,15 @@ class OtherSources:
 
 @dataclass(frozen=True, eq=False)
 class CurrentSpace:
-    """Fields of a plate's currents at the quadrature points of the meshed part.
+    """Fields of a plate's currents at the quadrature points of the meshed part."""
 
-    Parameters
-    ----------
-    parity : mirrors of the plate
-    points : (n, 3) m
-    root : (3n,) weights of the rows
-    fields : (states, 3n) rows e_i of each parity class, orthonormal
-    inductances : (states, states) of each parity class, s
-    order, cells : of the finite elements
-    """
-
-    parity: Parity
-    points: Array = field(metadata={"units": "m"})
-    root: Array = field(metadata={"units": "S^1/2 m"})
+    parity: Parity  # mirrors of the plate
+    points: Array = field(metadata={"units": "m"})  # (n, 3)
+    root: Array = field(metadata={"units": "S^1/2 m"})  # (3n,) weights of the rows
+    # (states, 3n) rows e_i of each parity class, orthonormal
     fields: tuple[Array, ...] = field(metadata={"units": "1", "dtype": "float32"})
-    inductances: tuple[Array, ...] = field(metadata={"units": "s"})
-    order: int
+    inductances: tuple[Array, ...] = field(metadata={"units": "s"})  # (states, states) of each parity class
+    order: int  # of the finite elements
     cells: int
 
     def couplings(self, sources: Sequence[Source]) -> list[Array]:
@@ -156,19 +147,11 @@ class FieldRows:
     def __init__(self, space: EddySpace) -> None:
         self.space = space
         weights = scipy.sparse.diags(space.root)
-        self._values = weights @ space.value_matrix(space.real, space.real.TrialFunction())
+        self.values = weights @ space.value_matrix(space.real, space.real.TrialFunction())
         self._scalars = ngsolve.H1(space.conductors.mesh, order=space.order + 1, definedon=space.region)
         slopes = space.value_matrix(self._scalars, ngsolve.grad(self._scalars.TrialFunction()))
         self._gradients = (weights @ slopes).tocsc()
         self._products = (self._gradients.T @ self._gradients).tocsc()
-
-    def loads(self, rows: Array) -> Array:
-        """∫ σ A·v dV (sources, unknowns) over the meshed part, S m³ T."""
-        return np.asarray((self._values.T @ rows.T).T) / self.space.conductors.images
-
-    def values(self, solutions: Array) -> Array:
-        """Rows of solutions (n, unknowns)."""
-        return np.asarray((self._values @ solutions.T).T)
 
     def without_gradients(self, rows: Array, parity_class: Sequence[int]) -> Array:
         """Rows of one parity class without their gradients: charges cancel these, so that they drive no current."""
@@ -351,10 +334,9 @@ def train(
     for parity_class, driving, testing in watched(classes, watch, f"eddy currents, order {space.order}"):
         solver = cache(partial(system.solver, parity_class))  # a class that nothing drives needs no factor
 
-        def fields_of(
-            starts: Array, solver: Callable[[], tuple[Callable[[Array], Array], int]] = solver
-        ) -> tuple[Array, Array]:
-            reaction = rows.values(solver()[0](rows.loads(starts)))
+        def fields_of(starts: Array, solver=solver) -> tuple[Array, Array]:  # type: ignore[no-untyped-def]
+            loads = np.asarray((rows.values.T @ starts.T).T) / space.conductors.images  # over the meshed part
+            reaction = np.asarray((rows.values @ solver()[0](loads).T).T)
             return starts + reaction, -reaction / float(np.real(system.shift))
 
         basis = class_basis(driving * scale[:, None], fields_of, omegas, allowed / len(sources))
@@ -387,31 +369,18 @@ ROUND_OFF = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class PlateSolution:
-    """Currents of a plate in many states, for all dipoles in some boxes.
+    """Currents of a plate in many states, for all dipoles in some boxes."""
 
-    Parameters
-    ----------
-    boxes : in the plate's frame
-    frequencies : lowest and highest, Hz
-    space : the states
-    mesh_error : estimated relative error of reaction tensors by the finite elements
-    space_error : bound of that by missing states, and of the error of the others' fields
-    probes : (n, 3) m, places in the boxes that were not trained
-    angular_frequencies : (k,) rad/s
-    residuals : (k, 3n, 3n) products of the residuals ρ of unit moments at the probes, whose norms bound the errors of
-        their fields (`Residuals`)
-    seconds : time spent
-    """
-
-    boxes: tuple[Region, ...]
-    frequencies: tuple[float, float] = field(metadata={"units": "Hz"})
-    space: CurrentSpace
-    mesh_error: float
-    space_error: float
-    probes: Array = field(metadata={"units": "m"})
-    angular_frequencies: Array = field(metadata={"units": "rad/s"})
+    boxes: tuple[Region, ...]  # in the plate's frame
+    frequencies: tuple[float, float] = field(metadata={"units": "Hz"})  # lowest and highest
+    space: CurrentSpace  # the states
+    mesh_error: float  # estimated relative error of reaction tensors by the finite elements
+    space_error: float  # bound of that by missing states, and of the error of the others' fields
+    probes: Array = field(metadata={"units": "m"})  # (n, 3) places in the boxes that were not trained
+    angular_frequencies: Array = field(metadata={"units": "rad/s"})  # (k,)
+    # (k, 3n, 3n) products of the residuals ρ of unit moments at the probes, whose norms bound their fields' errors
     residuals: ComplexArray = field(metadata={"units": "J s"})
-    seconds: float = field(metadata={"units": "s"})
+    seconds: float = field(metadata={"units": "s"})  # time spent
 
 
 def outer_box(box: Region, body: Solids) -> Region:
@@ -530,7 +499,7 @@ def cached_currents(
     rule: MeshRule | None = None,
     others: OtherSources | None = None,
     *,
-    report: Callable[[str], None],
+    report: Report,
     watch: Watch = unwatched,
 ) -> PlateSolution:
     """`solve_currents` from the cache if it is there.

@@ -26,7 +26,7 @@ import numpy as np
 import scipy
 from scipy.spatial.transform import Rotation
 
-from ...geometry.common import Array
+from ...geometry.common import Array, Report
 from ...geometry.meshes.plate import ConductorMesh, MeshRule, plate_mesh
 from ...geometry.scene.contents import Coil
 from ...geometry.solids import Solid
@@ -55,19 +55,11 @@ class AxialPotential:
 
     coefficients: Array = field(metadata={"units": "T"})  # (k, l)
     radius: float = field(metadata={"units": "m"})
-    heights: tuple[float, float] = field(metadata={"units": "m"})
     axis: tuple[float, float] = field(default=(0.0, 0.0), metadata={"units": "m"})  # where it is, of the given frame
 
     @classmethod
     def of(cls, field: CoilField, radius: float, heights: tuple[float, float]) -> "AxialPotential":
-        """Potential of coils whose axis is z.
-
-        Parameters
-        ----------
-        field : of the coils
-        radius : of the cylinder, m
-        heights : lowest and highest of the cylinder in the coils' frame, m
-        """
+        """Potential of coils about z in a cylinder of a `radius`, from the lowest to the highest of `heights` (m)."""
         low, high = heights
         squares = (1 + _nodes(RADII)) / 2 * radius**2
         places = np.stack(np.meshgrid(np.sqrt(squares), (low + high) / 2 + (high - low) / 2 * _nodes(HEIGHTS)), -1)
@@ -134,7 +126,6 @@ class _Seen:
     rotation: Array
 
     def vector_potential(self, points: Array) -> Array:
-        """A (n, 3), T m, at points (n, 3), m."""
         places = self.place + points @ self.rotation.T
         return np.asarray(np.sum([part.vector_potential(places) for part in self.parts], axis=0) @ self.rotation)
 
@@ -152,22 +143,14 @@ def _series(values: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class FloatingModes:
-    """Modes of a conductor on the axis of coils.
+    """Modes of a conductor on the axis of coils."""
 
-    Parameters
-    ----------
-    rates : (states,) λ_i, 1/s
-    series : (k, states, sources) Chebyshev coefficients of G over the heights, √J/A
-    heights : lowest and highest of the conductor's centre over the coils' frame, m
-    error : estimated relative error of the mean force
-    seconds : time spent
-    """
-
-    rates: Array = field(metadata={"units": "1/s"})
+    rates: Array = field(metadata={"units": "1/s"})  # (states,) λ_i
+    # (k, states, sources) Chebyshev coefficients of G over the heights
     series: Array = field(metadata={"units": "J^1/2 A-1"})
-    heights: tuple[float, float] = field(metadata={"units": "m"})
-    error: float
-    seconds: float = field(metadata={"units": "s"})
+    heights: tuple[float, float] = field(metadata={"units": "m"})  # lowest and highest of its centre, coils' frame
+    error: float  # estimated, relative, of the mean force
+    seconds: float = field(metadata={"units": "s"})  # time spent
 
     @cached_property
     def _both(self) -> Array:
@@ -191,19 +174,16 @@ class FloatingModes:
         return flux @ now, slope @ now, flux @ change
 
     def passing(self, way: Array, speed: float) -> tuple[Array, Array]:
-        """Currents that a steady way past the sources leaves, and the fluxes there.
+        """Currents x (n, states), √J, that a steady way past the sources leaves, and the fluxes there.
 
-        Exact for fluxes that change steadily from place to place.
+        Exact for fluxes that change steadily from place to place.  With G and its derivative along the way (n, 2,
+        states, sources), √J/A, x G' is the drag, and x by the difference of two sources' G the force along what parts
+        them.
 
         Parameters
         ----------
         way : (n,) m, places as of `heights`, at equal distances; there are no currents at the first
         speed : m/s; the first source has 1 A
-
-        Returns
-        -------
-        x (n, states), √J, and G and its derivative along the way (n, 2, states, sources), √J/A: x G' is the drag, x by
-        the difference of two sources' G the force along what parts them.
         """
         fluxes = np.array([self.flux(place) for place in way])
         lasts = self.rates * (way[1] - way[0]) / speed
@@ -305,11 +285,10 @@ def modes_along(
         rates, couplings = _modes(space, space.couplings(everywhere), band[1])
         values = couplings.reshape(degree + 1, len(sources), -1).swapaxes(1, 2)
         found.append(FloatingModes(rates, _series(values), heights, missed, 0.0))
-    every, amplitudes = np.linspace(low, high, 9), np.ones(len(sources))
-    forces = [[modes.mean_force(z, amplitudes, np.full(len(sources), frequency)) for z in every] for modes in found]
+    every, alike = np.linspace(low, high, 9), np.full(len(sources), frequency)
+    forces = [[modes.mean_force(z, np.ones(len(sources)), alike) for z in every] for modes in found]
     change = float(np.max(np.abs(np.diff(forces, axis=0)) / np.abs(forces[1])))
-    modes = found[1]
-    return FloatingModes(modes.rates, modes.series, heights, change + modes.error, time.perf_counter() - start)
+    return replace(found[1], error=change + found[1].error, seconds=time.perf_counter() - start)
 
 
 def _modes(space: CurrentSpace, couplings: Sequence[Array], highest: float) -> tuple[Array, Array]:
@@ -325,25 +304,17 @@ def _modes(space: CurrentSpace, couplings: Sequence[Array], highest: float) -> t
 
 @dataclass(frozen=True, eq=False)
 class FreeModes:
-    """Modes of a conductor over coils, in any pose, and the field of the coils where it can be.
+    """Modes of a conductor over coils, in any pose, and the field of the coils where it can be."""
 
-    Parameters
-    ----------
-    rates : (states,) λ_i, 1/s
-    places : (k, 3) of the dipoles in the conductor, along its axes from its centre, m
-    moments : (states, k, 3) m_ik of a unit of x_i, A m²/√J
-    potentials, owners : those of the coils about each axis, and the number of the source of each
-    error : estimated relative error of couplings
-    seconds : time spent
-    """
-
-    rates: Array = field(metadata={"units": "1/s"})
-    places: Array = field(metadata={"units": "m"})
-    moments: Array = field(metadata={"units": "A m2 J^-1/2"})
-    potentials: tuple[AxialPotential, ...]
-    owners: tuple[int, ...]
-    error: float
-    seconds: float = field(metadata={"units": "s"})
+    rates: Array = field(metadata={"units": "1/s"})  # (states,) λ_i
+    places: Array = field(
+        metadata={"units": "m"}
+    )  # (k, 3) of the dipoles in the conductor, along its axes from its centre
+    moments: Array = field(metadata={"units": "A m2 J^-1/2"})  # (states, k, 3) m_ik of a unit of x_i
+    potentials: tuple[AxialPotential, ...]  # those of the coils about each axis
+    owners: tuple[int, ...]  # number of the source of each
+    error: float  # estimated, relative, of couplings
+    seconds: float = field(metadata={"units": "s"})  # time spent
 
     @property
     def sources(self) -> int:
@@ -415,9 +386,7 @@ def free_modes(
     room : lowest and highest (3,) m of its centre, and a height (m) above all windings under which no point of it comes
     frequency, rtol, order : as of `floating_modes`
     """
-    start, (box, floor) = time.perf_counter(), room
-    low, high = box
-    around = body.circumradius
+    start, ((low, high), floor), around = time.perf_counter(), room, body.circumradius
     potentials, owners = list[AxialPotential](), list[int]()
     for number, share in enumerate(shares):
         used = [k for k, part in enumerate(share) if part]
@@ -440,8 +409,7 @@ def free_modes(
         seen(sampled_poses(body, room, count, seed)) for seed, count in enumerate((POSES, PROBED, FITTED))
     )
     mesh = plate_mesh(body, conductivity, _windings(coils, 2 * np.pi) - [*(low + high)[:2] / 2, low[2]], frequency)
-    band, space = (0.1 * frequency, 4 * frequency), EddySpace(mesh, order)
-    nothing = np.zeros((0, 3))
+    band, space, nothing = (0.1 * frequency, 4 * frequency), EddySpace(mesh, order), np.zeros((0, 3))
     states, missed, *_ = train(space, nothing, nothing, OtherSources(trained, probed), band, SHARE * rtol)
     tests = states.couplings([*fitted, *probed])
     every, wanted = _modes(states, tests, band[1])
@@ -479,7 +447,7 @@ def cached_floating_modes(
     region: Range | Room,
     frequency: float,
     rtol: float,
-    report: Callable[[str], None],
+    report: Report,
 ) -> tuple[FloatingModes | FreeModes, bool]:
     """`floating_modes` or `free_modes`, by what the region is, from the cache if they are there, and whether they were.
 

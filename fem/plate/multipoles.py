@@ -13,7 +13,7 @@ import heyoka as hy
 import numpy as np
 import scipy
 
-from ...geometry.common import Array, Watch, frozen_array, unwatched
+from ...geometry.common import Array, Watch, freeze, unwatched
 from ..compiled_code import compiled
 from ..harmonics.expressions import FieldExpressions, harmonic_sums
 from ..harmonics.solid import derivative, outer_sums
@@ -54,22 +54,14 @@ def weighted(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
 
 @dataclass(frozen=True, eq=False)
 class Multipoles:
-    """Single multipoles Re Θ_lm and Im Θ_lm of unit strength (T) at given centres.
+    """Single multipoles Re Θ_lm and Im Θ_lm of unit strength (T) at given centres."""
 
-    Parameters
-    ----------
-    centers : (k, 3) m
-    kinds : (k, 3) whole numbers: degree l, order m, and 0 for the real or 1 for the imaginary part
-    scale : length that makes coordinates free of units, m
-    """
-
-    centers: Array = field(metadata={"units": "m"})
-    kinds: Array
-    scale: float = field(metadata={"units": "m"})
+    centers: Array = field(metadata={"units": "m"})  # (k, 3)
+    kinds: Array  # (k, 3) whole numbers: degree l, order m, and 0 for the real or 1 for the imaginary part
+    scale: float = field(metadata={"units": "m"})  # length that makes coordinates free of units
 
     def __post_init__(self) -> None:
-        for name in ("centers", "kinds"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (len(self.kinds), 3)))
+        freeze(self, centers=(len(self.kinds), 3), kinds=(len(self.kinds), 3))
 
     @classmethod
     def at(cls, centers: Iterable[Array], kinds: Sequence[tuple[int, int, int]], scale: float) -> "Multipoles":
@@ -108,9 +100,8 @@ class Multipoles:
                         *(e for b in range(order) for e in known[l + order, b + 1]),
                     ]
                     continue
-                found[number] = [
-                    (-2.0 if part else 2.0) * known[l + order, m][part]
-                ]  # f is Θ_lm + conj, or i times -conj
+                # f is Θ_lm + conj, or i times -conj
+                found[number] = [(-2.0 if part else 2.0) * known[l + order, m][part]]
                 for b in range(1, order + 1):
                     (re, im), (other_re, other_im) = known[l + order, m + b], known[l + order, abs(m - b)]
                     sign = (-1.0) ** min(m, b)  # of what conj Θ_lm adds: Θ_l(-m) = (-1)^m conj Θ_lm

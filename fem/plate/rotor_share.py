@@ -57,8 +57,7 @@ class ExpansionSource:
     expansion: MultipoleExpansion
 
     @cached_property
-    def _by_degree(self) -> list[Coefficients]:
-        """Coefficients of the components of Σ B_l / l."""
+    def _by_degree(self) -> list[Coefficients]:  # of the components of Σ B_l / l
         degrees = np.maximum(np.arange(self.expansion.degree + 1), 1)[:, None]
         return [-derivative(self.expansion.coefficients / degrees, axis) for axis in range(3)]
 
@@ -77,10 +76,8 @@ class RotorSource:
 
     def vector_potential(self, points: Array) -> Array:
         places = self.center + points @ self.turn
-        total = np.zeros(places.shape)  # a rotor without a field has no parts
-        for part in self.parts:
-            total = total + part.vector_potential(places)
-        return np.asarray(total @ self.turn.T)
+        nothing = np.zeros(places.shape)  # a rotor without a field has no parts
+        return np.asarray(sum((part.vector_potential(places) for part in self.parts), nothing) @ self.turn.T)
 
 
 def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> list[Source]:
@@ -196,7 +193,7 @@ def rotor_share(
         by_angle = float(np.abs(series[-4:]).max() / size)  # of two harmonics: symmetry may forbid one
         by_depth = float(np.abs(series[..., -1]).max() / size) if distance else 0.0
         if max(by_angle, by_depth) <= tolerance / 2:
-            return _trimmed(distance, series, by_angle + by_depth, tolerance / 2, float(size))
+            break
         if max(angles // 2, depths) > MOST_TERMS:
             raise AccuracyError(
                 f"Input tolerance must be at least {by_angle + by_depth:.1e} for this rotor and this way; instead "
@@ -204,15 +201,11 @@ def rotor_share(
             )
         angles *= 1 + (by_angle > tolerance / 2)  # so that none is computed twice
         depths += 2 * (by_depth > tolerance / 2)
-
-
-def _trimmed(distance: float, series: Array, error: float, tolerance: float, size: float) -> RotorShare:
-    """The share without its highest harmonics, whose sum no signal misses by more than the tolerance."""
-    tails = np.cumsum(np.abs(series).sum(axis=2).max(axis=1)[::-1])[::-1] / size
-    kept = max(3, int(np.argmax(np.append(tails, 0.0) <= tolerance)) | 1)
-    part = series[:kept]
-    small = np.abs(part) < NOISE * size
-    return RotorShare(distance, np.where(small, 0.0, part), error + float(np.append(tails, [0.0, 0.0])[kept]))
+    # The highest harmonics go, whose sum no signal misses by more than half of the tolerance.
+    tails = np.append(np.cumsum(np.abs(series).sum(axis=2).max(axis=1)[::-1])[::-1] / size, [0.0, 0.0])
+    kept = max(3, int(np.argmax(tails <= tolerance / 2)) | 1)
+    part = np.where(np.abs(series[:kept]) < NOISE * size, 0.0, series[:kept])
+    return RotorShare(distance, part, by_angle + by_depth + float(tails[kept]))
 
 
 def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:
@@ -224,13 +217,7 @@ def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float)
     allowed : sum over the harmonics left out of their part of the field of the rotor's currents, or of its gradient;
         it is added to the share's error
     """
-    missed = np.append(np.cumsum(_parts(share, table)[::-1])[::-1], 0.0)  # by what begins with each harmonic
-    kept = max(1, int(np.argmax(missed <= allowed)))
-    return replace(share, series=share.series[: 2 * kept + 1], error=share.error + float(missed[kept]))
-
-
-def _parts(share: RotorShare, table: PlateTable) -> Array:
-    """(H,) largest part that harmonics 1…H have in field or gradient, at any place, depth and frequency."""
+    # Largest part that each harmonic has in field or gradient, at any place, depth and frequency.
     functions, slopes = table.field_functions(table.region.grid(POINTS))
     turns = np.arange(1, len(share.series) // 2 + 1)
     depths = np.cos(np.pi * np.arange(DEPTHS) / (DEPTHS - 1)) if share.distance else np.zeros(1)
@@ -245,4 +232,6 @@ def _parts(share: RotorShare, table: PlateTable) -> Array:
             whole = np.linalg.norm(sizes, axis=0)  # zero of a rotor without a field, or at rest
             parts = np.divide(sizes, whole, out=np.zeros_like(sizes), where=whole > 0)
             found = np.maximum(found, parts.max(axis=(1, 2)))
-    return found
+    missed = np.append(np.cumsum(found[::-1])[::-1], 0.0)  # by what begins with each harmonic
+    kept = max(1, int(np.argmax(missed <= allowed)))
+    return replace(share, series=share.series[: 2 * kept + 1], error=share.error + float(missed[kept]))

@@ -16,14 +16,14 @@ at d = 0.15.  No scale of the problem (1/h, 1/t, 1/δ, ωμ0σt) needs to be kno
 J. R. Reitz, J. Appl. Phys. 41 (1970) 2067; W. R. Smythe, Static and Dynamic Electricity (3rd ed.), ch. X.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ...geometry.common import MU_0, Array, InputError
+from ...geometry.common import MU_0, Array, InputError, Report
 from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import rotation_matrix
@@ -165,8 +165,7 @@ def slab_frame(plate: Plate, region: Region) -> SlabFrame:
 
 def corners(region: Region, frame: SlabFrame) -> Array:
     """(8, 3) m, of a region, in the cylinder's frame."""
-    points = np.stack(np.meshgrid(*np.stack([region.lower, region.upper], axis=1), indexing="ij"), -1).reshape(-1, 3)
-    return frame.to_local(points)
+    return frame.to_local(np.array(list(product(*np.stack([region.lower, region.upper], axis=1)))))
 
 
 def rotor_reach(plate: Plate, rotor: RotorTable, frame: SlabFrame) -> Array:
@@ -199,7 +198,11 @@ class SlabModes:
 def slab_modes(slab: Slab, wave_numbers: Array, count: int) -> SlabModes:
     """The slowest `count` modes of a `slab` at each of `wave_numbers` (n,), 1/m."""
     c = wave_numbers[:, None] * slab.thickness / 2
-    u = _roots(c, np.asarray(np.pi / 2 * np.arange(count), dtype=np.float64))
+    # u of u - atan(c/u) = phase: the left side is increasing and concave, so that Newton's method stays left of u
+    phase = np.asarray(np.pi / 2 * np.arange(count), dtype=np.float64)
+    u = phase + np.where(phase == 0, np.minimum(c, 1.0) / 2, 0.0)
+    for _ in range(NEWTON_STEPS):
+        u = u - (u - np.arctan2(c, u) - phase) / (1 + c / (u * u + c * c))
     rates = (2 / slab.thickness) ** 2 * (u * u + c * c) / (MU_0 * slab.conductivity)
     squares = 2 / slab.thickness * u * u / (u * u + c * c + c) / (slab.conductivity * rates)
     return SlabModes(wave_numbers, rates, np.sqrt(squares))
@@ -221,14 +224,6 @@ def modes_needed(slab: Slab, wave_number: float, frequency: float, tolerance: fl
     return int(np.ceil(np.cbrt(4 * kt * (squared + 4 * kt * kt) / (3 * np.pi**4 * tolerance)))) + 4
 
 
-def _roots(c: Array, phase: Array) -> Array:
-    """u of u - atan(c/u) = phase: the left side is increasing and concave, so that Newton's method stays left of u."""
-    u = phase + np.where(phase == 0, np.minimum(c, 1.0) / 2, 0.0)
-    for _ in range(NEWTON_STEPS):
-        u = u - (u - np.arctan2(c, u) - phase) / (1 + c / (u * u + c * c))
-    return u
-
-
 def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: ArrayLike) -> ComplexArray:
     """G (..., 3, 3), T/(A m²): reaction B = G m of a `slab` at `points` (..., 3) to a dipole m at `source` (..., 3), m.
 
@@ -244,12 +239,9 @@ def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: A
     k, weight = wave_numbers(h, aperture)
     spectrum = weight * k * k * np.exp(-2 * k * h[..., None]) * slab.reflection(k, f[..., None])
     even, first, second = (np.sum(spectrum * scipy.special.jv(n, k * distance[..., None]), axis=-1) for n in (0, 1, 2))
-    return -MU_0 / (4 * np.pi) * _angular(even, first, second, offset)
-
-
-def _angular(even: ComplexArray, first: ComplexArray, second: ComplexArray, offset: Array) -> ComplexArray:
-    """∂_i ∂'_j of the potential, from its Hankel moments of orders 0, 1 and 2 and the lateral `offset`."""
+    # ∂_i ∂'_j of the potential, from its Hankel moments of orders 0, 1 and 2 and the lateral offset
     angle = np.arctan2(offset[..., 1], offset[..., 0])
+    result = np.zeros((*even.shape, 3, 3), complex)
     result = np.zeros((*even.shape, 3, 3), complex)
     result[..., 0, 0] = (even - second * np.cos(2 * angle)) / 2
     result[..., 1, 1] = (even + second * np.cos(2 * angle)) / 2
@@ -258,7 +250,7 @@ def _angular(even: ComplexArray, first: ComplexArray, second: ComplexArray, offs
     for axis, projection in ((0, np.cos(angle)), (1, np.sin(angle))):
         result[..., axis, 2] = first * projection
         result[..., 2, axis] = -first * projection
-    return result
+    return np.asarray(-MU_0 / (4 * np.pi) * result)
 
 
 def edge_error(plate: Plate, place: Array) -> float:
@@ -305,7 +297,7 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
     return DOUBT * max(changes)
 
 
-def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Callable[[str], None]) -> float:
+def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Report) -> float:
     """`measured_edge_error` of `plate`, places and frequency rounded to 0.1 mm and 1 Hz; cached, `report` gets it."""
     places, frequency = np.round(places, 4), float(round(frequency))
     inputs = plate.body.shape_numbers, plate.conductivity, frequency, plate.box.to_body(places)

@@ -16,7 +16,7 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...geometry.common import Array, frozen_array, millimetres
+from ...geometry.common import Array, freeze, millimetres
 from ...geometry.solids import Solids
 from ..closed_forms.eddy_bodies import ComplexArray
 from ..rotor.models import AccuracyError
@@ -34,21 +34,14 @@ SYMMETRIC = 1e-9  # Relative difference of two bounds that still counts as a mir
 class Region:
     """Where the floater may be: a box in the frame of the plate, whose centre is the origin.
 
-    Parameters
-    ----------
-    lower, upper : (3,) bounds, m
-
-    Raises
-    ------
-    ValueError : an upper bound is not above the lower one
+    Raises ValueError: an upper bound is not above the lower one.
     """
 
-    lower: Array = field(metadata={"units": "m"})
+    lower: Array = field(metadata={"units": "m"})  # (3,) bounds
     upper: Array = field(metadata={"units": "m"})
 
     def __post_init__(self) -> None:
-        for name in ("lower", "upper"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (3,)))
+        freeze(self, lower=(3,), upper=(3,))
         if not np.all(self.upper > self.lower):
             bounds = f"{self.lower.tolist()} and {self.upper.tolist()}"
             raise ValueError(f"Input region upper bounds must exceed the lower ones; instead received {bounds}.")
@@ -90,10 +83,8 @@ class Region:
         for axis, count in enumerate(counts):
             nodes = -np.cos(np.pi * np.arange(count) / (count - 1)) if count > 1 else np.zeros(1)
             line = self.center[axis] + (self.upper - self.lower)[axis] / 2 * nodes
-            keep = (
-                line >= -SYMMETRIC * self.upper[axis] if axis in fold and axis in self.mirrors else np.full(count, True)
-            )
-            axes.append(line[keep])
+            folded = axis in fold and axis in self.mirrors
+            axes.append(line[line >= -SYMMETRIC * self.upper[axis]] if folded else line)
         return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
 
     def surface(self, counts: tuple[int, int, int], fold: Sequence[int] = ()) -> Array:
@@ -110,20 +101,17 @@ class RotorShare:
     The angle is φ = ωt about the laboratory's z axis, and d how far the plate has gone down; the amplitudes are
     Chebyshev series in d.
 
-    Parameters
-    ----------
-    distance : how far the plate goes down, m
-    series : (2H+1, states, k) Chebyshev coefficients over 0…distance, √J: constant, cos φ, sin φ, cos 2φ, …
-    error : estimated largest error of a signal, relative to the largest signal; in it, of harmonics that were left out
-        as the floater does not need them (`without_high_harmonics`), what they miss of the rotor's currents' field
     """
 
-    distance: float = field(metadata={"units": "m"})
+    distance: float = field(metadata={"units": "m"})  # how far the plate goes down
+    # (2H+1, states, k) Chebyshev coefficients over 0…distance: constant, cos φ, sin φ, cos 2φ, …
     series: Array = field(metadata={"units": "J^1/2"})
+    # Estimated largest error of a signal, relative to the largest signal; in it, of harmonics that were left out as the
+    # floater does not need them (`without_high_harmonics`), what they miss of the rotor's currents' field
     error: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "series", frozen_array(self.series, self.series.shape))
+        freeze(self, series=self.series.shape)
 
     def signals(self, angle: ArrayLike, depth: float) -> Array:
         """s_i (..., states), √J, at angles (...) of the rotor (rad) and a depth of the plate (m)."""
@@ -165,15 +153,6 @@ class PlateErrors:
     def total(self) -> float:
         return self.mesh + self.states + self.functions
 
-    def check(self, rtol: float, conductor: str) -> None:
-        """Refuse a table of a conductor, in words, that misses its tolerance.
-
-        The states follow what is asked, while what the field functions miss hardly does: with more than the sum of both
-        there are states enough. Raises AccuracyError: it names a tolerance that can be met.
-        """
-        if self.total > rtol:
-            refuse(rtol, ENOUGH * self.total, conductor)
-
 
 def refuse(rtol: float, enough: float, conductor: str) -> NoReturn:
     """Refuse a tolerance `rtol` that a table of a `conductor`, in words, misses, where `enough` can be met.
@@ -205,33 +184,22 @@ class PlateTable:
     The network is passive by construction.  There is no quasi-static remainder: added to the states left out, it was
     found to double their error at the highest frequency.
 
-    Parameters
-    ----------
-    size : (3,) edges of the plate, m
-    conductivity : S/m
-    region : where the table knows the fields, in the frame of the plate (origin at its centre)
-    frequencies : lowest and highest of the training, Hz; below the lowest the table stays right
-    rates : (n,) λ_i, 1/s, positive
-    multipoles : k harmonic functions
-    weights : (n, k) of each in b_i, 1/√J: b_i is in T/√J
-    errors : estimates
-    provenance : how the table was made; texts and numbers
     """
 
-    size: Array = field(metadata={"units": "m"})
+    size: Array = field(metadata={"units": "m"})  # (3,) edges of the plate
     conductivity: float = field(metadata={"units": "S/m"})
-    region: Region
+    region: Region  # where the table knows the fields, in the frame of the plate
+    # lowest and highest of the training; below the lowest the table stays right
     frequencies: tuple[float, float] = field(metadata={"units": "Hz"})
-    rates: Array = field(metadata={"units": "1/s"})
-    multipoles: Multipoles
-    weights: Array = field(metadata={"units": "J^-1/2"})
+    rates: Array = field(metadata={"units": "1/s"})  # (n,) λ_i, positive
+    multipoles: Multipoles  # k harmonic functions
+    weights: Array = field(metadata={"units": "J^-1/2"})  # (n, k) of each in b_i, which is in T/√J
     errors: PlateErrors
-    provenance: Mapping[str, str | float] = field(default_factory=dict)
+    provenance: Mapping[str, str | float] = field(default_factory=dict)  # how the table was made
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "size", frozen_array(self.size, (3,)))
-        object.__setattr__(self, "rates", frozen_array(self.rates, (len(self.rates),)))
-        object.__setattr__(self, "weights", frozen_array(self.weights, (len(self.rates), len(self.multipoles.kinds))))
+        states = len(self.rates)
+        freeze(self, size=(3,), rates=(states,), weights=(states, len(self.multipoles.kinds)))
 
     def __repr__(self) -> str:
         lower, upper = millimetres(self.region.lower), millimetres(self.region.upper)
@@ -271,14 +239,11 @@ class PlateTable:
 
         Raises RangeError: a point outside the region, or a frequency not between 0 and the highest of the table.
         """
-        b, _ = self.field_functions(points)
-        return np.asarray(np.einsum("nia,i,nib->nab", b, self._response(frequency), b, optimize=True))
-
-    def _response(self, frequency: float) -> ComplexArray:
         if not 0 <= frequency <= self.frequencies[1]:
             raise RangeError(
                 f"Input frequency_hz must be between 0 and {self.frequencies[1]:g}, for which the table was made; "
                 f"instead received {frequency!r}."
             )
-        omega = 2 * np.pi * frequency
-        return np.asarray(-1j * omega / (self.rates + 1j * omega))
+        rate = 2j * np.pi * frequency
+        b, _ = self.field_functions(points)
+        return np.asarray(np.einsum("nia,i,nib->nab", b, -rate / (self.rates + rate), b, optimize=True))

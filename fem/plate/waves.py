@@ -131,21 +131,12 @@ class SlabWaves:
         """(sources, sources) -iω Σ s s' / (λ + iω)."""
         rate = 2j * np.pi * frequency
         response = -rate * np.sum(self.modes.strengths**2 / (self.modes.rates + rate), axis=1)[:, None]
-        shape = (len(amplitudes), -1)
-        parts = [
-            (response * part).reshape(shape) @ part.reshape(shape).T for part in (amplitudes.real, amplitudes.imag)
-        ]
-        return np.asarray(sum(parts))
+        shape, halves = (len(amplitudes), -1), (amplitudes.real, amplitudes.imag)
+        return np.asarray(sum((response * part).reshape(shape) @ part.reshape(shape).T for part in halves))
 
 
 def _slab_waves(frame: SlabFrame, near: Array, far: Array, frequency: float, tolerance: float) -> SlabWaves:
-    """The full network for a relative accuracy and frequencies up to one (Hz).
-
-    Parameters
-    ----------
-    near : (n, 3) m, corners of the floater's region, in the cylinder's frame
-    far : (n, 3) m, corners of the rotor in all its places
-    """
+    """The full network for a relative accuracy and frequencies up to one (Hz); reaches as of `from_slab`."""
     radius, low = np.hypot(near[:, 0], near[:, 1]).max(), near[:, 2].min()
     every = np.concatenate([[[radius, 0.0, low]], far])
     lateral, height = np.hypot(every[:, 0], every[:, 1]), every[:, 2]

@@ -11,7 +11,7 @@ import ngsolve
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..common import MU_0, Array, frozen_array
+from ..common import MU_0, Array, freeze
 from ..shapes import Box
 from ..solids import Solids, moved
 from .solids import occ_solid
@@ -85,8 +85,7 @@ class Block:
     upper: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "lower", frozen_array(self.lower, (3,)))
-        object.__setattr__(self, "upper", frozen_array(self.upper, (3,)))
+        freeze(self, lower=(3,), upper=(3,))
 
 
 def hex_mesh(lines: Sequence[Array], blocks: Sequence[Block], mirrors: tuple[int, ...] = ()) -> ngsolve.Mesh:

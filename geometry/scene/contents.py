@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from ..common import Array, frozen_array, html_table, listed, millimetres
+from ..common import Array, freeze, frozen_array, html_table, listed, millimetres
 from ..magnets import Conductor, Magnet
 from ..shapes import Box, Cylinder
 from ..solids import Compound, Part, Solid, Solids
@@ -97,7 +97,7 @@ class Coil:
     phase: float = 0.0  # rad
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
+        freeze(self, center=(3,))
 
     @property
     def body(self) -> Cylinder:
