@@ -218,8 +218,16 @@ def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) ->
         for name in column.parts:
             if name in seen:
                 one, other = seen[name].title, column.title
+                # the first can be taken by a word of its title that the second has not
+                first, second = (re.findall(r"[^\W_]+(?:=[^\s,)]+)?", title) for title in (one, other))
+                apart = next((word for word in first if word not in second), None)
+                way = (
+                    f'Take one by what its title has, such as rotor.map_columns = "{apart}".'
+                    if apart
+                    else "Remove one."
+                )
                 raise FieldMapError(
-                    f"Input columns must hold {name} once; instead received {one!r} and {other!r}.{_choice(one, other)}"
+                    f"Input columns must hold {name} once; instead received {one!r} and {other!r}. {way}"
                 )
             seen[name] = column
     return known
@@ -232,10 +240,3 @@ def _without(title: str, text: str) -> str | None:
     if (found := re.search(pattern, title, re.IGNORECASE)) is None:
         return None
     return re.sub(r"[ _.:-]+(?=[ _]?[\[({]|$)", "", (title[: found.start()] + title[found.end() :]).strip(" _.:-"))
-
-
-def _choice(one: str, other: str) -> str:
-    """How to take the first of two columns: by a word of its title that the second has not."""
-    first, second = (re.findall(r"[^\W_]+(?:=[^\s,)]+)?", title) for title in (one, other))
-    apart = next((word for word in first if word not in second), None)
-    return f' Take one by what its title has, such as rotor.map_columns = "{apart}".' if apart else " Remove one."

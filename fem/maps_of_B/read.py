@@ -88,11 +88,21 @@ def _text(path: Path, reading: MapReading) -> FieldMap:
     maxwell = _maxwell(lines)
     tables = [maxwell] if maxwell else [t for s in separators if (t := _table(lines, s, reading))]
     if not tables:
-        received = _nearest_titles(lines, separators, reading)
+        heads = [COMMENT.sub("", line, count=1) for line in lines[:HEADER_LINES] if line.strip()]
+        splits = [_titles(line, separator, []) for line in heads for separator in separators]
+        nearest = max(splits, key=lambda titles: len(known_columns(titles, reading)), default=[])
+        known = [column.name for column in known_columns(nearest, reading).values()]
+        received = ", ".join(known) or "none that is known"
+        if any(title.strip() for title in nearest):
+            received += f" of the titles {shown(', '.join(title.strip() for title in nearest), 200)}"
         raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {received}. {VALID}")
     faults = []
     for table in tables:
-        below = _units_below(table, reading)
+        row = next(table.rows(), [])  # units may stand in a line of their own below the titles
+        units = {k: row[k].strip(" ()[]{}<>\"'") for k in known_columns(table.titles, reading) if k < len(row)}
+        below = {k: unit for k, unit in units.items() if unit}
+        if not all(map(unit_named, below.values())):
+            below = {}
         source = _Source(table.titles, below, table.usual, partial(_numbers, table, skipped=1 if below else 0))
         try:
             return _field_map(source, reading, vectors=False)
@@ -158,18 +168,6 @@ def _titles(line: str, separator: str | None, below: list[str]) -> list[str]:
     return next((titles for titles in ways if len(titles) == cells), line.split())
 
 
-def _nearest_titles(lines: list[str], separators: Sequence[str | None], reading: MapReading) -> str:
-    """Known columns, and titles, of the line that comes nearest to a header of a map."""
-    heads = [COMMENT.sub("", line, count=1) for line in lines[:HEADER_LINES] if line.strip()]
-    splits = [_titles(line, separator, []) for line in heads for separator in separators]
-    nearest = max(splits, key=lambda titles: len(known_columns(titles, reading)), default=[])
-    known = [column.name for column in known_columns(nearest, reading).values()]
-    received = ", ".join(known) or "none that is known"
-    if any(title.strip() for title in nearest):
-        received += f" of the titles {shown(', '.join(title.strip() for title in nearest), 200)}"
-    return received
-
-
 def _maxwell(lines: list[str]) -> _Table | None:
     """Maxwell's export of a field, `.fld`; its grid shows whether the coordinates are in m."""
     for number, line in enumerate(lines[:HEADER_LINES], 1):
@@ -198,23 +196,20 @@ def _grid_unit(table: _Table, corner: Sequence[str]) -> str:
     )
 
 
-def _units_below(table: _Table, reading: MapReading) -> dict[int, str]:
-    """Units of the columns in a line of their own below the titles."""
-    row = next(table.rows(), [])
-    units = {k: row[k].strip(" ()[]{}<>\"'") for k in known_columns(table.titles, reading) if k < len(row)}
-    said = {k: unit for k, unit in units.items() if unit}
-    return said if said and all(map(unit_named, said.values())) else {}
-
-
 def _numbers(table: _Table, columns: Mapping[int, Column], skipped: int) -> dict[str, Array]:
-    values = {k: array("d") for k in columns}
+    values, width = {k: array("d") for k in columns}, len(table.titles)
     cells = (row[k] for row in table.rows() for k in columns if k < len(row))
     comma = next((mark == "," for cell in cells for mark in cell if mark in ",."), False)  # of the first with either
     is_decimal = False
     for number, row in enumerate(table.rows(), 1 - skipped):
         if number < 1:
             continue
-        _require_width(table, number, row)
+        # none is longer than the titles, or shorter where only spaces part the cells
+        if any(map(str.strip, row[width:])) or (len(row) < width and table.separator is None):
+            hint = " A decimal comma needs another separator than a comma." if table.separator == "," else ""
+            raise FieldMapError(
+                f"Input row {number} below the titles must have {width} cells as they; instead it has {len(row)}.{hint}"
+            )
         for k, column in columns.items():
             cell = row[k].strip(" \t\"'\u00a0\u202f") if k < len(row) else ""
             values[k].append(_number(cell, comma, column.title, number))
@@ -227,16 +222,6 @@ def _numbers(table: _Table, columns: Mapping[int, Column], skipped: int) -> dict
     if not all(values.values()):
         raise FieldMapError("Input map must have numbers below its titles; instead it has none.")
     return {column.name: np.frombuffer(values[k]) for k, column in columns.items()}
-
-
-def _require_width(table: _Table, number: int, row: list[str]) -> None:
-    """Raise FieldMapError for a row that is longer than the titles, or shorter where only spaces part the cells."""
-    width = len(table.titles)
-    if any(map(str.strip, row[width:])) or (len(row) < width and table.separator is None):
-        hint = " A decimal comma needs another separator than a comma." if table.separator == "," else ""
-        raise FieldMapError(
-            f"Input row {number} below the titles must have {width} cells as they; instead it has {len(row)}.{hint}"
-        )
 
 
 def _number(cell: str, comma: bool, title: str, line: int) -> float:
@@ -340,20 +325,18 @@ def _netcdf(path: Path) -> _Source:
         found: dict[str, xr.DataArray] = {}
         for k, column in sorted(columns.items(), key=lambda entry: entry[1].name not in AXES):
             whole = dataset[titles[k]]
-            found |= _components(whole, column) if len(column.parts) == 3 else {column.name: whole}
+            if len(column.parts) == 1:
+                found[column.name] = whole
+                continue
+            axes = [d for d in whole.dims if d not in AXES and whole.sizes[d] == 3]
+            if len(axes) != 1:
+                raise FieldMapError(
+                    f"Input {column.name} must have one dimension of three components; instead it has {whole.sizes}."
+                )
+            found |= {name: whole.isel({axes[0]: k}, drop=True) for k, name in enumerate(column.parts)}
         return {n: part.values.ravel() for n, part in zip(found, xr.broadcast(*found.values()), strict=True)}
 
     return _Source(titles, said, (None, None), numbers)
-
-
-def _components(vector: xr.DataArray, column: Column) -> dict[str, xr.DataArray]:
-    """The parts of a variable that has a dimension of length 3 that is not one of space."""
-    axes = [d for d in vector.dims if d not in AXES and vector.sizes[d] == 3]
-    if len(axes) != 1:
-        raise FieldMapError(
-            f"Input {column.name} must have one dimension of three components; instead it has {vector.sizes}."
-        )
-    return {name: vector.isel({axes[0]: k}, drop=True) for k, name in enumerate(column.parts)}
 
 
 def _mesh(path: Path, reading: MapReading) -> _Source:

@@ -68,27 +68,26 @@ def require_plausible(field_map: FieldMap, magnets: Sequence[Magnet], radius: fl
     """
     if not any(magnet.polarization.any() for magnet in magnets):
         return
-    rotor = [_with_closed_form(magnet) for magnet in magnets]
+    rotor = list(magnets)
+    for k, magnet in enumerate(magnets):
+        if isinstance(body := magnet.body, Part):  # the sphere of its volume is near enough to a factor of two
+            center, size = body.center + body.rotation @ body.centroid, float(np.cbrt(body.volume * 0.75 / np.pi))
+            rotor[k] = replace(magnet, body=Sphere(size, center, body.rotation))
     found = _compared(field_map, rotor, radius)
     if found is not None and found.agrees(rotor):
         _require_no_zeros(field_map, rotor, radius)
         return
-    likely = _likely_units(field_map, rotor, radius)
+    rule = f"agree with the magnets of the scene to a factor of {FACTOR:g}"
     if found is None:
         received = f"all {len(field_map.points)} points lie within, and no field can be fitted to them"
         rule = f"have points farther than {radius * 1e3:.4g} mm from the magnets' centres"
+    elif 1 / FACTOR <= found.ratio <= FACTOR:
+        received = f"B is turned against theirs by {np.degrees(np.arccos(found.cosine)):.0f}° on the mean"
     else:
-        received = _received(found)
-        rule = f"agree with the magnets of the scene to a factor of {FACTOR:g}"
-    raise FieldMapError(f"Input map must {rule}; instead {received}{_way_out(likely, field_map.read_as)}")
-
-
-def _with_closed_form(magnet: Magnet) -> Magnet:
-    """The magnet, or for a part from a file the sphere of its volume, which is near enough to a factor of two."""
-    if not isinstance(body := magnet.body, Part):
-        return magnet
-    center = body.center + body.rotation @ body.centroid
-    return replace(magnet, body=Sphere(float(np.cbrt(body.volume * 0.75 / np.pi)), center, body.rotation))
+        factor, size = (found.ratio, "large") if found.ratio > 1 else (1 / max(found.ratio, 1e-300), "small")
+        received = f"B looks {float(f'{factor:.3g}'):g} times too {size} for this rotor"
+    ways = _way_out(_likely_units(field_map, rotor, radius), field_map.read_as)
+    raise FieldMapError(f"Input map must {rule}; instead {received}{ways}")
 
 
 def _outside(points: Array, magnets: Sequence[Magnet], radius: float) -> NDArray[np.bool_]:
@@ -129,13 +128,6 @@ def _likely_units(field_map: FieldMap, magnets: Sequence[Magnet], radius: float)
     best = min((deviation for _, deviation, _ in found), default=0.0)
     alike = sorted(entry for entry in found if entry[1] <= max(AS_GOOD * best, GOOD))
     return [units for _, _, units in alike[:2]]
-
-
-def _received(found: _Comparison) -> str:
-    if 1 / FACTOR <= found.ratio <= FACTOR:
-        return f"B is turned against theirs by {np.degrees(np.arccos(found.cosine)):.0f}° on the mean"
-    factor, size = (found.ratio, "large") if found.ratio > 1 else (1 / max(found.ratio, 1e-300), "small")
-    return f"B looks {float(f'{factor:.3g}'):g} times too {size} for this rotor"
 
 
 def _way_out(likely: Sequence[tuple[str, str]], read_as: tuple[str, str]) -> str:
@@ -193,16 +185,13 @@ class GriddedTable:
     The field is that of sources inside the spheres of the expansions, so that it is free of divergence and curl by
     construction. Its error bar has two parts: `COVERAGE` times the spread of fields that fit the map equally well,
     and the expansions' own uncertainty, which is what degrees beyond the largest may hold.
-
-    Parameters
-    ----------
-    expansions : table without closed forms; its provenance gives how the fit was made
-    deviations : c_lm (T) of equally likely fields minus the table's, complex (members, expansions, L+1, L+1)
-    region : (2, 3) m, opposite corners of the box where the map determines the field; may be infinite
     """
 
+    # without closed forms; its provenance gives how the fit was made
     expansions: RotorTable
+    # c_lm of equally likely fields minus the table's, complex (members, expansions, L+1, L+1)
     deviations: Coefficients = field(metadata={"units": "T"})
+    # (2, 3) opposite corners of the box where the map determines the field; may be infinite
     region: Array = field(metadata={"units": "m"})
 
     def __post_init__(self) -> None:
@@ -251,16 +240,13 @@ class GriddedTable:
         """
         known = self.in_range(points)
         if not known.all():
+            parts = [f"{e.radius * 1e3:.4g} mm from {millimetres(e.center)}" for e in self.expansions.expansions]
+            text = f"farther than {', '.join(parts)}"
+            if np.isfinite(self.region).all():
+                text += f" and in the map's box from {millimetres(self.region[0])} to {millimetres(self.region[1])}"
             where = ", ".join(f"{c * 1e3:.6g}" for c in points[int(np.argmin(known))])
-            raise RangeError(f"Input points must lie {self._range()}; instead received a point at ({where}) mm.")
+            raise RangeError(f"Input points must lie {text}; instead received a point at ({where}) mm.")
         return self.expansions.evaluate(points)
-
-    def _range(self) -> str:
-        parts = [f"{e.radius * 1e3:.4g} mm from {millimetres(e.center)}" for e in self.expansions.expansions]
-        text = f"farther than {', '.join(parts)}"
-        if np.isfinite(self.region).all():
-            text += f" and in the map's box from {millimetres(self.region[0])} to {millimetres(self.region[1])}"
-        return text
 
     @keeps_shape
     def relative_error(self, points: Array) -> tuple[Array, Array]:
@@ -290,10 +276,7 @@ EDGE_SAFETY = 2.0
 
 
 def fit_field_map(
-    field_map: FieldMap,
-    centers: ArrayLike,
-    radius: float | None = None,
-    max_degree: int = 30,
+    field_map: FieldMap, centers: ArrayLike, radius: float | None = None, max_degree: int = 30
 ) -> GriddedTable:
     """Fit multipole expansions to a map of B.
 
@@ -314,8 +297,16 @@ def fit_field_map(
     start = time.perf_counter()
     middle = np.asarray(centers, float).reshape(-1, 3)
     distances = np.linalg.norm(field_map.points[:, None] - middle, axis=2)
-    radii = _radii(distances, radius)
-    basis = _basis(field_map, middle, radii, max_degree)
+    radii = distances.min(axis=0) * (1 - 1e-9) if radius is None else np.full(len(middle), float(radius))
+    if len(inside := np.argwhere(distances <= radii)):
+        raise FieldMapError(
+            f"Input points must lie farther than {radii[0] * 1e3:.6g} mm from every centre (see FieldMap.outside); "
+            f"instead received point {inside[0, 0]} at {distances[tuple(inside[0])] * 1e3:.6g} mm."
+        )
+    basis, seen = HarmonicBasis(middle, radii, 1), field_map.observations
+    if seen < (needed := 2 * basis.count(1)):
+        raise FieldMapError(f"Input field must hold at least {needed} observed components; instead received {seen}.")
+    basis = replace(basis, degree=max(d for d in range(1, max_degree + 1) if 2 * basis.count(d) <= seen))
     errors = field_map.errors
     if errors is None:  # the typical size of a component, T, that falls as a dipole's
         fall = distances.min(axis=1)[:, None] ** 3
@@ -329,30 +320,16 @@ def fit_field_map(
     expansions = tuple(MultipoleExpansion(*part) for part in zip(middle, radii, coefficients, strict=True))
     left_out = _left_out(basis, fit, field_map, distances, expansions)
     doubts = {"tail": left_out} if left_out else {}
-    provenance = _provenance(fit, field_map, time.perf_counter() - start)
+    provenance: dict[str, str | float] = {
+        "map_points": len(field_map.points),
+        "observations": seen,
+        "degree": fit.degree,
+        "misfit": fit.misfit,
+        "misfit_means": "relative" if field_map.errors is None else "per given standard error",
+        "seconds": time.perf_counter() - start,
+    }
     region = _region(field_map, middle, radii)
     return GriddedTable(RotorTable("map", (), (), expansions, doubts, provenance), deviations, region)
-
-
-def _radii(distances: Array, radius: float | None) -> Array:
-    """(k,) radii of the sources' spheres; by default a hair less than the distance of the nearest map point."""
-    if radius is None:
-        return np.asarray(distances.min(axis=0) * (1 - 1e-9))
-    inside = np.argwhere(distances <= radius)
-    if len(inside):
-        raise FieldMapError(
-            f"Input points must lie farther than {radius * 1e3:.6g} mm from every centre (see FieldMap.outside); "
-            f"instead received point {inside[0, 0]} at {distances[tuple(inside[0])] * 1e3:.6g} mm."
-        )
-    return np.full(distances.shape[1], float(radius))
-
-
-def _basis(field_map: FieldMap, centers: Array, radii: Array, max_degree: int) -> HarmonicBasis:
-    smallest = HarmonicBasis(centers, radii, 1)
-    seen, needed = field_map.observations, 2 * smallest.count(1)
-    if seen < needed:
-        raise FieldMapError(f"Input field must hold at least {needed} observed components; instead received {seen}.")
-    return replace(smallest, degree=max(d for d in range(1, max_degree + 1) if 2 * smallest.count(d) <= seen))
 
 
 def _left_out(
@@ -400,17 +377,6 @@ def _region(field_map: FieldMap, centers: Array, radii: Array) -> Array:
     corners = np.array([field_map.points.min(axis=0) - step, field_map.points.max(axis=0) + step])
     surrounds = np.all(corners[0] <= centers - radii[:, None]) and np.all(centers + radii[:, None] <= corners[1])
     return np.array([[-np.inf] * 3, [np.inf] * 3]) if surrounds else corners
-
-
-def _provenance(fit: HarmonicFit, field_map: FieldMap, seconds: float) -> dict[str, str | float]:
-    return {
-        "map_points": len(field_map.points),
-        "observations": field_map.observations,
-        "degree": fit.degree,
-        "misfit": fit.misfit,
-        "misfit_means": "relative" if field_map.errors is None else "per given standard error",
-        "seconds": seconds,
-    }
 
 
 def map_table(path: Path | None, magnets: Sequence[Magnet], reading: MapReading | None = None) -> GriddedTable:
