@@ -49,6 +49,8 @@ Answer = TypeVar("Answer")
 def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> BinaryIO:
     """A file that a user named, opened for reading once it is known to be one: others may block, or never end.
 
+    Raises InputError: there is none, it cannot be opened, is a folder, pipe, device or socket, or is larger.
+
     Parameters
     ----------
     path : the file
@@ -59,10 +61,6 @@ def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> Bin
     Returns
     -------
     The file, to be closed; a library that opens the path by itself needs no more than that it was given.
-
-    Raises
-    ------
-    InputError : there is none, it cannot be opened, is a folder, pipe, device or socket, or is larger
     """
     found = _opened(path)
     if isinstance(found, str):
@@ -143,17 +141,14 @@ class CrashError(LostError):
 def call_apart(seconds: float, function: Callable[..., Answer], *given: Any) -> Answer:
     """Call a function of this package in another process.
 
+    Raises LostError: the process took too long, or needed more than `MEMORY`; CrashError: it crashed; Exception:
+    whatever the function raises.
+
     Parameters
     ----------
     seconds : of processor time
     function : at the top of its module
     *given : its arguments, which like the answer must be such that pickle takes them
-
-    Raises
-    ------
-    LostError : the process took too long, or needed more than `MEMORY`
-    CrashError : it crashed
-    Exception : whatever the function raises
     """
     # -P: no module of the current folder. Processes of multiprocessing would run the user's script once more.
     command = [sys.executable, "-P", "-c", LAUNCH, f"{function.__module__}.{function.__qualname__}"]

@@ -18,6 +18,8 @@ from .solids import Solid, moved
 class Magnet:
     """A permanent magnet: B = μ0 μ H + J inside, with J the remanent polarisation.
 
+    Raises ValueError: two unlike permeabilities without a polarisation that gives the easy axis.
+
     Parameters
     ----------
     body : shape and pose
@@ -26,10 +28,6 @@ class Magnet:
     transverse_permeability : μr across the easy axis; None: as along it
     conductivity : S/m, or None where its eddy currents are not modelled
     coercivity : field (A/m) against the polarisation at the knee of the demagnetisation curve, or None if not known
-
-    Raises
-    ------
-    ValueError : two unlike permeabilities without a polarisation that gives the easy axis
     """
 
     body: Solid

@@ -225,9 +225,7 @@ class Box(Body):
 class Cylinder(Body):
     """A round cylinder about the body's z, solid or with a hole (a ring of rectangular section, or tube).
 
-    Raises
-    ------
-    ValueError : the inner radius is not smaller than the outer one
+    Raises ValueError: the inner radius is not smaller than the outer one.
     """
 
     radius: float = field(metadata=METRES)

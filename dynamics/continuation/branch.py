@@ -139,6 +139,7 @@ def follow_branch(
     """The branch through an equilibrium, towards `end` of the parameter and on through every fold.
 
     Points are in order and good to round-off.  Folds and changes of stability are points of their own, by `kind`.
+    Raises EquilibriumError: there is no equilibrium near `start`.
 
     Parameters
     ----------
@@ -149,10 +150,6 @@ def follow_branch(
     steps : along the branch, `Steps()` if not given
     until : ends the branch after the first point of which it is true
     tolerated : growth that still counts as stable, 1/s
-
-    Raises
-    ------
-    EquilibriumError : there is no equilibrium near `start`
     """
     if (first := family.solution(start[[0, 1, 2, 6, 7, 8]], parameter)) is None:
         raise EquilibriumError(

@@ -187,6 +187,8 @@ def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[Sta
 def branch_through(scene: Scene, rates: Rates, start: Array, frequency: float, spin: float = 0.0) -> list[BranchPoint]:
     """The branch through an equilibrium, both ways to the first fold, contact with the rotor or border.
 
+    Raises EquilibriumError: there is no equilibrium near `start`.
+
     Parameters
     ----------
     scene : gravity along the axis
@@ -194,10 +196,6 @@ def branch_through(scene: Scene, rates: Rates, start: Array, frequency: float, s
     start : scaled state (12,) of the equilibrium
     frequency : where it is, Hz
     spin : body spin
-
-    Raises
-    ------
-    EquilibriumError : there is no equilibrium near `start`
     """
     walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates, spin), start, frequency)
     below = walk(LOWEST if frequency > LOWEST else frequency / WIDEST)

@@ -192,16 +192,14 @@ def equilibrium_map(
 ) -> EquilibriumMap:
     """All synchronous equilibria with z < 0 over a grid, with their stability; gravity along the axis, no plate.
 
+    Raises EquilibriumError: a frequency is zero, or gravity has a part across the axis.
+
     Parameters
     ----------
     family : the scenes; nothing is compiled again within a family
     frequencies, measures : axes, Hz and m or rad
     spin : body spin s
     spacing : steps of the grid between two searches; a sheet between them is missed if it meets no other in a fold
-
-    Raises
-    ------
-    EquilibriumError : a frequency is zero, or gravity has a part across the axis
     """
     axes = np.atleast_1d(np.asarray(frequencies, float)), np.atleast_1d(np.asarray(measures, float))
     if not axes[0].all() or np.any(family.scene.gravity[:2]):

@@ -187,6 +187,9 @@ def rotor_family(
 ) -> RotorFamily:
     """The family of one of the article's rotors, with the magnets of `scene`.
 
+    Raises InputError: mutual magnetisation, or finite elements, are asked for where magnets move against each other, or
+    conductors do not move; ValueError: unknown configuration or one of other magnets.
+
     Parameters
     ----------
     scene : its magnets' sizes and materials, and all else but the frequency
@@ -196,12 +199,6 @@ def rotor_family(
     interaction : "rigid", "mutual" or "auto", see `effects.mutual_choice`; "vertical" is rigid
 
     A rotor that moves as a whole keeps its tables, whatever the model: the family is as good as its scenes' tables.
-
-    Raises
-    ------
-    InputError : mutual magnetisation, or finite elements, are asked for where magnets move against each other, or
-        conductors do not move
-    ValueError : unknown configuration or one of other magnets
     """
     moves = MOVES.get(configuration, ())
     if not moves or len(moves) != len(scene.rotor):

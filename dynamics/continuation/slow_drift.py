@@ -184,6 +184,8 @@ def drift(
 ) -> Drift:
     """Follow the stable equilibrium of a scene while its body spin drifts.
 
+    Raises EquilibriumError: no equilibrium at the start.
+
     Parameters
     ----------
     scene : its drag and the floater's conductivity are the slow torques; its plate is left out
@@ -194,10 +196,6 @@ def drift(
     start : the equilibrium at `spin`, if it is known; else the one whose modes grow the slowest
     stokes : drag proportional to spin unless the scene's drag is that of real air, as in `simulate`
     e_folds : growth of a mode after which it has ended the trajectory
-
-    Raises
-    ------
-    EquilibriumError : no equilibrium at the start
     """
     rates = rates or Rates(with_effects(scene, table))
     torque = SlowTorque.of(scene, rates, stokes)

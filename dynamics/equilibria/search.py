@@ -120,6 +120,8 @@ def survey(
 ) -> Survey:
     """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
 
+    Raises EquilibriumError: the rotor is at rest and the floater does not spin.
+
     Parameters
     ----------
     scene : the scene; its plate is left out
@@ -136,10 +138,6 @@ def survey(
     Returns
     -------
     Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field.
-
-    Raises
-    ------
-    EquilibriumError : the rotor is at rest and the floater does not spin
     """
     check_turning(scene)
     if not scene.floater.round:

@@ -53,14 +53,12 @@ def memory_need(space: ngsolve.FESpace, free: ngsolve.BitArray) -> tuple[float, 
 def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str) -> None:
     """Refuse a system that the free memory does not hold, before anything of it is made.
 
+    Raises TooLargeError: it says how much is needed, how much there is, and `way_out`.
+
     Parameters
     ----------
     space, free : NGSolve space, and its unknowns that are solved for
     way_out : what the user can do
-
-    Raises
-    ------
-    TooLargeError : it says how much is needed, how much there is, and `way_out`
     """
     need, there = PEAK * sum(memory_need(space, free)), free_memory()
     if need > there:
@@ -185,16 +183,14 @@ class ConvergenceError(ComputationError):
 def solve_open(stiffness: Any, inverse: Any, free_dofs: Any, load: Any, boundary: OpenBoundary) -> Any:
     """The potential, an NGSolve function.
 
+    Raises ConvergenceError: the iteration for the open boundary stalls.
+
     Parameters
     ----------
     stiffness, load : condensed forms, without what harmonics beyond the Robin term do at the boundary
     inverse : of the stiffness on the free unknowns
     free_dofs : the unknowns that are not zero, without those that are condensed
     boundary : of open space
-
-    Raises
-    ------
-    ConvergenceError : the iteration for the open boundary stalls
     """
     potential = ng.GridFunction(stiffness.space)
     load.vec.data += stiffness.harmonic_extension_trans * load.vec

@@ -199,6 +199,9 @@ def solve_rotor(
 ) -> RotorSolution:
     """Solve for every parity part of the polarisation and add up; gaps too narrow for elements are closed.
 
+    Raises ConvergenceError: the iteration for the open boundary stalls; MeshError: no mesh of the magnets fits
+    together.
+
     Parameters
     ----------
     magnets, refinement : the rotor, and how fine
@@ -209,11 +212,6 @@ def solve_rotor(
     carriers : in `split`, the magnets with μr = 1 whose closed form is split off, each in the place of one of the
         magnets; by default the magnets' own remanence
     cells : of every piece, each with its own expansion; by default one
-
-    Raises
-    ------
-    ConvergenceError : the iteration for the open boundary stalls
-    MeshError : no mesh of the magnets fits together
     """
     cut = pieces or [(magnet,) for magnet in magnets]
     shifts = closing_shifts(magnets)

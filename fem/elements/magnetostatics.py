@@ -65,10 +65,7 @@ class Solution:
 def assemble(mesh: MagnetMesh, order: int) -> System:
     """Assemble ∫ ∇v·μ∇ψ with elements of degree `order`.
 
-    Raises
-    ------
-    MeshError : layers of elements do not match
-    TooLargeError : the memory does not hold the system
+    Raises MeshError: layers of elements do not match; TooLargeError: the memory does not hold the system.
     """
     permeability = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}
     return System(mesh, order, *stiffness_of(mesh.mesh, permeability, mesh.ball_radius, order, WAY_OUT))
@@ -79,6 +76,8 @@ def stiffness_of(
 ) -> tuple[Any, Any]:
     """The space H1 and ∫ ∇v·μ∇ψ on it, condensed, with the Robin term of the sphere `outer`.
 
+    Raises MeshError: layers of elements do not match; TooLargeError: the memory does not hold the system.
+
     Parameters
     ----------
     mesh : of NGSolve, with the boundary `outer`
@@ -86,11 +85,6 @@ def stiffness_of(
     ball_radius : of that sphere, in the unit of the mesh
     order : of the elements
     way_out : what to do where memory is short, for the message
-
-    Raises
-    ------
-    MeshError : layers of elements do not match
-    TooLargeError : the memory does not hold the system
     """
     space = ng.H1(mesh, order=order)
     require_memory(space, space.FreeDofs(True), way_out)
@@ -122,6 +116,8 @@ def solve(
 ) -> Solution:
     """Solve for the potential.
 
+    Raises ConvergenceError: the iteration for the open boundary stalls.
+
     Parameters
     ----------
     system : made by `assemble`
@@ -130,10 +126,6 @@ def solve(
     boundary_degree : harmonics up to this degree see an exactly open outer boundary
     signs : parity of the potential (+1 or -1) at each of the mesh's planes
     rest : in `split`, J' (n, 3) T of each of the mesh's magnets; by default none
-
-    Raises
-    ------
-    ConvergenceError : the iteration for the open boundary stalls
     """
     mesh, space = system.mesh, system.space
     boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, boundary_degree, system.order, mesh.planes, signs)
@@ -185,10 +177,7 @@ def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Arra
     """∫ M dV (n, 3), T m³, of every magnet, M as above: whole (`direct`) or correction (`split`).
 
     The error falls as the square of that of ∇ψ: about h² with elements of size h at the edges, where ∇ψ is logarithmic.
-
-    Raises
-    ------
-    ValueError : the mesh holds other elements than tetrahedra (hp_layers must be 0)
+    Raises ValueError: the mesh holds other elements than tetrahedra (hp_layers must be 0).
     """
     import skfem
     from skfem.helpers import dot, grad, mul

@@ -19,9 +19,8 @@ class FieldMapError(InputError):
 class FieldMap:
     """Observed field components at points in any order.
 
-    Raises
-    ------
-    FieldMapError : wrong shapes, a point or field that is infinite, a point that is NaN, an error that is not positive
+    Raises FieldMapError: wrong shapes, a point or field that is infinite, a point that is NaN, an error that is not
+    positive.
     """
 
     points: Array  #: (n, 3) m, rotor's frame

@@ -306,7 +306,7 @@ class Ladder:
     """Orders of the finite elements on one mesh, one after the other, and the estimated error of each.
 
     What an order leaves is at most its change of a tensor times the reduction of that change against the order before;
-    the truncation of the air comes on top.
+    the truncation of the air comes on top. Raises MeshTooLargeError: not even order 3 is within `MOST_UNKNOWNS`.
 
     Parameters
     ----------
@@ -315,10 +315,6 @@ class Ladder:
     rule, allowed : mesh, and relative error
     growing : compare fields that grow as e^{ωt} instead of phasors: half the memory, a quarter of the work
     watch : progress callback
-
-    Raises
-    ------
-    MeshTooLargeError : not even order 3 is within `MOST_UNKNOWNS`
     """
 
     def __init__(

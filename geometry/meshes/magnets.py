@@ -88,17 +88,15 @@ def mesh_magnets(
 ) -> MagnetMesh:
     """Mesh magnets in a ball of air; they may touch each other.
 
+    Raises ValueError: no magnet, or two that overlap; MeshError, ComputationError: a part from a file cannot be meshed,
+    takes too long or too much memory.
+
     Parameters
     ----------
     magnets, settings : what is meshed, and how finely
     planes : coordinate planes (0: across x, …) that mirror the magnets; only the positive side is meshed. The faces
         there are the boundaries `plane0`, …
     edges_of : the bodies at whose edges and corners the field is singular; by default the magnets
-
-    Raises
-    ------
-    ValueError : no magnet, or two that overlap
-    MeshError, ComputationError : a part from a file cannot be meshed, takes too long or too much memory
     """
     settings = settings or MeshSettings()
     if not (magnets := tuple(magnets)):

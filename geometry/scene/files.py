@@ -160,16 +160,14 @@ def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", k
 def driven(scene: Scene, steps: Sequence[Mapping[str, Any]], source: str = "drive", **keys: Any) -> Scene:
     """The scene with other steps of its drive.
 
+    Raises SceneError: as of `changed`.
+
     Parameters
     ----------
     scene : it stays as it is
     steps : tables of `[[drive]]`, with the keys of the scene file
     source : what messages call it
     keys : others of the whole file, which take the place of the scene's
-
-    Raises
-    ------
-    SceneError : as of `changed`
     """
     found = assemble(scene_keys(scene) | {"drive": _plain(steps)} | keys, source, Path())
     _check_same(scene, found.files, source)

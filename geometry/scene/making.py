@@ -26,6 +26,8 @@ MOST_BODIES = 64  # Magnets and conductors of a scene beside a known one, unless
 def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, known: Scene | None = None) -> Scene:
     """The scene of a scene file's keys, which it keeps; names of files in them are from the folder at hand then.
 
+    Raises SceneError: unknown, missing or wrong keys, bodies that overlap, or a file that is not known.
+
     Parameters
     ----------
     keys : as TOML has them
@@ -33,10 +35,6 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     folder : where the files lie that it names; left out, where `source` does
     known : for keys of which nothing is known, a scene whose files alone they may name, as it has them: no path is
         opened, and there are at most `MOST_BODIES` or as many as it has. Left out: any file, which is read.
-
-    Raises
-    ------
-    SceneError : unknown, missing or wrong keys, bodies that overlap, or a file that is not known
     """
     keys, tolerances, faults = without_tolerances(keys)
     if faults:
