@@ -524,6 +524,11 @@ def _classes(form: Any, found: dict[str, type]) -> dict[str, type]:
 
 @cache
 def _documentation(form: type) -> dict[str, str]:
-    """Sentences of a class's documentation about its parameters, by name."""
+    """What comments beside a class's fields, or else above them, or its list of parameters say of these, by name."""
     lines = re.findall(r"^(\w+(?:, \w+)*) : (.*(?:\n {4,}.*)*)", inspect.getdoc(form) or "", re.MULTILINE)
-    return {name: " ".join(text.split()) for names, text in lines for name in names.split(", ")}
+    said = {name: " ".join(text.split()) for names, text in lines for name in names.split(", ")}
+    with suppress(OSError):  # no source
+        written = re.findall(r"((?:^ +# .*\n)*)^ +(\w+): [^#\n]*(?:# (.*))?$", inspect.getsource(form), re.MULTILINE)
+        said |= {name: " ".join((beside or above.replace("# ", "")).split()) for above, name, beside in written
+                 if above or beside}  # fmt: skip
+    return said

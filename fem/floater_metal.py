@@ -53,28 +53,17 @@ Pieces = Sequence[tuple[Solid, float]]  # bodies with their conductivities by th
 
 @dataclass(frozen=True, eq=False)
 class CurrentShape:
-    """Currents of a body over those of a ball of its circumradius R and conductivity, along the axes of its frame.
+    """Currents of a body over those of a ball of its circumradius R and conductivity, along the axes of its frame."""
 
-    Parameters
-    ----------
-    delays : (n,) by those of the ball's modes
-    tensors : (n, 3, 3) of a uniform field, each with a delay; their sum is K/κ
-    gradient : (5, 5) K/(κR²) of `GRADIENTS`
-    gradient_delay : its mean delay
-    coupling : (3, 5) K/(κR) between field and gradient, zero of bodies with a centre of symmetry
-    coupling_delay : its mean delay by that of the ball's field
-    error : relative error of the tensors by the finite elements, at most
-    delay_error : the same of what the delays do, in a field whose gradient changes it by itself over a radius: with
-        what one delay of the gradient and one of the coupling miss
-    """
-
-    delays: Array
-    tensors: Array
-    gradient: Array
-    gradient_delay: float
-    coupling: Array
-    coupling_delay: float
-    error: float
+    delays: Array  # (n,) by those of the ball's modes
+    tensors: Array  # (n, 3, 3) of a uniform field, each with a delay; their sum is K/κ
+    gradient: Array  # (5, 5) K/(κR²) of `GRADIENTS`
+    gradient_delay: float  # its mean delay
+    coupling: Array  # (3, 5) K/(κR) between field and gradient, zero of bodies with a centre of symmetry
+    coupling_delay: float  # its mean delay by that of the ball's field
+    error: float  # relative error of the tensors by the finite elements, at most
+    # the same of what the delays do, in a field whose gradient changes it by itself over a radius: with what one delay
+    # of the gradient and one of the coupling miss
     delay_error: float
 
 

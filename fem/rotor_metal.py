@@ -238,22 +238,13 @@ PRODUCTS = [(a, b) for a in range(8) for b in range(a, 8)]  # Pairs of these and
 
 @dataclass(frozen=True, eq=False)
 class RotorLosses:
-    """Dissipation in the rotor's metal.
+    """Dissipation in the rotor's metal."""
 
-    Parameters
-    ----------
-    multipoles : the J that all fields are made of
-    weights : (K, J) c_k = Σ_j weight B_j, √W s/(A m²)
-    distances : (d,) m from the rotor's nearest face, from contact on
-    errors : (d,) largest relative error of D at these distances
-    provenance : how the table was made; texts and numbers
-    """
-
-    multipoles: Multipoles
-    weights: Array = field(metadata={"units": "W^0.5 s A-1 m-2 T-1"})
-    distances: Array = field(metadata={"units": "m"})
-    errors: Array
-    provenance: Mapping[str, str | float] = field(default_factory=dict)
+    multipoles: Multipoles  # the J that all fields are made of
+    weights: Array = field(metadata={"units": "W^0.5 s A-1 m-2 T-1"})  # (K, J) c_k = Σ_j weight B_j, √W s/(A m²)
+    distances: Array = field(metadata={"units": "m"})  # (d,) m from the rotor's nearest face, from contact on
+    errors: Array  # (d,) largest relative error of D at these distances
+    provenance: Mapping[str, str | float] = field(default_factory=dict)  # how the table was made; texts and numbers
 
     def rate_matrix(self, positions: ArrayLike, moments: ArrayLike) -> Array:
         """C (n, K, 6) √W s, for dipoles (n, 3) A m² at (n, 3) m: by velocity in m/s, then by turn in rad/s."""

@@ -13,7 +13,7 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..equilibria.balance import DUPLICATE_DISTANCE, EVERY, Balance, Indices
 from ..equilibria.curves import SearchRange, newton_search
-from ..equilibria.equilibrium import MARGINAL, EquilibriumError, Survey, is_stable, spectra
+from ..equilibria.equilibrium import MARGINAL, EquilibriumError, Modes, Survey, is_stable, spectra
 from ..equilibria.path import continued
 from ..equilibria.search import FixedPoints, check_turning, field_doubts, survey_of
 from ..motion.equations import parameters
@@ -184,11 +184,7 @@ class EquilibriumMap:
 
 
 def equilibrium_map(
-    family: RotorFamily,
-    frequencies: ArrayLike,
-    measures: ArrayLike,
-    spin: float = 0.0,
-    spacing: int = SPACING,
+    family: RotorFamily, frequencies: ArrayLike, measures: ArrayLike, spin: float = 0.0, spacing: int = SPACING
 ) -> EquilibriumMap:
     """All synchronous equilibria with z < 0 over a grid, with their stability; gravity along the axis, no plate.
 
@@ -213,10 +209,10 @@ def equilibrium_map(
     row, column = grid.places[point].T
     balance = grid.balance(point)
     time, length = balance.values[:, [Parameter.TIME]], balance.values[:, [Parameter.LENGTH]]
-    values, errors = np.zeros((0, 10), complex), np.zeros((0, 10))
+    found = Modes(np.zeros((0, 10), complex), np.zeros((0, 10)), np.zeros((0, 12, 10)))
     if len(point):
         states = balance.states(position, moment)
-        values, errors, _ = spectra(states, balance.rates(states, balance.values)[1])
+        found = spectra(states, balance.rates(states, balance.values)[1])
     return EquilibriumMap(
         frequencies=axes[0],
         measures=axes[1],
@@ -224,9 +220,9 @@ def equilibrium_map(
         column=column,
         position=position * length,
         moment=moment,
-        eigenvalues=np.asarray(values / time, complex),
-        errors=errors.max(axis=1, initial=0.0) / time[:, 0],
-        stable=is_stable(values, errors),
+        eigenvalues=np.asarray(found.eigenvalues / time, complex),
+        errors=found.errors.max(axis=1, initial=0.0) / time[:, 0],
+        stable=is_stable(found.eigenvalues, found.errors),
         searches=len(nodes),
     )
 

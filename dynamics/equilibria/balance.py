@@ -145,7 +145,12 @@ def solve(
         step = np.zeros((len(active), 5))
         good = np.isfinite(slope).all(axis=(1, 2))
         value, slope = value[:, free], slope[:, free[:, None], free]
-        step[np.ix_(good, free)] = -_divided(slope[good], value[good])
+        right = -value[good, :, None]
+        try:
+            found = np.linalg.solve(slope[good], right)
+        except np.linalg.LinAlgError:  # one of them is singular to the last bit
+            found = np.linalg.pinv(slope[good]) @ right
+        step[np.ix_(good, free)] = found[..., 0]
         shift, tilt = np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1)
         scale = np.maximum(1.0, np.linalg.norm(position[active], axis=1) / far)
         step *= (reach / np.maximum(np.maximum(shift / scale, tilt), reach))[:, None]
@@ -157,10 +162,3 @@ def solve(
         if not len(active):
             break
     return position, moment, length
-
-
-def _divided(matrix: Array, vector: Array) -> Array:
-    try:
-        return np.asarray(np.linalg.solve(matrix, vector[..., None])[..., 0])
-    except np.linalg.LinAlgError:  # one of them is singular to the last bit
-        return np.asarray((np.linalg.pinv(matrix) @ vector[..., None])[..., 0])

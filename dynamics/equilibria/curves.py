@@ -201,24 +201,8 @@ def fixed_points(balance: Balance, where: SearchRange, watch: Watch = unwatched)
 
     `watch` is as for `newton_search`.
     """
-    curves = _all_curves(balance, where, watch)
-    guesses = [*(curve.balanced() for curve in curves), from_starts(balance, where, EVERY, SPARE, watch)]
-    points = np.concatenate(guesses)
-    if not len(points):
-        return curves, points
-    position, moment, step = solve(balance, points[:, :3], points[:, 3:], EVERY)
-    found: list[Array] = []
-    for point in np.concatenate([position, moment], axis=1)[(step < CONVERGED_STEP) & where.holds(position)]:
-        if all(np.linalg.norm(point - known) > DUPLICATE_DISTANCE for known in found):
-            found.append(point)
-    return curves, np.reshape(found, (-1, 6))
-
-
-def _all_curves(balance: Balance, where: SearchRange, watch: Watch) -> list[Curve]:
-    """Every curve that is met in the range, from its starts at their own heights."""
     seeds = from_starts(balance, where, LATERAL, watch=watch)
-    curves: list[Curve] = []
-    count = len(seeds)
+    curves, count = list[Curve](), len(seeds)
     while len(seeds):
         watch("curves of balance", 1 - len(seeds) / count)
         # What is at one height lies on different curves, or on both sides of a fold.
@@ -239,4 +223,13 @@ def _all_curves(balance: Balance, where: SearchRange, watch: Watch) -> list[Curv
             arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
             curves.append(Curve(arc, points, tangents, value[:, AXIAL], np.sum(slope * tangents, axis=1)))
         seeds = np.array([seed for seed in seeds[~chosen] if not any(curve.passes(seed) for curve in curves)])
-    return curves
+    guesses = [*(curve.balanced() for curve in curves), from_starts(balance, where, EVERY, SPARE, watch)]
+    points = np.concatenate(guesses)
+    if not len(points):
+        return curves, points
+    position, moment, step = solve(balance, points[:, :3], points[:, 3:], EVERY)
+    found: list[Array] = []
+    for point in np.concatenate([position, moment], axis=1)[(step < CONVERGED_STEP) & where.holds(position)]:
+        if all(np.linalg.norm(point - known) > DUPLICATE_DISTANCE for known in found):
+            found.append(point)
+    return curves, np.reshape(found, (-1, 6))

@@ -153,11 +153,8 @@ class Implicit:
     def modes(self) -> list[_ModeAt]:
         """The floater's modes."""
         scale = 2j * np.pi * self.setting.scales.time
-        given = [
-            (mode, mode.growth_per_s * self.setting.scales.time + scale * mode.frequency_hz)
-            for mode in self.known.modes
-        ]
-        return [self._mode(mode.name, complex(value)) for mode, value in given]
+        given = [m.growth_per_s * self.setting.scales.time + scale * m.frequency_hz for m in self.known.modes]
+        return [self._mode(mode.name, complex(value)) for mode, value in zip(self.known.modes, given, strict=True)]
 
     def _mode(self, name: str, value: complex) -> _ModeAt:
         left = right = np.zeros(self.start.size)

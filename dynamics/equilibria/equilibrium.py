@@ -71,12 +71,12 @@ class Modes:
         }
 
 
-def eigenmodes(matrix: Array, tangents: Array) -> Modes:
-    """Those of a matrix (k, k) of rates on `tangents` (n, k), directions of the state; errors as of `modes`."""
-    values, right = np.linalg.eig(matrix)
-    condition = np.linalg.norm(left_eigenvectors(right), axis=1) * np.linalg.norm(right, axis=0)
-    errors = np.minimum(100 * np.finfo(float).eps * np.linalg.norm(matrix) * condition, 1e-6)
-    return Modes(values.astype(complex), errors, tangents @ right)
+def eigenmodes(matrices: Array, tangents: Array) -> Modes:
+    """Those of matrices (..., k, k) of rates on `tangents` (..., n, k), directions of states; errors as of `modes`."""
+    values, right = np.linalg.eig(matrices)
+    condition = np.linalg.norm(left_eigenvectors(right), axis=-1) * np.linalg.norm(right, axis=-2)
+    round_off = 100 * np.finfo(float).eps * np.linalg.norm(matrices, axis=(-2, -1))[..., None]
+    return Modes(values.astype(complex), np.minimum(round_off * condition, 1e-6), tangents @ right)
 
 
 def is_stable(eigenvalues: NDArray[Any], errors: Array) -> NDArray[np.bool_]:
@@ -93,19 +93,14 @@ def modes(state: Array, slope: Array) -> Modes:
     collisions of eigenvalues and 1e-8 at one, where Stokes drag makes 1e-7.  Of a scaled `state` (12,) and the `slope`
     (12, 12) of its rates, drag along the moment left out.
     """
-    values, errors, shapes = spectra(state[None], slope[None])
-    return Modes(values[0], errors[0], shapes[0])
+    found = spectra(state[None], slope[None])
+    return Modes(found.eigenvalues[0], found.errors[0], found.shapes[0])
 
 
-def spectra(states: Array, slopes: Array) -> tuple[Array, Array, Array]:
+def spectra(states: Array, slopes: Array) -> Modes:
     """`modes` of many equilibria in one call: eigenvalues (n, 10), their errors (n, 10) and shapes (n, 12, 10)."""
     tangents, projections = tangent_spaces(states)
-    matrices = projections @ slopes @ tangents
-    values, right = np.linalg.eig(matrices)
-    left = left_eigenvectors(right)
-    condition = np.linalg.norm(left, axis=2) * np.linalg.norm(right, axis=1)
-    round_off = 100 * np.finfo(float).eps * np.linalg.norm(matrices, axis=(1, 2))[:, None]
-    return values.astype(complex), np.minimum(round_off * condition, 1e-6), tangents @ right
+    return eigenmodes(projections @ slopes @ tangents, tangents)
 
 
 def left_eigenvectors(right: Array) -> Array:
@@ -178,9 +173,8 @@ def named_modes(modes: Modes, time: float) -> tuple[Mode, ...]:
     side, tilt = (sorted(part, key=lambda k: values[k].imag) for part in (others[:2], others[2:]))
     names = (LIBRATION, *TILT) if turning else TILT
     pairs = [("bounce", bounce), *zip(SIDE, side, strict=False), *zip(names, tilt, strict=False)]
-    return tuple(
-        Mode(name, float(values[k].real) / time, float(values[k].imag) / (2 * np.pi * time)) for name, k in pairs
-    )
+    rates = [(name, complex(values[k]) / time) for name, k in pairs]
+    return tuple(Mode(name, rate.real, rate.imag / (2 * np.pi)) for name, rate in rates)
 
 
 class EquilibriumError(ComputationError):
@@ -230,9 +224,7 @@ class Equilibrium:
     @property
     def start(self) -> State:
         """The state at t = 0."""
-        if self.turn is None:
-            return self.state
-        return self.turn[0]
+        return self.state if self.turn is None else self.turn[0]
 
     @property
     def position(self) -> Array:
@@ -321,9 +313,7 @@ class Equilibrium:
             "polar angle": f"{self.polar_angle_deg:.3f}°",
             "body spin": f"{self.spin:g}",
             "growth rate": f"{self.growth_per_s:.3g} s⁻¹",
-            "modes": "; ".join(
-                f"{MODE_NAMES.get(mode.name, mode.name)} {mode.frequency_hz:.4g} Hz" for mode in self.modes
-            ),
+            "modes": "; ".join(f"{MODE_NAMES.get(m.name, m.name)} {m.frequency_hz:.4g} Hz" for m in self.modes),
         }
         return html_table(f"Equilibrium, {self.stability}", rows)
 

@@ -244,13 +244,11 @@ STEPS, MOST_STEPS = 24, 384
 ENOUGH = 1e-8  # Error of the multipliers that is small: 1e-6 /s of growth at 100 Hz
 SHARE = 0.1  # Of the change by the last doubling, as the error: of a method of order six it is a 63rd
 NODES = np.array([0.5 - np.sqrt(15) / 10, 0.5, 0.5 + np.sqrt(15) / 10])
-COLLOCATION = np.array(
-    [
-        [5 / 36, 2 / 9 - np.sqrt(15) / 15, 5 / 36 - np.sqrt(15) / 30],
-        [5 / 36 + np.sqrt(15) / 24, 2 / 9, 5 / 36 - np.sqrt(15) / 24],
-        [5 / 36 + np.sqrt(15) / 30, 2 / 9 + np.sqrt(15) / 15, 5 / 36],
-    ]
-)
+COLLOCATION = np.array([
+    [5 / 36, 2 / 9 - np.sqrt(15) / 15, 5 / 36 - np.sqrt(15) / 30],
+    [5 / 36 + np.sqrt(15) / 24, 2 / 9, 5 / 36 - np.sqrt(15) / 24],
+    [5 / 36 + np.sqrt(15) / 30, 2 / 9 + np.sqrt(15) / 15, 5 / 36],
+])  # fmt: skip
 # Gauss's method of order six (E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 1996, ch. IV.5).
 WEIGHTS = np.array([5, 8, 5]) / 18
 
@@ -343,10 +341,10 @@ class OrbitCurve:
         What the equations of an orbit keep is prescribed beside them, so that as many follow from the others; of their
         singular value decomposition as many are taken as there are unknowns but one.
         """
-        states, parameter = self.states(points[0, :-1]), float(points[0, -1])
-        problem = self._at(states, parameter)
+        states, around = self.states(points[0, :-1]), float(points[0, -1]) + DIFFERENCE * np.array([0, 1, -1])
+        problem, *beside = (OrbitProblem(self.rates, *self.problem(part), len(states)) for part in around)
         residual, slope = problem(states)
-        ends = [self._at(states, parameter + s * DIFFERENCE)(states)[0] for s in (1, -1)]
+        ends = [other(states)[0] for other in beside]
         rows, aims = conserved(states, self.spin * abs(problem.values[Parameter.RATE]))
         column = np.append((ends[0] - ends[1]) / (2 * DIFFERENCE), 0.0 * aims)
         every = np.column_stack([np.vstack([slope, rows]) * np.sqrt(len(states)), column])
@@ -364,9 +362,6 @@ class OrbitCurve:
         states = unknowns.reshape(-1, 13 if self.rates.turning else 12)
         return np.asarray(states * np.sqrt(len(states)))
 
-    def _at(self, states: Array, parameter: float) -> OrbitProblem:
-        return OrbitProblem(self.rates, *self.problem(parameter), len(states))
-
 
 @dataclass(frozen=True, eq=False)
 class ForcedMotion:
@@ -379,9 +374,9 @@ class ForcedMotion:
 
     def reaches(self, known: Equilibrium) -> bool:
         """Whether the plate's table knows the places of an equilibrium through a whole turn."""
-        if self.memory is None:
+        if (memory := self.memory) is None:
             return True
-        return bool(np.all(self.memory.table.in_range(self.memory.plate.box.to_body(known.laboratory_turn.position))))
+        return bool(memory.table.in_range(memory.plate.box.to_body(known.laboratory_turn.position)).all())
 
     def equilibrium(self, known: Equilibrium) -> Equilibrium | LeftOut:
         """Periodic motion that a fixed point, or one in tilted gravity without plate, becomes; or why it is none."""
@@ -397,12 +392,10 @@ class ForcedMotion:
             places = known.position if known.turn is None else resampled(known.turn.position, len(orbit.states))
             moved = np.linalg.norm(orbit.states[:, :3] * scales.length - places, axis=1).max()
             wrong = self.memory.error * float(moved)
-        spin = fixed.spin
-        if self.rates.turning:
-            spin = float(np.mean(np.sum(turn.spin * turn.moment, axis=1))) / self.scene.angular_velocity
+        own = float(np.mean(np.sum(turn.spin * turn.moment, axis=1)))
         found = Equilibrium(
             state=scales.unpack(orbit.mean),
-            spin=spin,
+            spin=own / self.scene.angular_velocity if self.rates.turning else fixed.spin,
             residual=orbit.error,
             position_error=known.position_error + wrong + orbit.error * scales.length,
             **motion.in_seconds(scales.time),
@@ -435,7 +428,10 @@ class ForcedMotion:
         found, done, step, states = None, 0.0, 1.0, start
         while done < 1.0 and step >= SMALLEST_STEP:
             ahead = orbit(min(1.0, done + step), states)
-            if ahead is None or (step > SMALLEST_STEP and _moved(states, ahead.states) > JUMP):
+            before = states if states.ndim == 1 else states.mean(axis=0)
+            if ahead is None or (
+                step > SMALLEST_STEP and np.linalg.norm((ahead.states.mean(axis=0) - before)[:3]) > JUMP
+            ):
                 step /= 2
             else:
                 found, done, states = ahead, min(1.0, done + step), ahead.states
@@ -463,12 +459,6 @@ def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None
     if last[-1] >= 1:
         return curve.states(last[:-1]), NOT_CONVERGED, farthest
     return None, FOLD if tangent[-1] < 0 else NOT_CONVERGED, farthest
-
-
-def _moved(before: Array, after: Array) -> float:
-    """Distance of the means of an orbit (n, m) and of another one, or a state (m,), in floater radii."""
-    start = before if before.ndim == 1 else before.mean(axis=0)
-    return float(np.linalg.norm((after.mean(axis=0) - start)[:3]))
 
 
 def overlap(scene: Scene, known: Equilibrium) -> str:

@@ -139,29 +139,16 @@ def stepped(
 ) -> tuple[Array, Array, Truth]:
     """Points and tangents (n, k + 1) at `lengths` (n,) along curves of `equations`, `which` of them, and where found.
 
-    From `points` and `tangents` (n, k + 1). Those found are by the last correction, which moved less than `CLOSE`.
+    From `points` and `tangents` (n, k + 1). Those found are by the last correction, which moved less than `CLOSE`, in
+    the planes through the ends of the steps across them, where none moved farther than half of a step.
     """
-    ahead = equations.onto(points + lengths[:, None] * tangents)
-    ahead, good, slope = _corrected(equations, ahead, tangents, np.maximum(lengths / 2, 1e-8), which)
-    turned = np.full(tangents.shape, np.nan)
-    if good.any():
-        turned[good] = _along(slope[good], tangents[good])
-    return ahead, turned, good & np.isfinite(turned).all(axis=1)
-
-
-def _corrected(
-    equations: Equations, points: Array, across: Array, reach: Array, which: Indices
-) -> tuple[Array, Truth, Array]:
-    """Solutions in the planes through guesses (n, k + 1) across directions, where one was within reach (n,), and the
-    derivatives (n, k, k + 1) of the last correction.
-    """
+    points, reach = equations.onto(points + lengths[:, None] * tangents), np.maximum(lengths / 2, 1e-8)
     slopes = np.full((len(points), points.shape[1] - 1, points.shape[1]), np.nan)
-    points, good, active = points.copy(), np.zeros(len(points), bool), np.arange(len(points))
-    before = np.full(len(points), np.inf)
+    good, active, before = np.zeros(len(points), bool), np.arange(len(points)), np.full(len(points), np.inf)
     for _ in range(CORRECTIONS):
         value, slope = equations.linear(points[active], which[active])
         slopes[active] = slope
-        change = _solved(slope, across[active], -value, 0.0)
+        change = _solved(slope, tangents[active], -value, 0.0)
         size = np.linalg.norm(change, axis=1)
         near = size <= reach[active]  # not a number is not near
         active, change, size = active[near], change[near], size[near]
@@ -172,7 +159,10 @@ def _corrected(
         active = active[~met]
         if not len(active):
             break
-    return points, good, slopes
+    turned = np.full(tangents.shape, np.nan)
+    if good.any():
+        turned[good] = _along(slopes[good], tangents[good])
+    return points, turned, good & np.isfinite(turned).all(axis=1)
 
 
 def directions(equations: Equations, points: Array, before: Array, which: Indices = ONE) -> Array:

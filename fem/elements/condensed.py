@@ -112,14 +112,10 @@ class OpenBoundary:
         used = surface.weights > 0
         self.radius, self.degree, self.copies = radius, degree, 2 ** len(planes)
         self.area_error = abs(float(surface.weights.sum()) * self.copies / (FOUR_PI * radius**2) - 1)
-        self.keys = [
-            key
-            for key in members(degree)
-            if all(harmonic_parity(key, axis) == sign for axis, sign in zip(planes, signs, strict=True))
-        ]
+        parities = list(zip(planes, signs, strict=True))
+        self.keys = [key for key in members(degree) if all(harmonic_parity(key, axis) == p for axis, p in parities)]
         harmonics = np.zeros((len(used), len(self.keys)))
         harmonics[used] = orthonormal(self.keys, surface.points[used])
-        self._size = int(space.ndof)
         self.unknowns = np.nonzero(np.array(space.GetDofs(mesh.Boundaries("outer"))))[0]
         columns = []
         for values in harmonics.T:
@@ -127,28 +123,20 @@ class OpenBoundary:
             form += surface.function(values) * space.TestFunction() * surface.measure
             form.Assemble()
             columns.append(form.vec.FV().NumPy()[self.unknowns])
-        self._projection = np.stack(columns, axis=1)
-        self._degrees = np.array([l for l, _, _ in self.keys], float)
+        self.projection = np.stack(columns, axis=1)
+        self.degrees = np.array([l for l, _, _ in self.keys], float)
 
     def apply(self, potential: Array) -> Array:
         """What the map adds to the Robin term, as a load vector (unknowns,)."""
-        amplitudes = self.copies * (self._projection.T @ potential[self.unknowns])
+        amplitudes = self.copies * (self.projection.T @ potential[self.unknowns])
         result = np.zeros_like(potential)
-        result[self.unknowns] = self._projection @ ((self._degrees - 1) / self.radius**3 * amplitudes)
+        result[self.unknowns] = self.projection @ ((self.degrees - 1) / self.radius**3 * amplitudes)
         return result
-
-    def lacking(self) -> tuple[Array, Array]:
-        """Load vectors (k, unknowns) p and factors (k,) d, none of them 0, of the same map Σ d p pᵀ."""
-        factors = self.copies * (self._degrees - 1) / self.radius**3
-        used = factors != 0
-        loads = np.zeros((int(used.sum()), self._size))
-        loads[:, self.unknowns] = self._projection[:, used].T
-        return loads, factors[used]
 
     def expansion(self, potential: Array) -> Coefficients:
         """Coefficients c_lm of the potential Σ c_lm Θ_lm outside, from its values on the sphere."""
-        amplitudes = self.copies * (self._projection.T @ potential[self.unknowns]) / self.radius**2
-        return outer_coefficients(amplitudes * self.radius ** (self._degrees + 1), self.keys, self.degree)
+        amplitudes = self.copies * (self.projection.T @ potential[self.unknowns]) / self.radius**2
+        return outer_coefficients(amplitudes * self.radius ** (self.degrees + 1), self.keys, self.degree)
 
 
 Number = TypeVar("Number", np.float64, np.complex128)

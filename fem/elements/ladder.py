@@ -56,10 +56,7 @@ def reaction_moments(solution: Solution, degree: int) -> Array:
     surface = surface_points(mesh.mesh, "faces|plane.", 2 * solution.system.order + 4)
     used = surface.weights > 0
     faces = mesh.to_meter(surface.points[used]), surface.weights[used], surface.sample(solution.potential)[used, 0]
-    for name in mesh.mesh.GetMaterials():
-        if name == "air":
-            continue
-        k = int(name.removeprefix("magnet"))
+    for k in (int(name.removeprefix("magnet")) for name in mesh.mesh.GetMaterials() if name != "air"):
         if mesh.magnets[k].contrast == 0:
             continue
         body = mesh.magnets[k].body
@@ -86,8 +83,6 @@ def _share(solution: Solution, k: int) -> tuple[Array, Array, Array]:
 def reaction_dipoles(solution: Solution, number: int) -> tuple[Array, Array, Array]:
     """-(μ - 1) ∇ψ of a magnet's share on the meshed side of the planes, and of those that are its images.
 
-    Returns
-    -------
     Integration points (n, 3) m and weights (n,) m³ in the mirrors' frame, and values (n, 3) T there; nothing where the
     magnet has no share but that of an image.
     """
@@ -239,28 +234,18 @@ def solve_rotor(
     elif formulation == "direct":
         total = [rotated_harmonics(np.sum([trace_moments(one) for one in solutions], axis=0), symmetry.axes)]
     else:
-        total = _of_cells(solutions, symmetry, known, shifts[owners], degree)
+        # -(μ - 1) ∇ψ of every cell of every piece about its centre; all solutions have the same integration points
+        undivided, total = any(len(own.radii) == 1 for own in known), []
+        parts = [reaction_moments(solution, degree) for solution in solutions] if undivided else []
+        for k, (own, shift) in enumerate(zip(known, shifts[owners], strict=True)):
+            if len(own.radii) == 1:
+                total.append(rotated_harmonics(np.sum([part[k] for part in parts], axis=0), symmetry.axes))
+                continue
+            points, weights, values = reaction_dipoles(solutions[0], k)
+            values = values + sum(reaction_dipoles(other, k)[2] for other in solutions[1:])
+            places = symmetry.center + points @ symmetry.axes.T - shift
+            total += by_cells(places, weights, values @ symmetry.axes.T, own, degree)
     return RotorSolution(tuple(total), spheres, mesh, system.unknowns, layers, symmetry, tuple(solutions))
-
-
-def _of_cells(
-    solutions: Sequence[Solution], symmetry: Symmetry, cells: Sequence[Cells], shifts: Array, degree: int
-) -> list[Coefficients]:
-    """Coefficients (T) of -(μ - 1) ∇ψ of every cell of every piece, about its centre, in the rotor's frame.
-
-    Of the sum of solutions on one mesh, whose integration points are the same.
-    """
-    undivided, found = any(len(own.radii) == 1 for own in cells), list[Coefficients]()
-    parts = [reaction_moments(solution, degree) for solution in solutions] if undivided else []
-    for k, (own, shift) in enumerate(zip(cells, shifts, strict=True)):
-        if len(own.radii) == 1:
-            found.append(rotated_harmonics(np.sum([part[k] for part in parts], axis=0), symmetry.axes))
-            continue
-        points, weights, values = reaction_dipoles(solutions[0], k)
-        values = values + sum(reaction_dipoles(other, k)[2] for other in solutions[1:])
-        places = symmetry.center + points @ symmetry.axes.T - shift
-        found += by_cells(places, weights, values @ symmetry.axes.T, own, degree)
-    return found
 
 
 def _meshed_system(
@@ -315,8 +300,9 @@ def potential_slopes(solution: RotorSolution, points: Array, beside: Array) -> t
     # the mesh has one side of the planes: points are mirrored there, and each parity gets its signs back
     near = np.flatnonzero((places != others).any(axis=1))
     if len(near):
-        sides = [_materials(mesh, flips[near] * there[near]) for there in (places, others)]
-        near = near[sides[0] != sides[1]]
+        numbers = [mesh.mesh(*(flips[near] * there[near]).T)["nr"] for there in (places, others)]
+        sides = [[mesh.mesh[ng.ElementId(ng.VOL, int(k))].mat for k in elements] for elements in numbers]
+        near = near[np.array(sides[0]) != np.array(sides[1])]
         places[near] = others[near]
     found = mesh.mesh(*(flips * places).T)
     first, second = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
@@ -331,12 +317,6 @@ def potential_slopes(solution: RotorSolution, points: Array, beside: Array) -> t
     first, second = first @ axes.T, np.asarray(axes @ second @ axes.T)
     first[near] += np.einsum("nij,nj->ni", second[near], points[near] - beside[near])
     return first, second
-
-
-def _materials(mesh: MagnetMesh, places: Array) -> NDArray[np.str_]:
-    """Names of the materials (n,) of the elements in which the mesh finds places (n, 3) in its coordinates."""
-    numbers = mesh.mesh(*places.T)["nr"]
-    return np.array([mesh.mesh[ng.ElementId(ng.VOL, int(number))].mat for number in numbers])
 
 
 def _in_mesh(solution: RotorSolution, points: Array) -> Array:
@@ -376,16 +356,14 @@ def refined(
 ) -> tuple[RotorSolution, int, dict[str, list[MultipoleExpansion]]]:
     """The solution at the first order whose error is below the target.
 
+    With its order, and the two estimates of its error, to be added, as fields.
+
     Parameters
     ----------
     solve : solution at an order
     points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
     settings : of the mesh, as given to `refinement_of`
     watch : called with the progress, as far as the rate of convergence foretells it
-
-    Returns
-    -------
-    The last solution, its order, and the two estimates of its error, to be added, as fields.
     """
     first, *others = LAYERS
     coarse, before, old = solve(first), np.inf, list[Coefficients]()
@@ -397,7 +375,11 @@ def refined(
         # geometric: what is left is rate/(1 - rate) of the last step; the one before, scaled, stands for its direction
         rate = FIRST_RATE
         if np.isfinite(before):
-            rate = min(max(size / before, _fastest(fine, order, settings)) if before else 0.0, SLOWEST_RATE)
+            contrast = strongest(fine.mesh.magnets)
+            fastest = FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG
+            if fine.layers < refinement_of(order, settings, contrast).mesh.hp_layers:
+                fastest = FIRST_RATE  # where layers at the edges lack, orders converge slowly later on
+            rate = min(max(size / before, fastest) if before else 0.0, SLOWEST_RATE)
         factor = SAFETY * rate / (1 - rate)
         earlier = [size / before * d for d in old] if old and before else new
         if 2 * factor * size <= target:
@@ -409,11 +391,3 @@ def refined(
         coarse, before, old = fine, size, new
     doubts = {"discretisation": new, "discretisation, earlier step": earlier}
     return fine, order, {cause: fine.expansions([factor * d for d in ds]) for cause, ds in doubts.items()}
-
-
-def _fastest(solution: RotorSolution, order: int, settings: MeshSettings) -> float:
-    """Rate that may be trusted: slow where layers at the edges lack, since orders then converge slowly later on."""
-    contrast = strongest(solution.mesh.magnets)
-    if solution.layers < refinement_of(order, settings, contrast).mesh.hp_layers:
-        return FIRST_RATE
-    return FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG

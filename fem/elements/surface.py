@@ -15,7 +15,7 @@ O. D. Kellogg, Foundations of Potential Theory (1929), ch. VI; P. R. Johnston an
 62 (2005) 564, for the hyperbolic sine.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from itertools import combinations, product
 
@@ -212,8 +212,8 @@ class _BoxSurface(Surface):
         """(n,) the nodes' mirror images at the plane across an axis."""
         found = np.empty(len(self.places), int)
         for (across, side), mine in self.numbers.items():
-            flipped = self.numbers[across, -side] if across == axis else np.flip(mine, self._order(across).index(axis))
-            found[mine] = flipped
+            opposite = across == axis
+            found[mine] = self.numbers[across, -side] if opposite else np.flip(mine, self._order(across).index(axis))
         return found
 
     @cached_property
@@ -321,9 +321,8 @@ class _RoundSurface(Surface):
                 x = (radius - middle[0]) / way[0]
                 on = (np.abs(places[:, 2] - middle[1]) <= self.reach) & (np.abs(x) <= 1)
                 jump = 0.5 * normal[1] * normals[on, 2, None] * _lagrange(x[on], self.count)
-                result[on, number * size : (number + 1) * size] += (jump[:, :, None] * around[on, None]).reshape(
-                    -1, size
-                )
+                mine = slice(number * size, (number + 1) * size)
+                result[on, mine] += (jump[:, :, None] * around[on, None]).reshape(-1, size)
         return result
 
     @cached_property
@@ -387,11 +386,7 @@ class _SphereSurface(Surface):
         return np.asarray(values / [2 * (2 * l + 1) for l, _, _ in keys] @ (values.T * sphere(self.count)[1]))
 
 
-def _surface(body: Solid, count: int) -> Surface:
-    if isinstance(body, Box):
-        return _BoxSurface(body, count)
-    assert isinstance(body, Cylinder | Sphere)
-    return _RoundSurface(body, count) if isinstance(body, Cylinder) else _SphereSurface(body, count)
+SURFACES: dict[type, Callable[..., Surface]] = {Box: _BoxSurface, Cylinder: _RoundSurface, Sphere: _SphereSurface}
 
 
 def bears_charges(magnet: Magnet) -> bool:
@@ -447,7 +442,7 @@ class SurfaceCharges:
             body = magnet.body
             key = (body.kind, *body.shape_numbers.tolist())
             if key not in alike:
-                alike[key] = _surface(moved(body, np.zeros(3), np.eye(3)), count)
+                alike[key] = SURFACES[type(body)](moved(body, np.zeros(3), np.eye(3)), count)
             self._surfaces.append(alike[key])
             places.append(body.center + alike[key].places @ body.rotation.T)
             normals.append(alike[key].normals @ body.rotation.T)
@@ -528,9 +523,8 @@ class SurfaceCharges:
         amounts -= amounts.sum() / areas.sum() * areas  # a magnet has no charge
         few = max(1, ROWS // len(places))
         some = [points[start : start + few] for start in range(0, len(points), few)]
-        return (
-            np.concatenate([-unit_dipole_potentials(places, part).T @ amounts for part in some]).reshape(-1, 3) / MU_0
-        )
+        fields = [-unit_dipole_potentials(places, part).T @ amounts for part in some]
+        return np.concatenate(fields).reshape(-1, 3) / MU_0
 
     def response(self, field: Array) -> Array:
         """Charges σ (n, k) T that k fields with n·b (n, k) T of sources elsewhere make; raises as `solved`."""

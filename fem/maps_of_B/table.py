@@ -71,8 +71,8 @@ def require_plausible(field_map: FieldMap, magnets: Sequence[Magnet], radius: fl
     rotor = list(magnets)
     for k, magnet in enumerate(magnets):
         if isinstance(body := magnet.body, Part):  # the sphere of its volume is near enough to a factor of two
-            center, size = body.center + body.rotation @ body.centroid, float(np.cbrt(body.volume * 0.75 / np.pi))
-            rotor[k] = replace(magnet, body=Sphere(size, center, body.rotation))
+            center, across = body.center + body.rotation @ body.centroid, float(np.cbrt(body.volume * 0.75 / np.pi))
+            rotor[k] = replace(magnet, body=Sphere(across, center, body.rotation))
     found = _compared(field_map, rotor, radius)
     if found is not None and found.agrees(rotor):
         _require_no_zeros(field_map, rotor, radius)

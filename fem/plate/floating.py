@@ -55,6 +55,7 @@ class AxialPotential:
 
     coefficients: Array = field(metadata={"units": "T"})  # (k, l)
     radius: float = field(metadata={"units": "m"})
+    heights: tuple[float, float] = field(metadata={"units": "m"})
     axis: tuple[float, float] = field(default=(0.0, 0.0), metadata={"units": "m"})  # where it is, of the given frame
 
     @classmethod

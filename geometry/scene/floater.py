@@ -39,31 +39,21 @@ class FloaterPart:
 
 @dataclass(frozen=True)
 class Floater:
-    """The floating magnet; a sphere, rigidly magnetised, is exactly a dipole, seen and seeing.
+    """The floating magnet; a sphere, rigidly magnetised, is exactly a dipole, seen and seeing."""
 
-    Parameters
-    ----------
-    radius : of the sphere, or of one about another body's centre of mass that holds it, m
-    remanence : remanent polarisation, T; the largest of several magnets
-    recoil_permeability : μr, the largest of several magnets
-    density : kg/m³, the mean of several parts
-    conductivity : S/m, of several parts the largest, or None where its own eddy currents are not modelled
-    body : its shape about the origin where it is a cuboid, cylinder or ring, which is polarised along its z
-    pieces : the parts of any other body, in its frame; see `composed`
-    moments_of_inertia : (3,) kg m² about the axes of its frame where they are given and not those of its parts
-    mean : whether it is the mean of a body over turns about its moment, see `averaged`
-    file_axes : (3, 3) whose columns are the scene file's axes in its frame
-    """
-
-    radius: float
-    remanence: float
-    recoil_permeability: float
-    density: float
+    radius: float  # of the sphere, or of one about another body's centre of mass that holds it, m
+    remanence: float  # remanent polarisation, T; the largest of several magnets
+    recoil_permeability: float  # μr, the largest of several magnets
+    density: float  # kg/m³, the mean of several parts
+    # S/m, of several parts the largest, or None where its own eddy currents are not modelled
     conductivity: float | None = None
+    # its shape about the origin where it is a cuboid, cylinder or ring, which is polarised along its z
     body: Box | Cylinder | None = None
-    pieces: tuple[FloaterPart, ...] = ()
+    pieces: tuple[FloaterPart, ...] = ()  # the parts of any other body, in its frame; see `composed`
+    # (3,) kg m² about the axes of its frame where they are given and not those of its parts
     moments_of_inertia: tuple[float, float, float] | None = None
-    mean: bool = False
+    mean: bool = False  # whether it is the mean of a body over turns about its moment, see `averaged`
+    # (3, 3) whose columns are the scene file's axes in its frame
     file_axes: Array = field(default_factory=unturned, compare=False)
 
     @classmethod

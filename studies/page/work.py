@@ -367,12 +367,9 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
         apart = np.linalg.norm(places - position, axis=1)
         good = np.flatnonzero((size < CONVERGED_STEP) & (apart < 3 * NEAR))  # not a number is neither
         there = balance.at(good)
-        eigenvalues, errors, _ = spectra(
-            there.states(places[good], turned[good]),
-            there.rates(there.states(places[good], turned[good]), there.values)[1],
-        )
-        slow = MARGINAL * Scales.of(family.scene).time
-        good = good[is_stable(eigenvalues, np.maximum(errors, slow))]
+        states = there.states(places[good], turned[good])
+        linear, slow = spectra(states, there.rates(states, there.values)[1]), MARGINAL * Scales.of(family.scene).time
+        good = good[is_stable(linear.eigenvalues, np.maximum(linear.errors, slow))]
         position[good], moment[good], low[good] = places[good], turned[good], middle[good]
         high[np.setdiff1d(np.arange(len(pairs)), good)] = middle[np.setdiff1d(np.arange(len(pairs)), good)]
     return dict(zip(pairs, ((low + high) / 2).tolist(), strict=True))

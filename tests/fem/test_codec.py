@@ -35,7 +35,9 @@ class Outer:
     """All that can be in a table."""
 
     name: str
-    size: float = field(metadata={"units": "kg"})
+    size: float = field(metadata={"units": "kg"})  # of it all
+    # the parts,
+    # each by itself
     parts: tuple[Inner, ...] = ()
     one: Inner | None = None
     several: Mapping[str, tuple[Inner, ...]] = field(default_factory=dict)
@@ -106,7 +108,7 @@ def test_variables_say_what_they_are():
     data = to_dataset(TABLE)
     assert data["Inner.values"].attrs == {"units": "m", "long_name": "(n,) m, of any length"}
     assert data["Inner.loose"].dtype == np.float32
-    assert data["Outer.size"].attrs["units"] == "kg"
+    assert data["Outer.size"].attrs == {"units": "kg", "long_name": "of it all"}
     assert all("units" in variable.attrs for variable in data.variables.values())
 
 

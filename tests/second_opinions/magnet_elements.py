@@ -31,6 +31,15 @@ from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes.magnets import MagnetMesh, mesh_magnets
 
 
+def lacking(boundary: OpenBoundary, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Load vectors (k, `size`) p and factors (k,) d, none of them 0, of its map Σ d p pᵀ."""
+    factors = boundary.copies * (boundary.degrees - 1) / boundary.radius**3
+    used = factors != 0
+    loads = np.zeros((int(used.sum()), size))
+    loads[:, boundary.unknowns] = boundary.projection[:, used].T
+    return loads, factors[used]
+
+
 class OpenFactor:
     """A factor that knows the open boundary: many loads, each at the price of one in the ball of air alone.
 
@@ -48,7 +57,7 @@ class OpenFactor:
 
     def __init__(self, form: ng.BilinearForm, inverse: ng.BaseMatrix, boundary: OpenBoundary) -> None:
         self._form, self._inverse = form, inverse
-        self._loads, factors = boundary.lacking()
+        self._loads, factors = lacking(boundary, form.space.ndof)
         answers = solve_condensed(form, inverse, self._loads)
         self._mixed = np.linalg.solve(np.diag(1 / factors) + self._loads @ answers.T, answers)
 

@@ -3,7 +3,7 @@
 import ngsolve as ng
 import numpy as np
 import pytest
-from second_opinions.magnet_elements import OpenFactor
+from second_opinions.magnet_elements import OpenFactor, lacking
 
 from spinlev.fem.elements.condensed import OpenBoundary, solve_open
 from spinlev.fem.elements.spaces import volume_points
@@ -44,7 +44,7 @@ def test_the_factor_with_the_boundary_gives_what_iteration_gives(system):
 def test_its_loads_and_factors_are_its_map(system):
     """As a sum over harmonics against `apply`, which is not nothing."""
     _form, _inverse, boundary, space, _mesh = system
-    loads, factors = boundary.lacking()
+    loads, factors = lacking(boundary, space.ndof)
     assert len(loads) == (DEGREE + 1) ** 2 - 3  # all but the three of degree 1, for which the Robin term is exact
     assert np.all(factors != 0)
     values = np.random.default_rng(0).normal(size=space.ndof)
