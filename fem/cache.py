@@ -101,10 +101,7 @@ def libraries() -> str:
 def program_digest(*without: str, root: Path = ROOT) -> str:
     """SHA-256 of this program's text and its libraries' versions: processes that compute together have one.
 
-    Parameters
-    ----------
-    without : rooms that are left out, as "studies/figures"
-    root : where the floors lie
+    `without`: rooms that are left out, as "studies/figures"; `root`: where the floors lie.
     """
     digest = hashlib.sha256(libraries().encode())
     for path in sorted(path for floor in FLOORS for path in (root / floor).rglob("*") if path.suffix in TEXTS):

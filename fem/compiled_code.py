@@ -40,10 +40,7 @@ def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any)
 
     Damaged code is thrown away without a word and compiled anew; a cache that cannot be written does no harm.
 
-    Parameters
-    ----------
-    compiler : ``heyoka.cfunc`` or ``heyoka.taylor_adaptive``
-    arguments, options : the compiler's
+    `compiler`: `heyoka.cfunc` or `heyoka.taylor_adaptive`; `arguments`, `options`: the compiler's.
     """
     return compiled_later(compiler, lambda: arguments, arguments, **options)
 

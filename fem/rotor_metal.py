@@ -425,10 +425,7 @@ def check_metal(pieces: Pieces, frequency: float, nearest: float) -> None:
 
     Raises InputError: with the skin depth, and the conductivity or frequency up to which it would do.
 
-    Parameters
-    ----------
-    frequency : of the rotor, Hz
-    nearest : how near the floater's centre comes to a face, m
+    `frequency`: of the rotor, Hz; `nearest`: how near the floater's centre comes to a face, m.
     """
     refuse_wide_holes(pieces, nearest)
     for bodies, conductivity in pieces:

@@ -49,18 +49,11 @@ Answer = TypeVar("Answer")
 def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> BinaryIO:
     """A file that a user named, opened for reading once it is known to be one: others may block, or never end.
 
-    Raises InputError: there is none, it cannot be opened, is a folder, pipe, device or socket, or is larger.
+    Raises InputError: there is none, it cannot be opened, is a folder, pipe, device or socket, or is larger. Returns
+    the file, to be closed; a library that opens the path by itself needs no more than that it was given.
 
-    Parameters
-    ----------
-    path : the file
-    most_bytes : its size may be so large
-    name : what messages call the input, such as `points`
-    kind : what it must be, with its article, such as `a CSV file`
-
-    Returns
-    -------
-    The file, to be closed; a library that opens the path by itself needs no more than that it was given.
+    `path`: the file; `most_bytes`: its size may be so large; `name`: what messages call the input, such as `points`;
+    `kind`: what it must be, with its article, such as `a CSV file`.
     """
     found = _opened(path)
     if isinstance(found, str):
@@ -144,11 +137,8 @@ def call_apart(seconds: float, function: Callable[..., Answer], *given: Any) -> 
     Raises LostError: the process took too long, or needed more than `MEMORY`; CrashError: it crashed; Exception:
     whatever the function raises.
 
-    Parameters
-    ----------
-    seconds : of processor time
-    function : at the top of its module
-    *given : its arguments, which like the answer must be such that pickle takes them
+    `seconds`: of processor time; `function`: at the top of its module; `*given`: its arguments, which like the answer
+    must be such that pickle takes them.
     """
     # -P: no module of the current folder. Processes of multiprocessing would run the user's script once more.
     command = [sys.executable, "-P", "-c", LAUNCH, f"{function.__module__}.{function.__qualname__}"]

@@ -189,13 +189,8 @@ def branch_through(scene: Scene, rates: Rates, start: Array, frequency: float, s
 
     Raises EquilibriumError: there is no equilibrium near `start`.
 
-    Parameters
-    ----------
-    scene : gravity along the axis
-    rates : its equations of motion
-    start : scaled state (12,) of the equilibrium
-    frequency : where it is, Hz
-    spin : body spin
+    `scene`: gravity along the axis; `rates`: its equations of motion; `start`: scaled state (12,) of the equilibrium;
+    `frequency`: where it is, Hz; `spin`: body spin.
     """
     walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates, spin), start, frequency)
     below = walk(LOWEST if frequency > LOWEST else frequency / WIDEST)

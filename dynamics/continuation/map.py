@@ -250,6 +250,9 @@ def surveys(
 ) -> list[tuple[Survey, bool]]:
     """Survey of each scene as by `equilibria.survey`, without curves; neighbours help each other as in a map.
 
+    Returns (n,) the surveys, and whether the scene's own point was searched. Raises EquilibriumError for a rotor at
+    rest.
+
     Parameters
     ----------
     scenes : n scenes with one rotor, or of one family of rotors; their plates are left out
@@ -258,10 +261,6 @@ def surveys(
     spin : (n,) body spin s
     places : (n, axes) whole-numbered coordinates by which scenes are neighbours
     measures : (n,) of the rotors in their family, see `RotorFamily`
-
-    Returns
-    -------
-    (n,) the surveys, and whether the scene's own point was searched. Raises EquilibriumError for a rotor at rest.
     """
     for scene in scenes:
         check_turning(scene)

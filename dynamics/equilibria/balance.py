@@ -123,6 +123,9 @@ def solve(
 ) -> tuple[Array, Array, Array]:
     """Newton's method from many starts at once.
 
+    Returns positions and moments (n, 3), and lengths (n,) of the last steps: the errors before these; infinite where it
+    failed.
+
     Parameters
     ----------
     balance : what shall vanish
@@ -132,10 +135,6 @@ def solve(
     reach : longest step of the position (floater radii) and of the moment (rad)
     far : farther than this from the origin, in floater radii, the longest step grows with the distance, as the scale
         of the field does
-
-    Returns
-    -------
-    Positions and moments (n, 3), and lengths (n,) of the last steps: the errors before these; infinite where it failed.
     """
     position, moment = position.copy(), moment.copy()
     length = np.full(len(position), np.inf)

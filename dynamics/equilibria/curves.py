@@ -88,6 +88,8 @@ def newton_search(
 ) -> tuple[Indices, Array]:
     """Solutions that Newton's method finds from starts, in one problem or in several as a batch, each once.
 
+    Returns problems (k,) in order, and positions with moments (k, 6), of each problem the lowest first.
+
     Parameters
     ----------
     balance : of problems (n,), one for each point
@@ -98,10 +100,6 @@ def newton_search(
     margin : so far outside the range (radii) solutions are kept
     reach, far : longest steps, see `balance.solve`
     watch : progress of the search
-
-    Returns
-    -------
-    Problems (k,) in order, and positions with moments (k, 6), of each problem the lowest first.
     """
 
     def solved(problem: Indices, points: Array, rough: bool) -> tuple[Indices, Array]:

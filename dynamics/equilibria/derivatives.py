@@ -127,10 +127,7 @@ def _eigenvalue(pencil: Pencil, near: _ModeAt, value: complex) -> complex:
 class Implicit:
     """An equilibrium's equations, factorised once for derivatives by many numbers.
 
-    Parameters
-    ----------
-    known : of a body that is round about its moment, or its mean
-    setting : its equations
+    `known`: of a body that is round about its moment, or its mean; `setting`: its equations.
     """
 
     def __init__(self, known: Equilibrium, setting: Setting) -> None:
@@ -235,11 +232,8 @@ class Implicit:
     ) -> Equilibrium | None:
         """The equilibrium that equations nearby have, by Newton's method from where tangents lead; None where none is.
 
-        Parameters
-        ----------
-        setting : the equations
-        tangents : steps of numbers with the way by each
-        with_modes : whether its modes are computed, or left as they are
+        `setting`: the equations; `tangents`: steps of numbers with the way by each; `with_modes`: whether its modes are
+        computed, or left as they are.
         """
         spin, scales = self.known.spin, setting.scales
         begun = self.start + sum((step * way.change for step, way in tangents), np.zeros_like(self.start))

@@ -65,9 +65,7 @@ class AtRest:
 class BalanceCurve(AtRest, ABC):
     """All five balances on curves with one parameter each: unknown are position, moment, and the parameter by its unit.
 
-    Parameters
-    ----------
-    unit : of the parameter, a typical change over which an equilibrium moves by its radius
+    `unit`: of the parameter, a typical change over which an equilibrium moves by its radius.
     """
 
     unit: float
@@ -254,15 +252,11 @@ def continued(
 ) -> tuple[Indices, Truth, Array, Array]:
     """Equilibria to which others lead while the parameters of their problem change steadily to those of another one.
 
-    Parameters
-    ----------
-    start, end : with the same equations
-    position, moment : (n, 3) of equilibria at the start, scaled
-    bound : farther from the origin than this, in floater radii, none is followed
+    Returns which (k,) were followed; whether to the end, or beyond a fold to others at the start; position and moment
+    (k, 3).
 
-    Returns
-    -------
-    Which (k,) were followed; whether to the end, or beyond a fold to others at the start; position and moment (k, 3).
+    `start`, `end`: with the same equations; `position`, `moment`: (n, 3) of equilibria at the start, scaled; `bound`:
+    farther from the origin than this, in floater radii, none is followed.
     """
     places, turned, size = solve(end, position, moment, EVERY, NEWTON_STEPS)
     apart = np.linalg.norm(np.concatenate([places - position, turned - moment], axis=1), axis=1)

@@ -56,7 +56,8 @@ def shifted_equilibrium(
 ) -> tuple[Array, Array]:
     """Follow an equilibrium to where additional forces put it.
 
-    Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577).
+    Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577). Returns the shift (3,) m to
+    first order, and the new position (3,) m; NaN if none was reached.
 
     Parameters
     ----------
@@ -64,10 +65,6 @@ def shifted_equilibrium(
     position, moment : (3,) m and direction of the equilibrium
     extra : of a position (3,) m and a direction (3,): additional force (3,) N and torque (3,) N m, rotor's frame
     tolerance : of the place, in radii of the floater
-
-    Returns
-    -------
-    The shift (3,) m to first order, and the new position (3,) m; NaN if none was reached.
     """
     scales, floater = Scales.of(scene), scene.floater
 

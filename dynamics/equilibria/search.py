@@ -98,10 +98,8 @@ def find_equilibria(
 ) -> list[Equilibrium]:
     """All synchronous equilibria free of the bodies, the stable ones first, then by distance.
 
-    Parameters
-    ----------
-    scene, table, spin, farthest, rates : see `survey`, as for what it raises
-    memory : the plate's currents; None leaves them out
+    `scene`, `table`, `spin`, `farthest`, `rates`: see `survey`, as for what it raises; `memory`: the plate's currents;
+    None leaves them out.
     """
     rates = rates or Rates(with_effects(scene, table))
     found = survey(scene, table, spin, farthest, rates)
@@ -120,7 +118,8 @@ def survey(
 ) -> Survey:
     """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
 
-    Raises EquilibriumError: the rotor is at rest and the floater does not spin.
+    Raises EquilibriumError: the rotor is at rest and the floater does not spin. Returns equilibria, the stable ones
+    first, then by distance, accurate to round-off in the table's field.
 
     Parameters
     ----------
@@ -134,10 +133,6 @@ def survey(
     watch : progress of the search
 
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
-
-    Returns
-    -------
-    Equilibria, the stable ones first, then by distance, accurate to round-off in the table's field.
     """
     check_turning(scene)
     if not scene.floater.round:
@@ -374,10 +369,7 @@ def with_plate(
     Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate removes or
     pushes against a body, and those that overlap one, are left out.
 
-    Parameters
-    ----------
-    scene, table, rates : as for the survey `known` without the plate's currents
-    memory : these currents
+    `scene`, `table`, `rates`: as for the survey `known` without the plate's currents; `memory`: these currents.
     """
     known, rates = free_of_bodies(scene, known), rates or Rates(with_effects(scene, table))
     whole = [e for e in known.equilibria if of_whole_body(scene, rates, e) and not scene.floater.mean]
@@ -460,10 +452,8 @@ def _equilibrium(
 def locked_poses(rates: Rates, values: Array, points: Array, axes: Array) -> tuple[Array, Array]:
     """Scaled positions (k, 3) and quaternions (k, 4) of equilibria, by Newton's method.
 
-    Parameters
-    ----------
-    rates, values : of the equations, and the runtime parameters (p,)
-    points, axes : (n, 3) scaled positions and (n, 3, 3) axes of the body from which they are looked for
+    `rates`, `values`: of the equations, and the runtime parameters (p,); `points`, `axes`: (n, 3) scaled positions and
+    (n, 3, 3) axes of the body from which they are looked for.
     """
     position, quaternion = points.copy(), quaternions_of(axes)
     active, met = np.arange(len(points)), np.zeros(len(points), bool)
@@ -498,14 +488,8 @@ def locked_equilibrium(
 ) -> Equilibrium:
     """The equilibrium in a pose of `locked_poses`, with its modes.
 
-    Parameters
-    ----------
-    scales : of the scene
-    rates : of a body that is not round
-    values : (p,) of the parameters
-    position : (3,) scaled
-    quaternion : (4,)
-    doubt : (2 + 12 c,) of the field there, T and T/m, see `field_doubts`
+    `scales`: of the scene; `rates`: of a body that is not round; `values`: (p,) of the parameters; `position`: (3,)
+    scaled; `quaternion`: (4,); `doubt`: (2 + 12 c,) of the field there, T and T/m, see `field_doubts`.
     """
     rate = float(values[Parameter.RATE])
     axes = matrices_of(quaternion)

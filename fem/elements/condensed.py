@@ -55,10 +55,7 @@ def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str)
 
     Raises TooLargeError: it says how much is needed, how much there is, and `way_out`.
 
-    Parameters
-    ----------
-    space, free : NGSolve space, and its unknowns that are solved for
-    way_out : what the user can do
+    `space`, `free`: NGSolve space, and its unknowns that are solved for; `way_out`: what the user can do.
     """
     need, there = PEAK * sum(memory_need(space, free)), free_memory()
     if need > there:
@@ -145,11 +142,8 @@ Number = TypeVar("Number", np.float64, np.complex128)
 def solve_condensed(form: ngsolve.BilinearForm, inverse: ngsolve.BaseMatrix, loads: NDArray[Number]) -> NDArray[Number]:
     """Solutions (n, unknowns), inner unknowns included.
 
-    Parameters
-    ----------
-    form : assembled with `condense=True`
-    inverse : of its matrix on the free coupling unknowns
-    loads : (n, unknowns), real or complex as the form is
+    `form`: assembled with `condense=True`; `inverse`: of its matrix on the free coupling unknowns; `loads`: (n,
+    unknowns), real or complex as the form is.
     """
     right, solution = ngsolve.GridFunction(form.space), ngsolve.GridFunction(form.space)
     condensed = right.vec.CreateVector()

@@ -285,11 +285,8 @@ def potential_slopes(solution: RotorSolution, points: Array, beside: Array) -> t
     find a point on the wrong side: where the material is not that of the place `beside`, ∇ψ is continued from there by
     its slope.
 
-    Parameters
-    ----------
-    solution : of the rotor
-    points : (n, 3) m in the ball
-    beside : (n, 3) m, for each point a place farther from the face on the same side
+    `solution`: of the rotor; `points`: (n, 3) m in the ball; `beside`: (n, 3) m, for each point a place farther from
+    the face on the same side.
     """
     mesh, planes, axes = solution.mesh, solution.symmetry.planes, solution.symmetry.axes
     places, others = _in_mesh(solution, points), _in_mesh(solution, beside)

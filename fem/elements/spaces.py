@@ -88,12 +88,8 @@ def value_matrix(
 ) -> scipy.sparse.csr_matrix:
     """(3n, unknowns) values at points of a `basis` of three components, those of one point together.
 
-    Parameters
-    ----------
-    space : of the unknowns
-    points : NGSolve space with one unknown per point
-    region, rules : that they are of, and its integration rules
-    weights : (n,) of the points, times what the basis was multiplied by
+    `space`: of the unknowns; `points`: NGSolve space with one unknown per point; `region`, `rules`: that they are of,
+    and its integration rules; `weights`: (n,) of the points, times what the basis was multiplied by.
     """
     components = points**3
     # Not vectorised: NGSolve's vectorised integrals are wrong for elements of many points (order 4 on).
@@ -146,10 +142,7 @@ def region_edges(mesh: ngsolve.Mesh, region: ngsolve.Region) -> NDArray[np.bool_
 def tree_edges(edges: IntArray, shrunk: NDArray[np.bool_]) -> IntArray:
     """Numbers of the edges of a spanning tree of the graph in which all `shrunk` edges have length zero.
 
-    Parameters
-    ----------
-    edges : (n, 2) vertex numbers
-    shrunk : (n,) which edges join their ends to one vertex
+    `edges`: (n, 2) vertex numbers; `shrunk`: (n,) which edges join their ends to one vertex.
     """
     vertices = int(edges.max()) + 1
     joined = scipy.sparse.coo_matrix((np.ones(int(shrunk.sum())), edges[shrunk].T), shape=(vertices, vertices))

@@ -91,11 +91,8 @@ def _about(place: Array, scale: Array, half: float, count: int) -> tuple[Array, 
 def face_rows(places: Array, normals: Array, halves: Array, counts: tuple[int, int]) -> Array:
     """n·h (T) at places off the plane of a rectangle by the charges (T) at its n × m nodes: weights (t, n m).
 
-    Parameters
-    ----------
-    places, normals : (t, 3), along the rectangle's edges and its normal, from its middle
-    halves : (2,) half edges
-    counts : n and m, nodes along the edges
+    `places`, `normals`: (t, 3), along the rectangle's edges and its normal, from its middle; `halves`: (2,) half edges;
+    `counts`: n and m, nodes along the edges.
     """
     (first, second), result = counts, np.empty((len(places), *counts))
     step = max(1, ROWS // ((first + FINE) * (second + FINE) * second))
@@ -420,10 +417,7 @@ def smooth(magnets: Sequence[Magnet]) -> bool:
 class SurfaceCharges:
     """Charges on the surfaces of permeable magnets that respond to each other.
 
-    Parameters
-    ----------
-    magnets : each of them `bears_charges`
-    count : n, nodes along an edge of a face
+    `magnets`: each of them `bears_charges`; `count`: n, nodes along an edge of a face.
 
     Attributes
     ----------

@@ -178,11 +178,7 @@ def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = Fa
 
     `x_index` is none beside `x_mm`.
 
-    Parameters
-    ----------
-    titles : of all columns
-    reading : of the scene
-    vectors : whether a column can hold all components
+    `titles`: of all columns; `reading`: of the scene; `vectors`: whether a column can hold all components.
     """
     found: dict[int, Column] = {}
     for k, title in enumerate(titles):

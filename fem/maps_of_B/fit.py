@@ -110,12 +110,8 @@ def fit_harmonics(
     without one group differ gives the error (jackknife; B. Efron, The Jackknife, SIAM 1982, ch. 3), whatever the
     distribution of the noise; what the expectation alone decides is added to it.
 
-    Parameters
-    ----------
-    points : (n, 3) m
-    field : (n, 3) T, NaN where a component was not observed
-    errors : (n, 3) standard errors, T; only their ratios matter
-    generator : chooses the groups
+    `points`: (n, 3) m; `field`: (n, 3) T, NaN where a component was not observed; `errors`: (n, 3) standard errors, T;
+    only their ratios matter; `generator`: chooses the groups.
     """
     groups = generator.permutation(len(points)) % GROUPS
     parts = np.array([_normal_matrix(basis, points, field, errors, groups == k) for k in range(GROUPS)])

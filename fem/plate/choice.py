@@ -179,10 +179,8 @@ def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, rad
     The box about `center` and its image under the lowering are united; what is nearer to the plate than the floater's
     radius is cut off. Raises InputError: the centre is not farther than the radius from the plate's face, all the way.
 
-    Parameters
-    ----------
-    center, half_edges : (3,) m, box along the laboratory's axes, where the floater may be
-    radius : of the floater, m
+    `center`, `half_edges`: (3,) m, box along the laboratory's axes, where the floater may be; `radius`: of the floater,
+    m.
     """
     center = np.asarray(center, float)
     ends = plate.box.to_body(np.array([center, center - plate.way * DOWN]))

@@ -245,11 +245,8 @@ def class_basis(
 ) -> ClassBasis:
     """A basis in which no source's residual is larger than `allowed`, relative to what the source drives.
 
-    Parameters
-    ----------
-    sources : (m, width) without gradients, of about unit power each
-    solve : fields e and their potentials T e for rows, at the shift
-    angular_frequencies : at which residuals are looked at, rad/s
+    `sources`: (m, width) without gradients, of about unit power each; `solve`: fields e and their potentials T e for
+    rows, at the shift; `angular_frequencies`: at which residuals are looked at, rad/s.
     """
     energies, vectors = np.linalg.eigh(sources @ sources.T)
     kept = np.cumsum(np.maximum(energies, 0.0)) > MODE_SHARE * allowed

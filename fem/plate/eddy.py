@@ -48,10 +48,7 @@ class Source(Protocol):
 class EddySpace:
     """Space, quadrature and gauge on one mesh with one order.
 
-    Parameters
-    ----------
-    conductors : mesh and conductivities
-    order : polynomial order, at least 1
+    `conductors`: mesh and conductivities; `order`: polynomial order, at least 1.
 
     Attributes
     ----------
@@ -145,10 +142,8 @@ def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> I
 class ShiftedSystem:
     """Condensed matrix of curl curl + s μ0 σ, factorised once for each parity class.
 
-    Parameters
-    ----------
-    space : finite elements
-    shift : s, rad/s: iω at a frequency; a real one needs half the memory and a quarter of the work
+    `space`: finite elements; `shift`: s, rad/s: iω at a frequency; a real one needs half the memory and a quarter of
+    the work.
     """
 
     def __init__(self, space: EddySpace, shift: complex) -> None:
@@ -262,10 +257,8 @@ def current_density(
 ) -> ComplexArray:
     """J = -iωσ(A_s + A) (n, 3), A/m², at points (n, 3), m; zero in air. Raises ValueError: a point outside the mesh.
 
-    Parameters
-    ----------
-    applied : (n, 3) T m, potential A_s of the sources with their amplitudes at the same points
-    amplitudes : of the sources that `response` was solved for
+    `applied`: (n, 3) T m, potential A_s of the sources with their amplitudes at the same points; `amplitudes`: of the
+    sources that `response` was solved for.
     """
     points, space = np.asarray(points, float).reshape(-1, 3), response.space
     mirrors = list(space.parity.mirrors)
@@ -429,13 +422,9 @@ def plate_reaction(
     Raises ValueError: a position inside the plate, a size, a conductivity or a frequency out of range; AccuracyError:
     `rtol` not reached after all refinements of the mesh, or with `MOST_UNKNOWNS`.
 
-    Parameters
-    ----------
-    plate : its body may have any pose; it is solved in its own frame
-    positions : laboratory frame, outside the plate
-    rtol : estimated relative error asked of every own tensor
-    rule : first mesh
-    refinements : how often the mesh may be refined
+    `plate`: its body may have any pose; it is solved in its own frame; `positions`: laboratory frame, outside the
+    plate; `rtol`: estimated relative error asked of every own tensor; `rule`: first mesh; `refinements`: how often the
+    mesh may be refined.
     """
     places = np.asarray(positions, float).reshape(-1, 3)
     if frequency == 0:

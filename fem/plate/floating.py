@@ -181,10 +181,8 @@ class FloatingModes:
         states, sources), √J/A, x G' is the drag, and x by the difference of two sources' G the force along what parts
         them.
 
-        Parameters
-        ----------
-        way : (n,) m, places as of `heights`, at equal distances; there are no currents at the first
-        speed : m/s; the first source has 1 A
+        `way`: (n,) m, places as of `heights`, at equal distances; there are no currents at the first; `speed`: m/s; the
+        first source has 1 A.
         """
         fluxes = np.array([self.flux(place) for place in way])
         lasts = self.rates * (way[1] - way[0]) / speed
@@ -196,11 +194,8 @@ class FloatingModes:
     def mean_force(self, height: float, amplitudes: Array, frequencies: Array) -> float:
         """Force (N) upwards at rest, in the mean of a period.
 
-        Parameters
-        ----------
-        height : of the centre, m, within `heights`
-        amplitudes : (sources,) complex, of the currents' e^{iωt}, A
-        frequencies : (sources,) of the currents, Hz; sources of different ones do not act together in the mean
+        `height`: of the centre, m, within `heights`; `amplitudes`: (sources,) complex, of the currents' e^{iωt}, A;
+        `frequencies`: (sources,) of the currents, Hz; sources of different ones do not act together in the mean.
         """
         flux, slope = self.flux(height)
         total = 0.0
@@ -264,12 +259,8 @@ def modes_along(
 ) -> FloatingModes:
     """Modes of a conductor that moves along an axis beside any sources.
 
-    Parameters
-    ----------
-    mesh : of the conductor
-    sources : at each height (m) of the conductor, in its frame
-    heights, frequency, rtol, order : as of `floating_modes`
-    degree : of the series of G
+    `mesh`: of the conductor; `sources`: at each height (m) of the conductor, in its frame; `heights`, `frequency`,
+    `rtol`, `order`: as of `floating_modes`; `degree`: of the series of G.
     """
     start, (low, high) = time.perf_counter(), heights
     training = round(TRAINED * degree / DEGREE)
@@ -338,11 +329,7 @@ class FreeModes:
     def mean_force(self, place: Array, rotation: Array, amplitudes: Array, frequency: float) -> Array:
         """Force (3,) N at rest in the mean of a period, of currents e^{iωt} of one frequency (Hz).
 
-        Parameters
-        ----------
-        place, rotation : of the conductor
-        amplitudes : (sources,) complex, A
-        frequency : Hz
+        `place`, `rotation`: of the conductor; `amplitudes`: (sources,) complex, A; `frequency`: Hz.
         """
         _, slopes = self.fields(place + self.places @ rotation.T)
         rate = 2j * np.pi * frequency
@@ -452,10 +439,7 @@ def cached_floating_modes(
 ) -> tuple[FloatingModes | FreeModes, bool]:
     """`floating_modes` or `free_modes`, by what the region is, from the cache if they are there, and whether they were.
 
-    Parameters
-    ----------
-    body, conductivity, coils, shares, region, frequency, rtol : as of these
-    report : gets messages
+    `body`, `conductivity`, `coils`, `shares`, `region`, `frequency`, `rtol`: as of these; `report`: gets messages.
     """
     windings = [(coil.center, coil.radius, coil.width, coil.height, coil.turns) for coil in coils]
     inputs = (body.shape_numbers, conductivity, windings, [list(map(float, share)) for share in shares], region,

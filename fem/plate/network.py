@@ -185,11 +185,9 @@ def from_elements(
 
     Raises AccuracyError: (the reduction) all of the solution's states do not suffice.
 
-    Parameters
-    ----------
-    rtol : relative accuracy of reaction tensors (Frobenius norm) and of the fields of `others`
-    others : more sources whose currents the networks shall hold: the rotor's
-    space_error : what the solution's states miss of these, relative
+    `rtol`: relative accuracy of reaction tensors (Frobenius norm) and of the fields of `others`; `others`: more sources
+    whose currents the networks shall hold: the rotor's; `space_error`: what the solution's states miss of these,
+    relative.
     """
     space, (low, high) = solution.space, frequencies
     # Classes of the plate's mirrors that do not mirror the region are mixed by every source: they share their states.

@@ -160,11 +160,8 @@ def rotor_share(
 
     Raises AccuracyError: the tolerance is not met with the most terms.
 
-    Parameters
-    ----------
-    network : of a plate of the same size and conductivity, or of what stands for it
-    tolerance : for the estimated error; harmonics and depths are added until it is met
-    watch : progress callback
+    `network`: of a plate of the same size and conductivity, or of what stands for it; `tolerance`: for the estimated
+    error; harmonics and depths are added until it is met; `watch`: progress callback.
     """
     parts, distance = rotor_parts(rotor, plate, UNNOTICED * tolerance), plate.way
     cached: dict[tuple[float, float], Array] = {}

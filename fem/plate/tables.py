@@ -146,12 +146,8 @@ def changed_shares(
 
     Raises ComputationError: the network comes out otherwise than when the table was made.
 
-    Parameters
-    ----------
-    known : the table and the share, of whose network and harmonics they are
-    requested : what these were made of, see `plate_and_rotor_table`
-    others : the plate in another pose, and another rotor
-    slab, solve, watch : as there
+    `known`: the table and the share, of whose network and harmonics they are; `requested`: what these were made of, see
+    `plate_and_rotor_table`; `others`: the plate in another pose, and another rotor; `slab`, `solve`, `watch`: as there.
     """
     (table, share), (plate, rotor, region, frequencies, rtol) = known, requested
     reduced = _reduction(plate, rotor, region, frequencies, rtol, None, solve, slab, watch)

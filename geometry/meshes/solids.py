@@ -196,10 +196,7 @@ def solid_of(body: Solid) -> Any:
 def segment(inner_radius: float, radius: float, height: float, start: float, end: float) -> Any:
     """Part of a ring about z, its middle at the origin.
 
-    Parameters
-    ----------
-    inner_radius, radius, height : of the ring, m
-    start, end : angles about z, degrees
+    `inner_radius`, `radius`, `height`: of the ring, m; `start`, `end`: angles about z, degrees.
     """
     inner, outer, high = (length / MILLIMETRE for length in (inner_radius, radius, height))
     section = occ.WorkPlane(occ.Axes((inner, 0.0, -high / 2), n=occ.gp_Dir(0, -1, 0), h=occ.X))
@@ -210,11 +207,7 @@ def segment(inner_radius: float, radius: float, height: float, start: float, end
 def shifted(solid: Any, shift: Array, rotation: Array) -> Any:
     """A solid that is turned about the origin, then moved.
 
-    Parameters
-    ----------
-    solid : of OpenCASCADE
-    shift : (3,) m
-    rotation : (3, 3)
+    `solid`: of OpenCASCADE; `shift`: (3,) m; `rotation`: (3, 3).
     """
     return _turned(solid, rotation).Move(_vector(shift / MILLIMETRE))
 

@@ -162,12 +162,8 @@ def driven(scene: Scene, steps: Sequence[Mapping[str, Any]], source: str = "driv
 
     Raises SceneError: as of `changed`.
 
-    Parameters
-    ----------
-    scene : it stays as it is
-    steps : tables of `[[drive]]`, with the keys of the scene file
-    source : what messages call it
-    keys : others of the whole file, which take the place of the scene's
+    `scene`: it stays as it is; `steps`: tables of `[[drive]]`, with the keys of the scene file; `source`: what messages
+    call it; `keys`: others of the whole file, which take the place of the scene's.
     """
     found = assemble(scene_keys(scene) | {"drive": _plain(steps)} | keys, source, Path())
     _check_same(scene, found.files, source)

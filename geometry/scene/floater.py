@@ -64,10 +64,8 @@ class Floater:
     ) -> Self:
         """A floater of pieces whose centre of mass may be anywhere.
 
-        Parameters
-        ----------
-        pieces : in the scene file's frame
-        moments_of_inertia : kg m² about the file's axes through the centre of mass, in place of those of the pieces
+        `pieces`: in the scene file's frame; `moments_of_inertia`: kg m² about the file's axes through the centre of
+        mass, in place of those of the pieces.
         """
         masses = np.array([piece.mass for piece in pieces])
         center = masses @ [centroid(piece.magnet.body) for piece in pieces] / masses.sum()
