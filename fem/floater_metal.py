@@ -93,7 +93,11 @@ def current_shape(floater: Floater) -> CurrentShape:
 
 
 def _computed(pieces: Pieces, floater: Floater) -> CurrentShape:
-    hard = any(isinstance(body, Part) or _thickness(body) < THINNEST for body, _ in pieces)
+    def thickness(body: Solid) -> float:  # over the largest size; of a ring its wall counts
+        wall = [body.radius - body.inner_radius] if isinstance(body, Cylinder) else []
+        return float(min([*body.size, *wall]) / max(body.size))
+
+    hard = any(isinstance(body, Part) or thickness(body) < THINNEST for body, _ in pieces)
     try:  # the mesher may crash, or come to no end
         matrices = call_apart(LONGEST, loss_and_delay, pieces) if hard else loss_and_delay(pieces)
     except LostError as error:
@@ -102,12 +106,6 @@ def _computed(pieces: Pieces, floater: Floater) -> CurrentShape:
             f"The floater's currents are not known: the mesher {error} ({names}). Leave out floater.conductivity_S_m."
         ) from None
     return _described(matrices, floater.radius, floater.round)
-
-
-def _thickness(body: Solid) -> float:
-    """The least size of a body over its largest; of a ring its wall counts."""
-    wall = [body.radius - body.inner_radius] if isinstance(body, Cylinder) else []
-    return float(min([*body.size, *wall]) / max(body.size))
 
 
 def loss_and_delay(pieces: Pieces) -> tuple[Array, Array, Array, Array]:

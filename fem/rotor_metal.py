@@ -77,16 +77,14 @@ class Metal:
         fields, test, found = sources(self.places), self.space.TestFunction(), []
         for k in range(fields.shape[2]):
             form = ng.LinearForm(self.space)
-            along = ng.CF(tuple(self.points.function(fields[:, axis, k]) for axis in range(3)))
-            form += along * ng.grad(test) * self.points.measure
+            form += self.points.vector(fields[:, :, k]) * ng.grad(test) * self.points.measure
             form.Assemble()
             found.append(form.vec.FV().NumPy().copy())
         return np.array(found)
 
     def solutions(self, loads: Array) -> Array:
         """Potentials (k, unknowns) to loads (k, unknowns), of the sign of A."""
-        right, result = ng.GridFunction(self.space), np.empty_like(loads)
-        left = ng.GridFunction(self.space)
+        right, left, result = ng.GridFunction(self.space), ng.GridFunction(self.space), np.empty_like(loads)
         for row, load in zip(result, loads, strict=True):
             right.vec.FV().NumPy()[:] = load
             left.vec.data = self.inverse * right.vec
@@ -98,8 +96,7 @@ class Metal:
         function, found = ng.GridFunction(self.space), []
         for potential in potentials:
             function.vec.FV().NumPy()[:] = potential
-            slope = ng.grad(function)
-            found.append(self.points.sample(*(slope[axis] for axis in range(3))))
+            found.append(self.points.sample(*(ng.grad(function)[axis] for axis in range(3))))
         return np.moveaxis(np.array(found), 0, 2)
 
 
@@ -175,10 +172,8 @@ class CurrentPatterns:
         found = []
         for start in watched(range(0, len(positions), TOGETHER), watch, "their fields"):
             sources = of_places(positions[start : start + TOGETHER])
-            parts = [
-                flat(pattern).T @ flat(sources(metal.places))
-                for metal, pattern in zip(self.metals, self.patterns, strict=True)
-            ]
+            pairs = zip(self.metals, self.patterns, strict=True)
+            parts = [flat(pattern).T @ flat(sources(metal.places)) for metal, pattern in pairs]
             found.append(np.sum(parts, axis=0).reshape(self.count, -1, 3))
         return np.concatenate(found, axis=1)
 
@@ -203,16 +198,14 @@ def current_patterns(
     missing = 1 - np.cumsum(shares, axis=1).min(axis=0)
     count = int(np.argmax(missing <= left_out)) + 1 if np.any(missing <= left_out) else len(energy)
     mix = scale[:, None] * vectors[:, :count] / np.sqrt(energy[:count])
-    patterns = [_pattern(metal, load, positions, mix) for metal, load in zip(metals, loads, strict=True)]
+    patterns = list[Array]()
+    for metal, load in zip(metals, loads, strict=True):
+        fields = -metal.gradients(metal.solutions(mix.T @ load))
+        for start in blocks:
+            part = of_places(positions[start : start + TOGETHER])(metal.places)
+            fields += part @ mix[3 * start : 3 * (start + TOGETHER)]
+        patterns.append(metal.weights[:, None, None] * fields)
     return CurrentPatterns(tuple(metals), tuple(patterns))
-
-
-def _pattern(metal: Metal, loads: Array, positions: Array, mix: Array) -> Array:
-    fields = -metal.gradients(metal.solutions(mix.T @ loads))
-    for start in range(0, len(positions), TOGETHER):
-        part = of_places(positions[start : start + TOGETHER])(metal.places)
-        fields += part @ mix[3 * start : 3 * (start + TOGETHER)]
-    return np.asarray(metal.weights[:, None, None] * fields)
 
 
 BALL_DEGREE = 3
@@ -246,12 +239,6 @@ class RotorLosses:
     errors: Array  # (d,) largest relative error of D at these distances
     provenance: Mapping[str, str | float] = field(default_factory=dict)  # how the table was made; texts and numbers
 
-    def rate_matrix(self, positions: ArrayLike, moments: ArrayLike) -> Array:
-        """C (n, K, 6) √W s, for dipoles (n, 3) A m² at (n, 3) m: by velocity in m/s, then by turn in rad/s."""
-        moments = np.asarray(moments, float)
-        fields, slopes = self.fields(positions)
-        return np.concatenate([np.einsum("ni,nkia->nka", moments, slopes), np.cross(moments[:, None], fields)], axis=2)
-
     def fields(self, positions: ArrayLike) -> tuple[Array, Array]:
         """c_k (n, K, 3) and ∂c_ki/∂x_j (n, K, 3, 3) at positions (n, 3) m."""
         fields, slopes = self.multipoles.evaluate(np.asarray(positions, float))
@@ -259,7 +246,9 @@ class RotorLosses:
 
     def dissipation(self, positions: ArrayLike, moments: ArrayLike) -> Array:
         """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m: N s/m, N s and N m s."""
-        rates = self.rate_matrix(positions, moments)
+        moments, (fields, slopes) = np.asarray(moments, float), self.fields(positions)
+        # C (n, K, 6) √W s: by velocity in m/s, then by turn in rad/s
+        rates = np.concatenate([np.einsum("ni,nkia->nka", moments, slopes), np.cross(moments[:, None], fields)], axis=2)
         return np.asarray(np.einsum("nka,nkb->nab", rates, rates))
 
     def products(self, places: Array) -> Array:
@@ -313,20 +302,15 @@ def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = B
     for bodies, conductivity in pieces:
         for body in bodies:
             radius = CUBE * body.volume ** (1 / 3)
-            parts = real_kinds(1, degree)
-            centers += [body.center] * len(parts)
-            kinds += parts
-            weights += [_weight(l, m, radius, conductivity) for l, m, _ in parts]
+            for l, m, part in real_kinds(1, degree):
+                centers.append(body.center)
+                kinds.append((l, m, part))
+                # strength of the field of one harmonic Θ_lm with lengths in metres, √W s/(A m²)
+                loss = conductivity * l / ((l + 1) * (2 * l + 3)) * radius ** (2 * l + 3)
+                harmonic = norm(l, m) / factorials(l)[l, m] / (1.0 if m == 0 else 2.0)  # both signs of m stand in one
+                weights.append(np.sqrt(loss) * MU_0 / (2 * l + 1) * harmonic)
     multipoles = Multipoles(np.array(centers), np.array(kinds, float), 1.0)
     return RotorLosses(multipoles, np.diag(weights), np.zeros(1), np.full(1, 0.5))
-
-
-def _weight(l: int, m: int, radius: float, conductivity: float) -> float:
-    """Strength of the field of one harmonic Θ_lm with lengths in metres, √W s/(A m²)."""
-    loss = conductivity * l / ((l + 1) * (2 * l + 3)) * radius ** (2 * l + 3)
-    harmonic = norm(l, m) / factorials(l)[l, m]
-    both_signs = 1.0 if m == 0 else 2.0  # of m stand in one multipole
-    return float(np.sqrt(loss) * MU_0 / (2 * l + 1) * harmonic / both_signs)
 
 
 def pieces_of(rotor: Sequence[Magnet], conductors: Sequence[Conductor]) -> Pieces:

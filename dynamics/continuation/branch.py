@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy
@@ -121,6 +122,13 @@ class Family(BalanceCurve):
             time_unit=float(balance.values[Parameter.TIME]),
         )
 
+    def after(self, unknowns: Array, tangent: Array, step: float) -> BranchPoint:
+        """The equilibrium a `step` along the branch from `unknowns` (7,) on a `tangent`. Raises EquilibriumError."""
+        points, tangents, good = stepped(self, unknowns[None], tangent[None], np.array([step]))
+        if not good[0]:
+            raise EquilibriumError(f"Lost the branch at {unknowns[6] * self.unit:.6g}: give it shorter steps.")
+        return self.at(points[0], tangents[0], float(points[0, 6]) * self.unit)
+
     def point(self, position: Array, moment: Array, parameter: float) -> BranchPoint:
         """Equilibrium at a scaled `position` and `moment` (3,), its tangent towards growing values of `parameter`."""
         unknowns = np.concatenate([position, moment, [parameter / self.unit]])
@@ -188,11 +196,7 @@ def _marked(
 ) -> list[BranchPoint]:
     """Folds and changes of stability, in order, on a step from unknowns (7,) of the point before to a point after."""
 
-    def at(step: float) -> BranchPoint:
-        points, tangents, good = stepped(family, unknowns[None], before.tangent[None], np.array([step]))
-        if not good[0]:
-            raise EquilibriumError(f"Lost the branch at {before.parameter:.6g}: give it shorter steps.")
-        return family.at(points[0], tangents[0], float(points[0, 6]) * family.unit)
+    at = partial(family.after, unknowns, before.tangent)
 
     def located(measure: Callable[[BranchPoint], float], kind: str) -> tuple[float, BranchPoint]:
         """Length along the step at which a measure changes its sign, and the point there."""

@@ -19,7 +19,7 @@ from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ..equilibria.equilibrium import FOLD, MARGINAL, Equilibrium, EquilibriumError
-from ..equilibria.path import Steps, stepped
+from ..equilibria.path import Steps
 from ..equilibria.search import find_equilibria
 from ..motion.effects import mean_over_turns, with_effects
 from ..motion.equations import parameters
@@ -285,16 +285,10 @@ def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0
     if end.kind == BORDER:
         there = family.solution(pose, end.parameter)
         return None if there is None else replace(family.at(there, end.tangent, end.parameter), kind=BORDER)
-    begun, along = np.append(pose, expected / family.unit)[None], end.tangent[None]
-
-    def at(way: float) -> BranchPoint:
-        points, tangents, good = stepped(family, begun - TRACKED * along, along, np.array([way + TRACKED]))
-        if not good[0]:
-            raise EquilibriumError(f"No equilibrium was found near the one at {end.parameter:.6g} Hz.")
-        return family.at(points[0], tangents[0], float(points[0, 6]) * family.unit)
+    begun = np.append(pose, expected / family.unit) - TRACKED * end.tangent
 
     def measure(way: float) -> float:
-        point = at(way)
+        point = family.after(begun, end.tangent, way + TRACKED)
         if end.kind == FOLD:
             return float(point.tangent[6])
         if end.kind == CONTACT:
@@ -311,7 +305,7 @@ def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0
         if not low * high <= 0:
             return None
         root = float(scipy.optimize.brentq(measure, 0.0, way, xtol=1e-10)) if low else 0.0
-        return replace(at(root), kind=end.kind)
+        return replace(family.after(begun, end.tangent, root + TRACKED), kind=end.kind)
     except EquilibriumError:
         return None
 
@@ -336,15 +330,12 @@ def _side(
             return points[: k + 1]
         if k and rotor_gap(scene, point.position, point.state[6:9]) < 0:
             before = points[k - 1]
-
-            def there(f: float, before: BranchPoint = before) -> BranchPoint:
-                return follow_branch(family, before.state, before.parameter, f, STEPS, tolerated=MARGINAL)[-1]
-
+            walk = partial(follow_branch, family, before.state, before.parameter, steps=STEPS, tolerated=MARGINAL)
             ends = before.parameter + 1e-9 * (point.parameter - before.parameter), point.parameter
             touching = scipy.optimize.brentq(
-                lambda f: rotor_gap(scene, (p := there(f)).position, p.state[6:9]), *ends, xtol=1e-6
+                lambda f, walk=walk: rotor_gap(scene, (p := walk(f)[-1]).position, p.state[6:9]), *ends, xtol=1e-6
             )
-            return [*points[:k], replace(there(float(touching)), kind=CONTACT)]
+            return [*points[:k], replace(walk(float(touching))[-1], kind=CONTACT)]
     return [*points[:-1], replace(points[-1], kind=points[-1].kind or BORDER)]
 
 

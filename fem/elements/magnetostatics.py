@@ -132,8 +132,7 @@ def solve(
     load = ng.LinearForm(space)
     for name in mesh.mesh.GetMaterials():
         if name != "air":
-            k = int(name.removeprefix("magnet"))
-            test = space.TestFunction()
+            k, test = int(name.removeprefix("magnet")), space.TestFunction()
             if formulation == "direct":
                 load += ng.CF(tuple(map(float, sources[k].polarization_in_rotor))) * ng.grad(test) * ng.dx(name)
                 continue
@@ -143,8 +142,7 @@ def solve(
                 points = volume_points(mesh.mesh, name, 2 * system.order + 2)
                 places = mesh.magnets[k].body.within(mesh.to_meter(points.points))
                 source = remanent_field(sources, places) @ susceptibility + own
-                for axis in range(3):
-                    load += points.function(source[:, axis]) * ng.grad(test)[axis] * points.measure
+                load += points.vector(source) * ng.grad(test) * points.measure
     load.Assemble()
     free = space.FreeDofs(True)
     for plane, sign in zip(mesh.planes, signs, strict=True):

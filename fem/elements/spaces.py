@@ -5,7 +5,6 @@ A mirror R = diag(±1) takes a polar vector field A to R A(R x).  With the plane
 component on its plane: a Dirichlet condition for A there.  An even class has the natural condition.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -78,33 +77,26 @@ class IntegrationPoints:
         result.vec.FV().NumPy()[:] = values
         return result
 
+    def vector(self, values: Array) -> Any:
+        """As `function`, of three components (n, 3)."""
+        return ng.CF(tuple(map(self.function, values.T)))
+
     def value_matrix(self, space: Any, basis: Any) -> scipy.sparse.csr_matrix:
         """(3n, unknowns) values here of a space's `basis` of three components, those of one point together."""
-        return value_matrix(space, basis, self.space, self.region, self.space.GetIntegrationRules(), self.weights)
-
-
-def value_matrix(
-    space: Any, basis: Any, points: Any, region: Any, rules: Mapping[Any, Any], weights: Array
-) -> scipy.sparse.csr_matrix:
-    """(3n, unknowns) values at points of a `basis` of three components, those of one point together.
-
-    `space`: of the unknowns; `points`: NGSolve space with one unknown per point; `region`, `rules`: that they are of,
-    and its integration rules; `weights`: (n,) of the points, times what the basis was multiplied by.
-    """
-    components = points**3
-    # Not vectorised: NGSolve's vectorised integrals are wrong for elements of many points (order 4 on).
-    integral = ng.SymbolicBFI(basis * ng.CF(tuple(components.TestFunction())), definedon=region, simd_evaluate=False)
-    for element, rule in rules.items():
-        integral.SetIntegrationRule(element, rule)
-    form = ng.BilinearForm(trialspace=space, testspace=components)
-    form += integral
-    form.Assemble()
-    # integrals with one point each: the weight taken off, they are the basis's values there
-    rows, columns, values = (np.asarray(part) for part in form.mat.COO())
-    component, point = np.divmod(rows, len(weights))
-    return scipy.sparse.csr_matrix(
-        (values / weights[point], (3 * point + component, columns)), shape=(form.mat.height, form.mat.width)
-    )
+        components = self.space**3
+        tested = basis * ng.CF(tuple(components.TestFunction()))
+        # Not vectorised: NGSolve's vectorised integrals are wrong for elements of many points (order 4 on).
+        integral = ng.SymbolicBFI(tested, definedon=self.region, simd_evaluate=False)
+        for element, rule in self.space.GetIntegrationRules().items():
+            integral.SetIntegrationRule(element, rule)
+        form = ng.BilinearForm(trialspace=space, testspace=components)
+        form += integral
+        form.Assemble()
+        # integrals with one point each: the weight taken off, they are the basis's values there
+        rows, columns, values = (np.asarray(part) for part in form.mat.COO())
+        component, point = np.divmod(rows, len(self.weights))
+        places = 3 * point + component, columns
+        return scipy.sparse.csr_matrix((values / self.weights[point], places), (form.mat.height, form.mat.width))
 
 
 def volume_points(mesh: Any, material: str, order: int) -> IntegrationPoints:

@@ -147,9 +147,9 @@ class FieldRows:
     def __init__(self, space: EddySpace) -> None:
         self.space = space
         weights = scipy.sparse.diags(space.root)
-        self.values = weights @ space.value_matrix(space.real, space.real.TrialFunction())
+        self.values = weights @ space.quadrature.value_matrix(space.real, space.real.TrialFunction())
         self._scalars = ngsolve.H1(space.conductors.mesh, order=space.order + 1, definedon=space.region)
-        slopes = space.value_matrix(self._scalars, ngsolve.grad(self._scalars.TrialFunction()))
+        slopes = space.quadrature.value_matrix(self._scalars, ngsolve.grad(self._scalars.TrialFunction()))
         self._gradients = (weights @ slopes).tocsc()
         self._products = (self._gradients.T @ self._gradients).tocsc()
 

@@ -17,7 +17,6 @@ from typing import Any, Protocol
 
 import ngsolve
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ...geometry.common import MU_0, Array, Watch, unwatched
@@ -27,7 +26,7 @@ from ...geometry.shapes import Box
 from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import HomogeneousField, unit_dipoles
 from ..elements.condensed import require_memory, solve_condensed
-from ..elements.spaces import Parity, region_edges, tree_edges, value_matrix
+from ..elements.spaces import Parity, region_edges, tree_edges, volume_points
 from ..rotor.models import AccuracyError
 from .table import OPTION
 
@@ -63,21 +62,15 @@ class EddySpace:
         self.conductors, self.order = conductors, order
         self.parity = Parity(conductors.mirrors)
         mesh = conductors.mesh
-        self.region = mesh.Materials(conductors.pattern)
         self.sigma = mesh.MaterialCF(dict(conductors.conductivity), default=0.0)
         self.real = self.elements(complex_valued=False)
         # Exact for twice its order; of tetrahedra the rules of order 8 and less have few points.
         bricks = mesh[ngsolve.ElementId(ngsolve.VOL, 0)].type == ngsolve.ET.HEX
-        self._rule_order = order + 2 if bricks else min(order + 1, max(order, 4))
-        scalar = ngsolve.comp.IntegrationRuleSpace(mesh, order=self._rule_order, definedon=self.region)
-        self._rules = scalar.GetIntegrationRules()
-        self._carrier = ngsolve.GridFunction(scalar**3)
-        self._carrier.Interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z)), definedon=self.region)
-        self.points = np.stack([c.vec.FV().NumPy() for c in self._carrier.components], axis=1) * MILLIMETRE
-        weight = ngsolve.LinearForm(scalar)
-        weight += self.sigma * scalar.TestFunction() * ngsolve.dx(definedon=self.region, intrules=self._rules)
-        weight.Assemble()
-        self.weights = np.array(weight.vec.FV().NumPy()) * MILLIMETRE**3
+        rule_order = order + 2 if bricks else min(order + 1, max(order, 4))
+        self.quadrature = volume_points(mesh, conductors.pattern, rule_order)
+        self.region = self.quadrature.region
+        self.points = self.quadrature.points * MILLIMETRE
+        self.weights = self.quadrature.sample(self.sigma)[:, 0] * self.quadrature.weights * MILLIMETRE**3
         self.root = np.repeat(np.sqrt(self.weights * conductors.images), 3)
         self._edges = np.array([[v.nr for v in edge.vertices] for edge in mesh.edges], dtype=np.int64)
         self._conducting = region_edges(mesh, self.region)
@@ -101,22 +94,13 @@ class EddySpace:
 
     def loads(self, potentials: Array) -> Array:
         """∫ σ A·v dV (sources, unknowns), S m³ T, of potentials (sources, n, 3) at the quadrature points, T m."""
-        test = self.real.TestFunction()
-        form = ngsolve.LinearForm(self.real)
-        form += self.sigma * self._carrier * test * ngsolve.dx(definedon=self.region, intrules=self._rules)
         found = np.zeros((len(potentials), self.real.ndof))
         for row, potential in zip(found, potentials, strict=True):
-            for component, values in zip(self._carrier.components, potential.T, strict=True):
-                component.vec.FV().NumPy()[:] = values
+            form = ngsolve.LinearForm(self.real)
+            form += self.sigma * self.quadrature.vector(potential) * self.real.TestFunction() * self.quadrature.measure
             form.Assemble()
             row[:] = form.vec.FV().NumPy() * MILLIMETRE**3
         return found
-
-    def value_matrix(self, space: ngsolve.FESpace, basis: ngsolve.CoefficientFunction) -> scipy.sparse.csr_matrix:
-        """(3n, unknowns) values of a space's `basis` at the quadrature points, the components of one point together."""
-        points = ngsolve.comp.IntegrationRuleSpace(self.conductors.mesh, order=self._rule_order, definedon=self.region)
-        weights = self.weights / MILLIMETRE**3
-        return value_matrix(space, self.sigma * basis, points, self.region, self._rules, weights)
 
     def free_unknowns(self, parity_class: Sequence[int], space: ngsolve.FESpace) -> ngsolve.BitArray:
         """Coupling unknowns of one parity class: without odd planes, the far boundary and a spanning tree in air."""

@@ -137,5 +137,5 @@ def test_values_of_a_function_from_its_coefficients_are_those_of_the_function(or
     function = ngsolve.GridFunction(space.real)
     function.vec.FV().NumPy()[:] = np.random.default_rng(0).normal(size=space.real.ndof)
     expected = function(space.conductors.mesh(*(space.points * 1e3).T))
-    found = space.value_matrix(space.real, space.real.TrialFunction()) @ function.vec.FV().NumPy()
+    found = space.quadrature.value_matrix(space.real, space.real.TrialFunction()) @ function.vec.FV().NumPy()
     np.testing.assert_allclose(found.reshape(-1, 3), expected, atol=1e-12 * np.abs(expected).max())
