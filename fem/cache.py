@@ -4,7 +4,7 @@ A key holds all inputs exactly, the number of the solver that turns them into a 
 that compute. The numbers stand here, so that `make lint` can hold each against the code of its solver.
 
 Tables are frozen dataclasses, kept as netCDF. Numbers become variables, one for each field of a class, with the unit
-that the field's metadata names and the sentence that the class's documentation has for it; all objects of a class share
+that the field's metadata names and the sentence that stands beside it; all objects of a class share
 them. Which object holds which numbers is said by one text in JSON, the variable `content`. Only classes that the
 fields' types name are made of it: no file can run anything.
 """
@@ -295,17 +295,6 @@ def temporary_home() -> Path:
     return home
 
 
-def own_folder(name: str) -> Path:
-    """A folder of the cache for this user alone, made if it is missing. Raises OSError.
-
-    In a cache that several users share each has one: what is in it can be trusted as far as `others_may_write` says.
-    """
-    # Not as the user's mask would have it, which often lets a group write.
-    (root := cache_folder()).mkdir(mode=0o755, parents=True, exist_ok=True)
-    (folder := root / f"{name}-{user()}").mkdir(mode=0o700, exist_ok=True)
-    return folder
-
-
 def others_may_write(folder: Path) -> str | None:
     """Who but this user and root can put files into a folder of the cache, or another in its place, and the way out.
 
@@ -337,10 +326,7 @@ def cache_limit() -> int:
 
 
 def make_room(folder: Path, limit: int) -> None:
-    """Remove what was not used for the longest time until the files of a folder together keep the limit, bytes.
-
-    The newest stays, and what a process has locked.
-    """
+    """Remove what was not used for the longest time and is not locked, until a folder keeps the limit, bytes."""
     kept = []
     for path in folder.iterdir():
         with suppress(FileNotFoundError):  # another process makes room too
@@ -424,10 +410,7 @@ class CodecError(InputError):
 
 
 def to_dataset(value: Any) -> xr.Dataset:
-    """A dataclass, or a tuple or number, with all that is in it: dataclasses, tuples, mappings, arrays, texts, numbers.
-
-    Raises TypeError: something else is in it.
-    """
+    """Dataclasses, tuples, mappings, arrays, texts and numbers in each other. Raises TypeError: another in them."""
     pools: dict[str, list[np.ndarray]] = {}
     labels: dict[str, dict[str, str]] = {}
 
@@ -457,16 +440,18 @@ def to_dataset(value: Any) -> xr.Dataset:
         raise TypeError(f"Input value must be of what tables are made of; instead {name} is {type(value).__name__}.")
 
     content = json.dumps(packed(value, "value", {}))
-    variables = {name: _variable(name, arrays, labels[name]) for name, arrays in pools.items()}
+    variables = {}
+    for name, arrays in pools.items():  # along a further axis where they have one shape, else one after the other
+        alike = len({array.shape for array in arrays}) == 1
+        whole = np.stack(arrays) if alike else np.concatenate([array.ravel() for array in arrays])
+        axes = [f"{axis}_of_{size}" for axis, size in zip("abcdefg", whole.shape, strict=False)]
+        variables[name] = xr.Variable(axes, whole, labels[name])
     about = {"units": "1", "long_name": "which object holds which numbers, JSON"}
     return xr.Dataset(variables | {CONTENT: xr.Variable((), content, about)})
 
 
 def from_dataset(dataset: xr.Dataset, form: type[Table]) -> Table:
-    """The object of a type, or of `tuple[...]`, that `to_dataset` made a data set of.
-
-    Raises CodecError: the data set holds something else.
-    """
+    """The object of a type, or of `tuple[...]`, that `to_dataset` made a data set of. Raises CodecError."""
     classes, left = _classes(form, {}), dict[str, np.ndarray]()
 
     def taken(name: str, shape: list[int]) -> np.ndarray:
@@ -497,13 +482,6 @@ def from_dataset(dataset: xr.Dataset, form: type[Table]) -> Table:
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         name = getattr(form, "__name__", form)
         raise CodecError(f"Input dataset must hold a {name}; instead {type(error).__name__}: {error}.") from error
-
-
-def _variable(name: str, arrays: list[np.ndarray], label: dict[str, str]) -> xr.Variable:
-    """All arrays of a name: along a further axis where they have one shape, else one after the other."""
-    alike = len({array.shape for array in arrays}) == 1
-    whole = np.stack(arrays) if alike else np.concatenate([array.ravel() for array in arrays])
-    return xr.Variable([f"{axis}_of_{size}" for axis, size in zip("abcdefg", whole.shape, strict=False)], whole, label)
 
 
 def _classes(form: Any, found: dict[str, type]) -> dict[str, type]:

@@ -20,8 +20,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from ..geometry.files import seal, unsealed, write_whole
-from .cache import cache_folder, cache_limit, key_of, make_room, others_may_write, own_folder
+from ..geometry.files import seal, unsealed, user, write_whole
+from .cache import cache_folder, cache_limit, key_of, make_room, others_may_write
 
 LIMIT = 2**29  # Size of all that is kept, bytes; what was not used for the longest time makes room
 # Memory of functions that this process keeps at hand, bytes; those in use are not lost by it, and integrators, which
@@ -113,9 +113,11 @@ def _alone() -> Iterator[None]:
 
 
 def _folder() -> Path | None:
-    """The user's folder for code, if no other user can write there; else that is said, once."""
+    """This user's folder for code, if no other user can write there; else that is said, once."""
     try:
-        folder = own_folder("code")
+        # Not as the user's mask would have it, which often lets a group write.
+        (root := cache_folder()).mkdir(mode=0o755, parents=True, exist_ok=True)
+        (folder := root / f"code-{user()}").mkdir(mode=0o700, exist_ok=True)
         reason = others_may_write(folder)
     except OSError as error:  # costs time only
         LOG.debug("Compiled code could not be kept: %s", error)

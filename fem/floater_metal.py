@@ -81,10 +81,7 @@ def conducting(floater: Floater) -> list[tuple[Solid, float]]:
 
 
 def current_shape(floater: Floater) -> CurrentShape:
-    """The currents of a floater that is no sphere, from the cache if they are there; a damaged one is logged.
-
-    Raises MeshError, ComputationError: a part cannot be meshed.
-    """
+    """The currents of a floater that is no sphere, cached. Raises MeshError, ComputationError: no mesh of a part."""
     pieces = conducting(floater)
     inputs = pieces, floater.radius, floater.round
     if (key := SHAPES.key(*inputs)) not in _known:

@@ -106,10 +106,7 @@ def flat(values: Array) -> Array:
 
 
 def metal_of(bodies: Sequence[Solid] | SolidMesh, conductivity: float, order: int) -> Metal:
-    """Mesh and factorise metal (`conductivity`, S/m) of `bodies` that touch, with elements of degree `order`.
-
-    Raises TooLargeError: the memory does not hold the system.
-    """
+    """Mesh and factorise metal (S/m) of `bodies` that touch, elements of degree `order`. Raises TooLargeError."""
     mesh = bodies if isinstance(bodies, SolidMesh) else mesh_metal(bodies)
     space = ng.H1(mesh.mesh, order=order)
     free = space.FreeDofs()
@@ -181,10 +178,7 @@ class CurrentPatterns:
 def current_patterns(
     metals: Sequence[Metal], positions: Array, left_out: float, watch: Watch = unwatched
 ) -> CurrentPatterns:
-    """Patterns that dipoles at `positions` (n, 3) m drive in `metals`, but for a part `left_out` of any loss.
-
-    `watch` is a progress callback.
-    """
+    """Patterns that dipoles at `positions` (n, 3) m drive in `metals`, but for a part `left_out` of any loss."""
     grams, loads, blocks = [], [], range(0, len(positions), TOGETHER)
     for metal in metals:
         parts = [metal.loads(of_places(positions[k : k + TOGETHER])) for k in watched(blocks, watch, "patterns")]
@@ -274,14 +268,12 @@ class MovedLosses:
     size: float
 
     def fields(self, places: Array) -> tuple[Array, Array]:
-        """See `RotorLosses`."""
         turn = self.after.body.rotation @ self.before.body.rotation.T
         there = self.before.body.center + (places - self.after.body.center) @ turn / self.size
         fields, slopes = self.table.fields(there)
         return fields @ turn.T / self.size**0.5, turn @ slopes @ turn.T / self.size**1.5
 
     def products(self, places: Array) -> Array:
-        """See `RotorLosses`."""
         return _products(*self.fields(places))
 
 

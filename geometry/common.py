@@ -29,13 +29,6 @@ def freeze(owner: object, **shapes: tuple[int, ...]) -> None:
         object.__setattr__(owner, name, frozen_array(getattr(owner, name), shape))
 
 
-def spread_points(lower: ArrayLike, upper: ArrayLike, number: int) -> Array:
-    """Points (`number`, 3) evenly between `lower` and `upper` ends: multiples of irrational numbers (H. Weyl, 1916)."""
-    parts = np.arange(1, number + 1)[:, None] * np.sqrt([2.0, 3.0, 5.0]) % 1.0
-    low, high = np.asarray(lower, float), np.asarray(upper, float)
-    return np.asarray(low + parts * (high - low))
-
-
 def even_directions(number: int) -> Array:
     """Unit vectors (number, 3) all around, evenly: a spiral of the golden angle."""
     steps = np.arange(number) + 0.5

@@ -69,10 +69,7 @@ def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> Bin
 
 
 def file_content(path: str | Path, most_bytes: int, name: str, kind: str) -> bytes:
-    """All of a file that a user named.
-
-    `path`, `most_bytes`, `name` and `kind` are as for `regular_file`. Raises InputError, also where reading fails.
-    """
+    """All of a file that a user named, as of `regular_file`. Raises InputError, also where reading fails."""
     with regular_file(path, most_bytes, name, kind) as stream:
         try:
             return stream.read(most_bytes)
@@ -196,10 +193,7 @@ def sent_answer(task: bytes) -> bytes:
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file at once. Raises OSError, which names the file.
-
-    Libraries that write files themselves may not survive a full disk: let them write to memory.
-    """
+    """Write a file at once: libraries may not survive a full disk. Raises OSError, which names the file."""
     with replacing(path) as temporary:
         temporary.write_bytes(content)
 
@@ -300,10 +294,7 @@ def is_hdf5(path: Path) -> bool:
 
 
 def hdf5_fault(path: Path, longest: float = SLOWEST) -> str | None:
-    """What is wrong with an HDF5 file, as the end of a sentence; None if all of it can be read.
-
-    A small file is given up after `longest` seconds.
-    """
+    """What is wrong with an HDF5 file, as a sentence's end; None if all can be read, a small one in `longest` s."""
     try:
         call_apart(longest + path.stat().st_size / PACE, look_through, path)
     except LostError as error:

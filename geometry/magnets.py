@@ -46,7 +46,6 @@ class Magnet:
 
     @property
     def box(self) -> Box:
-        """The box about the body, along its axes: the body itself where it is a cuboid."""
         return self.body.box
 
     @property

@@ -132,10 +132,7 @@ def _solids(text: str) -> tuple[list[Any], int]:
 
 
 def _roots(text: str) -> list[str]:
-    """The file once for each of its roots, without the others: netgen reads the first alone.
-
-    A root is a shape's definition whose product is not a component of another.
-    """
+    """The file once for each root, a shape that is no component, without the others: netgen reads the first alone."""
     found: dict[str, dict[str, list[str]]] = {}
     spans = {}
     for entity in ENTITY.finditer(text):

@@ -21,7 +21,7 @@ from ..dynamics.continuation.frequencies import (
     LOWEST,
     by_frequency,
     levitates,
-    stability_end,
+    one_way,
     tracked_end,
 )
 from ..dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
@@ -115,7 +115,8 @@ class Candidate:
             if end is None:  # tracked from a scene nearby, it may be on the other side of the frequency
                 if not levitates(family.point(start[:3], start[6:9], scene.frequency)):
                     raise EquilibriumError(f"At {scene.frequency:.4g} Hz it is not stable without the plate.")
-                end = stability_end(scene, family, start, scene.frequency, border, LONG_STEPS)
+                walk = one_way(scene, family, start, scene.frequency, border, LONG_STEPS)
+                end = next(point for point in walk if point.kind)
             found.append(end)
         self.near = None
         return found[0], found[1]

@@ -53,12 +53,10 @@ class BranchPoint:
 
     @property
     def distance(self) -> float:
-        """Distance from the rotor's origin, m."""
         return float(np.linalg.norm(self.position))
 
     @property
     def growth_per_s(self) -> float:
-        """Growth rate of the least stable mode, 1/s."""
         return self.motion.growth / self.time_unit
 
     @property

@@ -149,7 +149,6 @@ class StableRange:
     points: tuple[BranchPoint, ...]  # the equilibria between them, by ascending frequency
 
     def near(self, frequency: float) -> BranchPoint:
-        """The point that is nearest in frequency."""
         return min(self.points, key=lambda point: abs(point.parameter - frequency))
 
 
@@ -192,7 +191,7 @@ def branch_through(scene: Scene, rates: Rates, start: Array, frequency: float, s
     `scene`: gravity along the axis; `rates`: its equations of motion; `start`: scaled state (12,) of the equilibrium;
     `frequency`: where it is, Hz; `spin`: body spin.
     """
-    walk = partial(_side, replace(scene, plate=None), by_frequency(scene, rates, spin), start, frequency)
+    walk = partial(one_way, replace(scene, plate=None), by_frequency(scene, rates, spin), start, frequency)
     below = walk(LOWEST if frequency > LOWEST else frequency / WIDEST)
     return [*below[:0:-1], *walk(HIGHEST if frequency < HIGHEST else frequency * WIDEST)]
 
@@ -264,16 +263,6 @@ def on_branch(
     return found
 
 
-def stability_end(
-    scene: Scene, family: Family, start: Array, frequency: float, towards: float, steps: Steps = STEPS
-) -> BranchPoint:
-    """The first fold, change of stability, contact or border that is met from `frequency` `towards` another (Hz).
-
-    Of the equilibria of a `scene` against the frequency, a `family`, from a scaled state `start` (12,) in `steps`.
-    """
-    return next(point for point in _side(scene, family, start, frequency, towards, steps) if point.kind)
-
-
 def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0.0) -> BranchPoint | None:
     """The end of stability of a kind near one of another scene's `family`, without what lies between.
 
@@ -320,10 +309,13 @@ def levitates(point: BranchPoint) -> bool:
     return point.excess(MARGINAL) <= 0
 
 
-def _side(
+def one_way(
     scene: Scene, family: Family, start: Array, frequency: float, end: float, steps: Steps = STEPS
 ) -> list[BranchPoint]:
-    """The branch from `frequency` towards `end`, to its first fold, contact or the border, which is marked."""
+    """The branch from `frequency` towards `end` (Hz), to its first fold, contact or the border, which is marked.
+
+    Of the equilibria of a `scene` against the frequency, a `family`, from a scaled state `start` (12,) in `steps`.
+    """
     points = follow_branch(family, start, frequency, end, steps, partial(is_over, scene), MARGINAL)
     for k, point in enumerate(points):
         if point.kind == FOLD:

@@ -111,8 +111,10 @@ def filled(grid: Grid, nodes: Indices) -> tuple[Indices, Array, Array]:
     random, seeds = np.random.default_rng(0), []
     for first in range(0, len(nodes), TOGETHER):
         some = range(first, min(first + TOGETHER, len(nodes)))
-        starts = [_starts(grid, int(nodes[k]), None if k % WHOLE == 0 else random) for k in some]
-        problem, points = (np.concatenate(part) for part in zip(*starts, strict=True))
+        starts = [grid.range(int(nodes[k])).starts() for k in some]
+        starts = [one if k % WHOLE == 0 else one[random.choice(len(one), len(one) // PART, replace=False)]
+                  for k, one in zip(some, starts, strict=True)]  # fmt: skip
+        problem, points = np.repeat(nodes[some], [len(one) for one in starts]), np.concatenate(starts)
         seeds.append(newton_search(grid.balance, grid.holds, problem, points, EVERY, MARGIN, REACH, FAR))
     point, places = (np.concatenate(part) for part in zip(*seeds, strict=True))
     bound, known = FAR_APART * max(where.bound for where in grid.ranges), np.zeros((0, 7))
@@ -127,23 +129,13 @@ def filled(grid: Grid, nodes: Indices) -> tuple[Indices, Array, Array]:
             break
         before, after = grid.balance(point[source]), grid.balance(target)
         which, arrived, position, moment = continued(before, after, places[source, :3], places[source, 3:], bound)
-        point, places = (
-            np.where(arrived, target[which], point[source[which]]),
-            np.concatenate([position, moment], axis=1),
-        )
+        point = np.where(arrived, target[which], point[source[which]])
+        places = np.concatenate([position, moment], axis=1)
         inside = grid.holds(point, position, MARGIN)
         point, places = point[inside], places[inside]
     known = known[np.argsort(known[:, 0], kind="stable")]
     known = known[grid.holds(known[:, 0].astype(int), known[:, 1:4])]
     return known[:, 0].astype(int), known[:, 1:4], known[:, 4:]
-
-
-def _starts(grid: Grid, point: int, random: np.random.Generator | None) -> tuple[Indices, Array]:
-    """All starts at a point, or some: the point (n,) and scaled positions and moments (n, 6)."""
-    points = grid.range(point).starts()
-    if random is not None:
-        points = points[random.choice(len(points), len(points) // PART, replace=False)]
-    return np.full(len(points), point), points
 
 
 @dataclass(frozen=True, eq=False)

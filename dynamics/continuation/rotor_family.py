@@ -91,7 +91,6 @@ class MovableField:
         return replace(self, measures=measures)
 
     def derivatives(self, points: Array, order: int) -> Array:
-        """See `RotorTable`."""
         found = np.zeros((len(points), order * (order + 2)))
         for source, move in self.parts:
             places = np.transpose(move.place(list(points.T), self.measures))
@@ -126,7 +125,6 @@ class MovedEffect:
         return replace(found, **back)
 
     def placed(self, first: int) -> "MovedEffect":
-        """See `Placeable`."""
         return replace(self, effect=self.effect.placed(first))
 
     @property

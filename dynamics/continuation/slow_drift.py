@@ -109,15 +109,6 @@ class Drift:
         return float(np.diff(np.interp(times, self.time, self.distance))[0] / np.diff(times)[0])
 
 
-def _steady(start: BranchPoint, duration: float, e_folds: float) -> Drift:
-    """A trajectory on which nothing moves the spin."""
-    growth = max(0.0, start.growth_per_s - start.doubt_per_s)
-    ended = INSTABILITY if growth * duration > e_folds else DURATION
-    time = np.array([0.0, e_folds / growth if ended == INSTABILITY else duration])
-    spin, distance, rate = (np.full(2, value) for value in (start.spin, start.distance, start.growth_per_s))
-    return Drift(time, spin, distance, rate, ended, np.nan)
-
-
 def _averaged(torque: SlowTorque, points: list[BranchPoint], duration: float, end: str, e_folds: float) -> Drift:
     """The trajectory along the points of a branch, to its `end` or to what comes first."""
     places = np.array([np.concatenate([p.state[:3], p.state[6:9], [p.spin]]) for p in points])
@@ -152,7 +143,13 @@ def _averaged(torque: SlowTorque, points: list[BranchPoint], duration: float, en
         ended = INSTABILITY if times[-1] + wait < duration else DURATION
         lengths, times = np.append(lengths, lengths[-1]), np.append(times, min(times[-1] + wait, duration))
     spin, distance = course(lengths).T
-    balances = pace.roots(extrapolate=False)
+    balances, last_fall = pace.roots(extrapolate=False), 0.0
+    if ended == FOLD:
+        before = next(k for k in range(len(points) - 2, -1, -1) if arc[-1] - arc[k] > 0.01 or k == 0)
+        slowest = float(points[before].motion.angular_frequencies[0]) / points[before].time_unit
+        bend = float(course(arc[-1], 2)[0] / pace(arc[-1]))  # d²s/dℓ² over ds/dt there
+        remaining = abs(bend) / 2 * (arc[-1] - arc[before]) ** 2
+        last_fall = float(ESCAPE * (4 * remaining / slowest**4) ** 0.2)
     return Drift(
         time=times,
         spin=spin,
@@ -160,16 +157,8 @@ def _averaged(torque: SlowTorque, points: list[BranchPoint], duration: float, en
         growth_per_s=growth(lengths),
         ended_by=ended,
         balance_spin=float(course(balances[0])[0]) if len(balances) else np.nan,
-        last_fall_s=_escape(points, arc, float(course(arc[-1], 2)[0] / pace(arc[-1]))) if ended == FOLD else 0.0,
+        last_fall_s=last_fall,
     )
-
-
-def _escape(points: list[BranchPoint], arc: Array, bend: float) -> float:
-    """Time from the fold to the loss, s; `bend` is d²s/dℓ² over ds/dt there."""
-    before = next(k for k in range(len(points) - 2, -1, -1) if arc[-1] - arc[k] > 0.01 or k == 0)
-    slowest = float(points[before].motion.angular_frequencies[0]) / points[before].time_unit
-    remaining = abs(bend) / 2 * (arc[-1] - arc[before]) ** 2
-    return float(ESCAPE * (4 * remaining / slowest**4) ** 0.2)
 
 
 def drift(
@@ -206,7 +195,12 @@ def drift(
         start = min(known, key=lambda equilibrium: equilibrium.growth_per_s).state
     state = Scales.of(scene).pack(start)
     if not np.any(torque.values[[Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]]):  # nothing moves the spin
-        return _steady(family.point(state[:3], state[6:9], spin), duration, e_folds)
+        point = family.point(state[:3], state[6:9], spin)
+        growth = max(0.0, point.growth_per_s - point.doubt_per_s)
+        ended = INSTABILITY if growth * duration > e_folds else DURATION
+        time = np.array([0.0, e_folds / growth if ended == INSTABILITY else duration])
+        spin_, distance, rate = (np.full(2, value) for value in (point.spin, point.distance, point.growth_per_s))
+        return Drift(time, spin_, distance, rate, ended, np.nan)
     towards = spin + np.copysign(3.0, torque(state))
 
     def over(point: BranchPoint) -> bool:
@@ -214,10 +208,8 @@ def drift(
 
     points = follow_branch(family, state, spin, towards, Steps(longest=0.03, turn=0.05), over)
     end = CONTACT if rotor_gap(scene, points[-1].position) < 0 else BALANCE
-    for k, point in enumerate(points):
-        if point.kind == FOLD:
-            points, end = points[: k + 1], FOLD
-            break
+    if fold := next((k for k, point in enumerate(points) if point.kind == FOLD), None):
+        points, end = points[: fold + 1], FOLD
     return _averaged(torque, points, duration, end, e_folds)
 
 

@@ -93,10 +93,7 @@ def place_error(
 
 
 def tangent_basis(moment: Array) -> Array:
-    """Two unit vectors (n, 2, 3) across each unit vector (n, 3), without a singular direction.
-
-    T. Duff et al., J. Comput. Graph. Tech. 6 (2017) 1.
-    """
+    """Two unit vectors (n, 2, 3) across each (n, 3), nowhere singular (T. Duff, J. Comput. Graph. Tech. 6 (2017) 1)."""
     x, y, z = moment.T
     sign = np.copysign(1.0, z)
     a = -1.0 / (sign + z)

@@ -41,7 +41,6 @@ class SearchRange:
 
     @property
     def bound(self) -> float:
-        """Largest depth, and distance from the axis, in floater radii."""
         return self.farthest / self.scene.floater.radius
 
     def holds(self, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
@@ -195,10 +194,7 @@ class _Lateral(AtRest):
 
 
 def fixed_points(balance: Balance, where: SearchRange, watch: Watch = unwatched) -> tuple[list[Curve], Array]:
-    """Curves of lateral `balance` in the range `where`, and scaled positions and moments (k, 6) of the equilibria.
-
-    `watch` is as for `newton_search`.
-    """
+    """Curves of lateral balance in the range `where`, and scaled positions and moments (k, 6) of the equilibria."""
     seeds = from_starts(balance, where, LATERAL, watch=watch)
     curves, count = list[Curve](), len(seeds)
     while len(seeds):

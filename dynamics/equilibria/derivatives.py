@@ -148,7 +148,6 @@ class Implicit:
 
     @cached_property
     def modes(self) -> list[_ModeAt]:
-        """The floater's modes."""
         scale = 2j * np.pi * self.setting.scales.time
         given = [m.growth_per_s * self.setting.scales.time + scale * m.frequency_hz for m in self.known.modes]
         return [self._mode(mode.name, complex(value)) for mode, value in zip(self.known.modes, given, strict=True)]

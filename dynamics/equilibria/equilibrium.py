@@ -46,7 +46,6 @@ class Modes:
 
     @property
     def growth(self) -> float:
-        """Largest rate of growth."""
         return float(self.eigenvalues.real.max())
 
     @property
@@ -223,12 +222,10 @@ class Equilibrium:
 
     @property
     def start(self) -> State:
-        """The state at t = 0."""
         return self.state if self.turn is None else self.turn[0]
 
     @property
     def position(self) -> Array:
-        """(3,) m."""
         return self.state.position
 
     @cached_property

@@ -114,10 +114,7 @@ def _tail(states: Array) -> float:
 
 
 def conserved(states: Array, spin: float) -> tuple[Array, Array]:
-    """Derivatives (2, 12 n) and values (2,) of |m̂|²/2 - 1/2 and Ω·m̂ - s at the first instant.
-
-    Of a body that is not round that of its quaternion alone.
-    """
+    """Derivatives (2, 12 n) and values (2,) of |m̂|²/2 - 1/2 and Ω·m̂ - s at first; else (1,) of the quaternion."""
     if states.shape[1] > 12:
         rows, quaternion = np.zeros((1, states.size)), states[0, 6:10]
         rows[0, 6:10] = quaternion

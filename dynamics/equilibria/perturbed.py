@@ -114,10 +114,7 @@ def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) ->
 
 
 def shift_by_mutual(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
-    """Shift of an equilibrium by mutual magnetisation, m.
-
-    To first order by the `answers` in the field `table` of the `scene`; without them to a factor of two.
-    """
+    """Shift of an equilibrium by mutual magnetisation, m: to first order, without `answers` to a factor of two."""
     fixed = equilibrium.without or equilibrium
     place, moment, scales = fixed.position[None], fixed.state.moment[None], Scales.of(scene)
     if answers is None:

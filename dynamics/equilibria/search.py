@@ -181,10 +181,7 @@ def _survey_of_any_body(
     remembered: Remembered,
     watch: Watch,
 ) -> Survey:
-    """Equilibria of a body that is not round about its moment: its mean over turns about that, and frequency-locked.
-
-    See `survey`.
-    """
+    """`survey` of a body that is not round about its moment: its mean over turns about that, and frequency-locked."""
     means = mean_over_turns(scene, table)
     quick = Rates(means[2])
     found: list[Equilibrium] = []
@@ -404,10 +401,7 @@ def _own_spin(scene: Scene) -> float:
 
 
 def check_turning(scene: Scene) -> None:
-    """Raises EquilibriumError beside a rotor at rest, but for a floater that spins and gravity along the axis.
-
-    So it does where rotor or floater is not magnetised.
-    """
+    """Raises EquilibriumError where there is no torque, or beside a rotor at rest none that could hold a floater."""
     if not scene.frequency and not _own_spin(scene):
         raise EquilibriumError(
             "Beside a rotor at rest a magnet without spin has no stable equilibrium (S. Earnshaw, 1842). "

@@ -47,7 +47,6 @@ class System:
 
     @property
     def unknowns(self) -> int:
-        """Number of unknowns before static condensation."""
         return int(self.space.ndof)
 
 
@@ -63,10 +62,7 @@ class Solution:
 
 
 def assemble(mesh: MagnetMesh, order: int) -> System:
-    """Assemble ∫ ∇v·μ∇ψ with elements of degree `order`.
-
-    Raises MeshError: layers of elements do not match; TooLargeError: the memory does not hold the system.
-    """
+    """Assemble ∫ ∇v·μ∇ψ with elements of degree `order`. Raises MeshError, TooLargeError."""
     permeability = {f"magnet{k}": magnet.permeability_in_rotor for k, magnet in enumerate(mesh.magnets)}
     return System(mesh, order, *stiffness_of(mesh.mesh, permeability, mesh.ball_radius, order, WAY_OUT))
 

@@ -95,7 +95,6 @@ class HarmonicFit:
 
     @property
     def misfit(self) -> float:
-        """Root mean square of held-out residuals over the errors given, at the degree chosen."""
         return float(self.misfits[self.degree])
 
 
@@ -142,10 +141,7 @@ def fit_harmonics(
 def _normal_matrix(
     basis: HarmonicBasis, points: Array, field: Array, errors: Array, chosen: NDArray[np.bool_]
 ) -> Array:
-    """Products of all weighted columns and the weighted field (last but one) with each other, for `chosen` points.
-
-    The last diagonal entry counts the observations.
-    """
+    """Products of weighted columns, weighted field (last but one) and count (last) of `chosen` points."""
     size = basis.count(basis.degree) + 1
     product = np.zeros((size + 1, size + 1))
     (where,) = np.nonzero(chosen)

@@ -77,10 +77,7 @@ class _Table:
 
 
 def _text(path: Path, reading: MapReading) -> FieldMap:
-    """A map from a table as text.
-
-    Raises FieldMapError: no text, no titles of a map, a cell that is no number, or one that could be two.
-    """
+    """A map from a table as text. Raises FieldMapError: no text or titles of a map, a cell of no number or two."""
     lines = _lines(file_content(path, MOST_BYTES, "map", "a file"))
     separators: Sequence[str | None] = (",", ";", "\t", "|", None)
     if said := SEP.fullmatch(lines[0].strip()):

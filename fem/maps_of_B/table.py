@@ -42,10 +42,7 @@ STEPS, COMPONENT = 30.0, 0.1
 
 @dataclass(frozen=True)
 class _Comparison:
-    """Of a map with its magnets: median ratio of |B|, mean cosine, median relative deviation.
-
-    `share` is that of the points that lie outside the spheres.
-    """
+    """A map beside its magnets: median ratio of |B|, mean cosine, median deviation, share of points outside."""
 
     ratio: float
     cosine: float

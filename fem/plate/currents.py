@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ...geometry.common import MU_0, Array, Report, Watch, spread_points, unwatched, watched
+from ...geometry.common import MU_0, Array, Report, Watch, unwatched, watched
 from ...geometry.meshes.plate import PLANES, MeshRule
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box
@@ -130,7 +130,8 @@ def grid_counts(region: Region, body: Solids) -> tuple[int, int, int]:
 
 def probe_places(region: Region, fold: Sequence[int] = ()) -> Array:
     """(n, 3) m: corners of the region, folded those not mirrored, and some places within."""
-    inside = spread_points(region.lower, region.upper, PROBES)
+    parts = np.arange(1, PROBES + 1)[:, None] * np.sqrt([2.0, 3.0, 5.0]) % 1.0  # evenly (H. Weyl, 1916)
+    inside = region.lower + parts * (region.upper - region.lower)
     return np.concatenate([region.surface((2, 2, 2), fold), inside])
 
 
@@ -499,10 +500,7 @@ def cached_currents(
     report: Report,
     watch: Watch = unwatched,
 ) -> PlateSolution:
-    """`solve_currents` from the cache if it is there.
-
-    The same `plate`, `boxes`, `frequencies`, `rtol`, `rule` and `others`; `report` gets messages, `watch` progress.
-    """
+    """`solve_currents` from the cache if it is there; `report` gets messages, `watch` progress."""
     inputs = plate.body.shape_numbers, plate.metal, tuple(boxes), frequencies, rtol, rule, others
     make = partial(solve_currents, plate, boxes, frequencies, rtol, rule, others, watch)
     return CURRENTS.cached(inputs, make, report)[0]

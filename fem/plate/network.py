@@ -97,10 +97,7 @@ class OrderedBasis:
 
 
 def ordered_basis(fields: Array, potentials: Array, reference: float) -> OrderedBasis:
-    """Basis from snapshots of fields and of their potentials (n, width).
-
-    At the angular frequency `reference` (rad/s) energy and power count alike.
-    """
+    """Basis from snapshots of fields and potentials (n, width); energy and power count alike at `reference`, rad/s."""
     resistance, inductance = fields @ fields.T, potentials @ fields.T
     inductance = (inductance + inductance.T) / 2
     energies, vectors = np.linalg.eigh(resistance + reference * inductance)
@@ -283,26 +280,22 @@ def candidates(region: Region, body: Solids, degree: int = DEGREE) -> Multipoles
 
     They lie behind its surface, of several bodies behind each one's. Raises ValueError: the region touches the plate.
     """
-    centers = [_behind(region.moved(-center), half) + center for center, half in body.blocks]
+    centers = []
+    for center, half in body.blocks:
+        of_region, of_plate = region.moved(-center).nearest(half)
+        gap = float(np.linalg.norm(of_plate - of_region))
+        if gap < 1e-9:
+            raise ValueError(
+                f"Input region must be apart from the plate; instead received {region.lower.tolist()} to "
+                f"{region.upper.tolist()} m for half edges {half.tolist()} m."
+            )
+        away, lines = (of_plate - of_region) / gap, []
+        axis = int(np.argmax(np.abs(away)))
+        for a in range(3):
+            reach = max((region.upper - region.lower)[a] / 2 - gap, 0.0)
+            count = 2 * int(np.ceil(reach / (SPACING * gap))) + 1
+            middle = (region.center - center)[a]
+            lines.append(of_plate[[a]] if a == axis else middle + reach * np.linspace(-1, 1, count) * (count > 1))
+        starts = np.array(list(product(*lines))) + center
+        centers += [starts + depth * gap * away for depth in DEPTHS]
     return Multipoles.at(np.concatenate(centers), real_kinds(0, degree), region.gap(body))
-
-
-def _behind(region: Region, half_edges: Array) -> Array:
-    """Centres (n, 3) m on lines away from the region, behind the face of a body with `half_edges` (3,) m."""
-    of_region, of_plate = region.nearest(half_edges)
-    gap = float(np.linalg.norm(of_plate - of_region))
-    if gap < 1e-9:
-        raise ValueError(
-            f"Input region must be apart from the plate; instead received {region.lower.tolist()} to "
-            f"{region.upper.tolist()} m for half edges {half_edges.tolist()} m."
-        )
-    away = (of_plate - of_region) / gap
-    axis = int(np.argmax(np.abs(away)))
-    lines = []
-    for a in range(3):
-        reach = (region.upper - region.lower)[a] / 2 - gap
-        count = 1 if a == axis else 2 * int(np.ceil(max(reach, 0.0) / (SPACING * gap))) + 1
-        lines.append(region.center[a] + max(reach, 0.0) * np.linspace(-1, 1, count) * (count > 1))
-    lines[axis] = of_plate[[axis]]
-    starts = np.array(list(product(*lines)))
-    return np.concatenate([starts + depth * gap * away for depth in DEPTHS])

@@ -77,10 +77,7 @@ class Slab:
 
 
 def checked(height: ArrayLike, frequency: ArrayLike) -> tuple[Array, Array]:
-    """Heights (m) and frequencies (Hz) as arrays of one shape.
-
-    Raises ValueError: a height is not above the face, or a frequency is negative or not finite.
-    """
+    """Heights (m) and frequencies (Hz) as arrays of one shape. Raises ValueError: not positive; negative."""
     h, f = np.broadcast_arrays(np.asarray(height, float), np.asarray(frequency, float))
     if not np.all(h > 0):
         raise ValueError(f"Input height_m must be positive (the dipole is over the face); instead received {h.min()}.")
@@ -138,10 +135,7 @@ class SlabFrame:
 
 
 def slab_frame(plate: Plate, region: Region) -> SlabFrame:
-    """The slab that stands for `plate` under `region` (plate's frame).
-
-    Raises InputError: the region is not over one of the plate's two largest faces.
-    """
+    """The slab that stands for `plate`. Raises InputError: `region` is not over one of its two largest faces."""
     normal, half = int(np.argmin(plate.box.size)), plate.box.half_edges
     others = [(normal + 1) % 3, (normal + 2) % 3]
     apart = (region.lower >= half) | (region.upper <= -half)

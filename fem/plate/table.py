@@ -32,10 +32,7 @@ SYMMETRIC = 1e-9  # Relative difference of two bounds that still counts as a mir
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Where the floater may be: a box in the frame of the plate, whose centre is the origin.
-
-    Raises ValueError: an upper bound is not above the lower one.
-    """
+    """Where the floater may be: a box in the plate's frame. Raises ValueError: upper bounds not over lower ones."""
 
     lower: Array = field(metadata={"units": "m"})  # (3,) bounds
     upper: Array = field(metadata={"units": "m"})
@@ -57,7 +54,6 @@ class Region:
         return tuple(int(a) for a in np.flatnonzero(np.abs(self.lower + self.upper) <= SYMMETRIC * extent))
 
     def moved(self, shift: Array) -> "Region":
-        """The region displaced by (3,) m."""
         return Region(self.lower + shift, self.upper + shift)
 
     def nearest(self, half_edges: Array) -> tuple[Array, Array]:
@@ -155,10 +151,7 @@ class PlateErrors:
 
 
 def refuse(rtol: float, enough: float, conductor: str) -> NoReturn:
-    """Refuse a tolerance `rtol` that a table of a `conductor`, in words, misses, where `enough` can be met.
-
-    Raises AccuracyError: always.
-    """
+    """Raises AccuracyError: a table of a `conductor`, in words, misses `rtol`, where `enough` can be met."""
     unit = 10.0 ** math.floor(math.log10(enough))
     enough = math.ceil(enough / unit - 1e-9) * unit
     if enough > LARGEST:

@@ -186,10 +186,7 @@ def _reduced_table(reduced: Reduction, rtol: float, conductor: str, watch: Watch
 
 
 def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> PlateTable:
-    """Field functions of a network as multipoles, whose errors may add up to more than `rtol`.
-
-    `watch` is a progress callback.
-    """
+    """Field functions of a network as multipoles, whose errors may add up to more than `rtol`."""
     start = time.perf_counter()
     watch("field functions of the plate", 0.0)
     multipoles, weights, error = network.field_functions(network, rtol, watch)
@@ -204,10 +201,7 @@ def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> 
 def cached_plate_table(
     plate: Plate, region: Region, frequencies: tuple[float, float], rtol: float, report: Report
 ) -> tuple[PlateTable, bool]:
-    """`plate_table` (`region`, `frequencies`, `rtol`), if it can be from the cache, and whether it was, for `plate`.
-
-    `report` gets messages.
-    """
+    """`plate_table`, from the cache if it is there, and whether it was; `report` gets messages."""
     inputs = plate.body.shape_numbers, plate.metal, region, frequencies, rtol
     return PLATE.cached(inputs, lambda: plate_table(plate, region, frequencies, rtol), report)
 

@@ -23,7 +23,7 @@ from ...geometry.common import MU_0, Array, Watch
 from ...geometry.scene.contents import Plate
 from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import Dipole, PolarizedCuboid
-from ..harmonics.expansion import MultipoleExpansion, without_noise
+from ..harmonics.expansion import without_noise
 from ..harmonics.solid import Coefficients, rotated_harmonics
 from .currents import OtherSources, probe_places, unit_power
 from .eddy import Source
@@ -73,12 +73,9 @@ def wave_moment(source: Source, vectors: ComplexArray, shift: ComplexArray) -> C
         along = vectors @ source.box.rotation * source.box.half_edges
         shape = np.prod(np.sinc(1j * along / np.pi), axis=-1)  # sin(ix)/(ix) = sinh(x)/x
         return np.asarray(vectors @ moment * shape * np.exp(vectors @ source.box.center + shift))
-    if isinstance(source, ExpansionSource):
-        return _expansion_moment(source.expansion, vectors, shift)
-    raise TypeError(f"Input source must be a magnetisation; instead received a {type(source).__name__}.")
-
-
-def _expansion_moment(expansion: MultipoleExpansion, vectors: ComplexArray, shift: ComplexArray) -> ComplexArray:
+    if not isinstance(source, ExpansionSource):
+        raise TypeError(f"Input source must be a magnetisation; instead received a {type(source).__name__}.")
+    expansion = source.expansion
     x, y, z = np.moveaxis(expansion.radius * vectors, -1, 0)
     plus, minus = x + 1j * y, x - 1j * y
     total = np.zeros(z.shape, complex)
@@ -260,10 +257,7 @@ def _functions(
     rtol: float,
     watch: Watch,
 ) -> tuple[Multipoles, Array, float]:
-    """`PassiveNetwork.field_functions` from the fields on a meridian, order by order.
-
-    Each order is fitted where cos mφ = sin mφ, so that all three components show.
-    """
+    """`PassiveNetwork.field_functions`, order by order from a meridian where cos mφ = sin mφ: all components show."""
     tolerance = FUNCTION_SHARE * rtol
     grid = meridian(network.region, waves.frame, POINTS)
     radius, height = grid[:, 0], grid[:, 2]

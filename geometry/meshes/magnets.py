@@ -76,7 +76,6 @@ class MagnetMesh(SolidMesh):
 
     @property
     def elements(self) -> int:
-        """Number of volume elements."""
         return int(self.mesh.ne)
 
 

@@ -94,7 +94,6 @@ def mesh_metal(bodies: Sequence[Solid]) -> SolidMesh:
 
 
 def read_brep(brep: str) -> Any:
-    """The solid of a BREP text."""
     with tempfile.NamedTemporaryFile("w", suffix=".brep", encoding="utf-8") as copy:
         copy.write(brep)
         copy.flush()
@@ -189,15 +188,11 @@ def step_text(solid: Any) -> str:
 
 
 def solid_of(body: Solid) -> Any:
-    """The solid of a body, wherever that is."""
     return occ_solid(moved(body, np.zeros(3), np.eye(3)), np.zeros(3), MILLIMETRE)
 
 
 def segment(inner_radius: float, radius: float, height: float, start: float, end: float) -> Any:
-    """Part of a ring about z, its middle at the origin.
-
-    `inner_radius`, `radius`, `height`: of the ring, m; `start`, `end`: angles about z, degrees.
-    """
+    """Part of a ring about z, its middle at the origin, from a `start` to an `end` angle, degrees."""
     inner, outer, high = (length / MILLIMETRE for length in (inner_radius, radius, height))
     section = occ.WorkPlane(occ.Axes((inner, 0.0, -high / 2), n=occ.gp_Dir(0, -1, 0), h=occ.X))
     axis = occ.Axis(occ.Pnt(0, 0, 0), occ.Z)
@@ -205,10 +200,7 @@ def segment(inner_radius: float, radius: float, height: float, start: float, end
 
 
 def shifted(solid: Any, shift: Array, rotation: Array) -> Any:
-    """A solid that is turned about the origin, then moved.
-
-    `solid`: of OpenCASCADE; `shift`: (3,) m; `rotation`: (3, 3).
-    """
+    """A `solid` turned about the origin by a `rotation` (3, 3), then moved by a `shift` (3,) m."""
     return _turned(solid, rotation).Move(_vector(shift / MILLIMETRE))
 
 
@@ -226,10 +218,7 @@ def joined(solids: Sequence[Any]) -> Any | None:
 
 
 def faceted(triangles: Array) -> Any:
-    """The solid within triangles (n, 3, 3) m in any order; those of one plane are one face.
-
-    Raises InputError where they do not close, or cut each other.
-    """
+    """The solid within triangles (n, 3, 3) m in any order. Raises InputError where they do not close, or cut."""
     triangles = triangles / MILLIMETRE
     size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     _, numbers = np.unique(np.round(triangles.reshape(-1, 3) / (SAME * size)), axis=0, return_inverse=True)

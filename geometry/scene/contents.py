@@ -62,7 +62,6 @@ class Plate:
 
     @property
     def box(self) -> Box:
-        """The box about its body, along the body axes."""
         return self.body.box
 
     @property
@@ -101,7 +100,6 @@ class Coil:
 
     @property
     def body(self) -> Cylinder:
-        """Its winding."""
         outer, inner = self.radius + self.width / 2, self.radius - self.width / 2
         return Cylinder(outer, self.height, self.center, inner_radius=inner)
 
@@ -288,7 +286,6 @@ class Scene:
 
     @property
     def fastest(self) -> float:
-        """The highest frequency of the rotor, Hz."""
         return max(abs(self.frequency), *(step.frequency or 0.0 for step in self.drive), 0.0)
 
     @cached_property

@@ -33,7 +33,6 @@ class FloaterPart:
 
     @property
     def mass(self) -> float:
-        """Mass, kg."""
         return self.density * self.magnet.body.volume
 
 
@@ -129,12 +128,10 @@ class Floater:
 
     @property
     def volume(self) -> float:
-        """Volume, m³."""
         return sum(body.volume for body in self.bodies)
 
     @property
     def mass(self) -> float:
-        """Mass, kg."""
         return self.density * self.volume
 
     @cached_property

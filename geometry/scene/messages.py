@@ -114,10 +114,7 @@ def _with_line(fault: str, lines: dict[str, int]) -> str:
 
 
 def described_faults(details: Sequence[ErrorDetails]) -> list[str]:
-    """The faults found by the schema, as sentences that say what to do.
-
-    A mistyped key is one fault: that the key it was meant for is missing is not said beside it.
-    """
+    """The faults found by the schema, as sentences that say what to do; a mistyped key is one fault."""
     unknown = [detail["loc"] for detail in details if detail["type"] == "extra_forbidden"]
     meant = {(*place[:-1], close) for place in unknown for close in _close(place)}
     return [_described(detail) for detail in details if detail["type"] != "missing" or detail["loc"] not in meant]
@@ -401,10 +398,7 @@ def unusual(scene: Scene) -> str:
 
 
 def overlap_faults(scene: Scene) -> Iterator[str]:
-    """Every overlap of the scene's bodies as a message with its depth.
-
-    The plate is checked against the rotor over a whole turn; touching is allowed.
-    """
+    """Every overlap of the scene's bodies with its depth, of the rotor over a whole turn; touching is allowed."""
     bodies = [(f"magnet {i}", magnet.body) for i, magnet in enumerate(scene.rotor, 1)]
     bodies += [(f"conductor {i}", part.body) for i, part in enumerate(scene.conductors, 1)]
     yield from _own_overlaps("rotor", "magnets and conductors", bodies)

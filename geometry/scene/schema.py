@@ -258,7 +258,6 @@ class FloaterTable(Table):
 
     @property
     def composite(self) -> bool:
-        """Whether its parts are given one by one."""
         return bool(self.model_fields_set & {"magnets", "bodies"})
 
     def floater(self, parts: Mapping[int, Part]) -> Floater:
@@ -431,7 +430,6 @@ class SceneTable(Table):
 
     @property
     def starts(self) -> list[StartTable]:
-        """Where the floaters begin."""
         return self.start if isinstance(self.start, list) else [self.start or StartTable()]
 
     def scene(self, parts: Mapping[tuple[str, int], Part], field_map: Path | None) -> Scene:

@@ -13,7 +13,7 @@ from spinlev.fem.closed_forms.potentials import Dipole, HomogeneousField, Polari
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.plate.rotor_share import DOWN, ExpansionSource, posed_rotor, rotor_parts
 from spinlev.fem.plate.slab import Slab, modes_needed, mutual_tensor, reaction_tensor, slab_modes
-from spinlev.fem.plate.table import PlateErrors, Region
+from spinlev.fem.plate.table import Region, refuse
 from spinlev.fem.plate.tables import plate_and_rotor_table
 from spinlev.fem.plate.waves import cylinder_moments
 from spinlev.fem.rotor.choice import rotor_table
@@ -252,12 +252,10 @@ def test_a_tolerance_that_is_refused_names_one_that_is_met():
 
 
 def test_a_tolerance_that_cannot_be_met_is_told_in_words():
-    errors = PlateErrors(1e-3, 4e-3, 1.2e-2)
-    errors.check(0.017, "it")
     with pytest.raises(AccuracyError, match=r"must be at least 0\.04 for it; instead received 0\.016"):
-        errors.check(0.016, "it")
+        refuse(0.016, 0.034, "it")
     with pytest.raises(AccuracyError, match=r"at least 0\.2 .*0\.1 that is allowed.*Move the plate away"):
-        replace(errors, functions=0.08).check(0.016, "it")
+        refuse(0.016, 0.17, "it")
 
 
 def test_bad_ranges_are_named():
