@@ -99,10 +99,7 @@ def libraries() -> str:
 
 @cache
 def program_digest(*without: str, root: Path = ROOT) -> str:
-    """SHA-256 of this program's text and its libraries' versions: processes that compute together have one.
-
-    `without`: rooms that are left out, as "studies/figures"; `root`: where the floors lie.
-    """
+    """SHA-256 of this program's text, but for rooms, and its libraries: of processes that compute together."""
     digest = hashlib.sha256(libraries().encode())
     for path in sorted(path for floor in FLOORS for path in (root / floor).rglob("*") if path.suffix in TEXTS):
         name = path.relative_to(root)
@@ -178,10 +175,7 @@ class TableKind(Generic[Table]):
         write_checked(to_dataset(table).assign_attrs(labels), path)
 
     def load(self, path: str | Path, key: str = "") -> Table:
-        """Read a table, with a key only the one that was saved with it.
-
-        Raises TableFileError: the file is not of this kind and key, or its content is not what was written.
-        """
+        """Read a table, with a key only the one of that key. Raises TableFileError: another, or damaged."""
         dataset = read_checked(path, self.format)
         if key and dataset.attrs.get("key") != key:
             raise TableFileError(f"Input {path} must be what its name says; instead it is the table of other inputs.")
@@ -259,10 +253,7 @@ def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset
 
 
 def cache_folder() -> Path:
-    """$SPINLEV_CACHE, else spinlev in the place of a user's caches: $XDG_CACHE_HOME or ~/.cache on Linux.
-
-    Who has no home, or none to write in, has a folder in the system's temporary one.
-    """
+    """$SPINLEV_CACHE, else spinlev in the place of a user's caches, or in the temporary folder of who has no home."""
     if named := os.environ.get("SPINLEV_CACHE"):
         return Path(named)
     try:
@@ -350,10 +341,7 @@ def make_room(folder: Path, limit: int) -> None:
 
 @contextmanager
 def alone(path: Path, report: Report) -> Iterator[None]:
-    """Be the only process in this block with the same lock file; the system frees it if the process dies.
-
-    Where no lock can be had, the block runs without: at worst a table is made twice.
-    """
+    """Be the only process in this block with the same lock file; without locks a table is at worst made twice."""
     lock = FileLock(path)
     try:
         path.parent.mkdir(mode=0o755, parents=True, exist_ok=True)

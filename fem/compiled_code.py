@@ -39,7 +39,6 @@ def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any)
     """What a compiler makes of its arguments, from the cache if it is there.
 
     Damaged code is thrown away without a word and compiled anew; a cache that cannot be written does no harm.
-
     `compiler`: `heyoka.cfunc` or `heyoka.taylor_adaptive`; `arguments`, `options`: the compiler's.
     """
     return compiled_later(compiler, lambda: arguments, arguments, **options)

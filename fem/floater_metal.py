@@ -139,10 +139,7 @@ def rates_of_potential(points: Array) -> Array:
 def _own_field(
     points: Sequence[Array], flows: Sequence[Array], units: Sequence[float], squares: Sequence[Array]
 ) -> tuple[Array, Array]:
-    """L over μ0 of currents times volumes `flows` at points, by three lengths ε and by two.
-
-    `squares` are each piece's ∫ J_a·J_b, and `units` the lengths that its ε are of.
-    """
+    """L over μ0 of volumes' currents at points, by three and two lengths ε in `units`; `squares`: ∫ J_a·J_b."""
     places, flow = np.concatenate(points), np.concatenate(flows)
     # between two pieces a mean of theirs: smearing by Gaussians of both
     lengths = np.concatenate([np.full(len(p), unit**2) for p, unit in zip(points, units, strict=True)])

@@ -286,10 +286,7 @@ LOSSES = TableKind("rotor-losses", RotorLosses, "Dissipation in a rotor's metal:
 
 
 def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = BALL_DEGREE) -> RotorLosses:
-    """Table for pieces of metal (bodies, S/m), each body a ball as large as a cube of its volume makes.
-
-    Beside a cube it is right to a fifth from 15 mm off a 10 mm one on, and to a half in contact.
-    """
+    """Table for pieces of metal (bodies, S/m) as balls: beside a cube right to a fifth, and to a half in contact."""
     centers, kinds, weights = [], [], []
     for bodies, conductivity in pieces:
         for body in bodies:
@@ -359,10 +356,7 @@ def rotor_losses(
 
 
 def sparse(weights: Array) -> Array:
-    """Weights (K, J) with the same WᵀW, and zeros where symmetry and a triangle allow them.
-
-    Any orthogonal mix of the fields gives the same dissipation; that of a QR decomposition has the fewest terms.
-    """
+    """Weights (K, J) with the same WᵀW, and the zeros that symmetry and the triangle of a QR decomposition allow."""
     _, triangle, order = scipy.linalg.qr(weights / np.linalg.norm(weights, axis=0), mode="economic", pivoting=True)
     small = np.abs(triangle) < NOISE
     found = np.zeros_like(triangle)
@@ -399,9 +393,8 @@ def _error(table: RotorLosses, metals: Sequence[Metal], places: Array) -> float:
 def check_metal(pieces: Pieces, frequency: float, nearest: float) -> None:
     """Refuse pieces of metal whose losses a table cannot hold: too fast ones, and those around the floater.
 
-    Raises InputError: with the skin depth, and the conductivity or frequency up to which it would do.
-
-    `frequency`: of the rotor, Hz; `nearest`: how near the floater's centre comes to a face, m.
+    Raises InputError: with the skin depth, and the conductivity or frequency up to which it would do. `frequency`: of
+    the rotor, Hz; `nearest`: how near the floater's centre comes to a face, m.
     """
     refuse_wide_holes(pieces, nearest)
     for bodies, conductivity in pieces:

@@ -21,10 +21,7 @@ SAME = 1e-9  # Of polarisations that differ by round-off alone
 
 
 def united(magnets: Sequence[Magnet]) -> tuple[Magnet, ...]:
-    """The `magnets` where those that have a whole face in common, one material and one polarisation are one.
-
-    Cuboids join at any face, cylinders and rings at their ends; one that is made so has no conductivity.
-    """
+    """The `magnets`, one of those that share a face (cylinders an end), material and polarisation."""
     found = list(magnets)
     while pair := next(
         ((i, k, one) for i, k in combinations(range(len(found)), 2) if (one := _joined(found[i], found[k]))), None
@@ -120,10 +117,7 @@ class Cells:
 
 
 def cells_of(body: Solid, nearest: float) -> Cells:
-    """Cells for expansions that are used from the distance `nearest` (m) from the surface on; a cuboid stays whole.
-
-    A cuboid that is too long is cut before, see `cut_magnets`. Raises InputError as that does.
-    """
+    """Cells for expansions `nearest` (m) from the surface; a cuboid stays whole. Raises InputError: too many."""
     counts = np.ones(3, dtype=int)
     while True:
         cells = _cells(body, (int(counts[0]), int(counts[1]), int(counts[2])))

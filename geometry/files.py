@@ -50,10 +50,9 @@ def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> Bin
     """A file that a user named, opened for reading once it is known to be one: others may block, or never end.
 
     Raises InputError: there is none, it cannot be opened, is a folder, pipe, device or socket, or is larger. Returns
-    the file, to be closed; a library that opens the path by itself needs no more than that it was given.
-
-    `path`: the file; `most_bytes`: its size may be so large; `name`: what messages call the input, such as `points`;
-    `kind`: what it must be, with its article, such as `a CSV file`.
+    the file, to be closed; a library that opens the path by itself needs no more than that it was given. `path`: the
+    file; `most_bytes`: its size may be so large; `name`: what messages call the input, such as `points`; `kind`: what
+    it must be, with its article, such as `a CSV file`.
     """
     found = _opened(path)
     if isinstance(found, str):
@@ -78,10 +77,7 @@ def file_content(path: str | Path, most_bytes: int, name: str, kind: str) -> byt
 
 
 def _opened(path: str | Path) -> BinaryIO | str:
-    """A regular file of a disk, opened; or why it is none, as the end of a sentence.
-
-    Looked at before, as opening a device may do something, and after, when no other can have taken its place.
-    """
+    """A regular file of a disk, opened, looked at before and after; or why it is none, as the end of a sentence."""
     if not isinstance(path, str | Path):  # a number would be taken for a file that is open already
         return f"received {shown(path)}"
     try:
@@ -132,10 +128,8 @@ def call_apart(seconds: float, function: Callable[..., Answer], *given: Any) -> 
     """Call a function of this package in another process.
 
     Raises LostError: the process took too long, or needed more than `MEMORY`; CrashError: it crashed; Exception:
-    whatever the function raises.
-
-    `seconds`: of processor time; `function`: at the top of its module; `*given`: its arguments, which like the answer
-    must be such that pickle takes them.
+    whatever the function raises. `seconds`: of processor time; `function`: at the top of its module; `*given`: its
+    arguments, which like the answer must be such that pickle takes them.
     """
     # -P: no module of the current folder. Processes of multiprocessing would run the user's script once more.
     command = [sys.executable, "-P", "-c", LAUNCH, f"{function.__module__}.{function.__qualname__}"]

@@ -30,10 +30,7 @@ def rotation_matrix(degrees_xyz: ArrayLike) -> Array:
 
 
 def rotation_angles(matrix: Array) -> Array:
-    """Degrees (3,) about the fixed x, then y, then z axis by which `rotation_matrix` makes this matrix.
-
-    Where y is ±90°, x and z are one turn, and x is 0; elsewhere y is between.
-    """
+    """Degrees (3,) about fixed x, y and z of a `rotation_matrix`; where y is ±90°, x is 0."""
     across = np.hypot(matrix[0, 0], matrix[1, 0])
     x = np.arctan2(matrix[2, 1], matrix[2, 2]) if across > ROUND_OFF else 0.0
     second = matrix[:, 1] * np.cos(x) - matrix[:, 2] * np.sin(x)  # column of the matrix without the turn about x
@@ -54,10 +51,7 @@ def unturned() -> Array:
 
 
 class Body:
-    """A solid with a centre (3,) m and a rotation (3, 3), whose columns are the body axes.
-
-    `kind` is the shape's name in a scene file, `size` (3,) m the edges of the box about it along the body axes.
-    """
+    """A solid with a centre (3,) m, a rotation (3, 3), its columns the body axes, and a box of edges `size` (3,) m."""
 
     kind: ClassVar[str]
     center: Array
@@ -223,10 +217,7 @@ class Box(Body):
 
 @dataclass(frozen=True, eq=False)
 class Cylinder(Body):
-    """A round cylinder about the body's z, solid or with a hole (a ring of rectangular section, or tube).
-
-    Raises ValueError: the inner radius is not smaller than the outer one.
-    """
+    """A cylinder about the body's z, solid or with a hole. Raises ValueError: a hole not within it."""
 
     radius: float = field(metadata=METRES)
     height: float = field(metadata=METRES)

@@ -177,10 +177,7 @@ def _plane(a: Array, b: Array, c: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Compound(Body):
-    """Solids that are apart from each other, in the frame of the first.
-
-    `size` holds all of them about the first one's centre; `box` is that of the first alone, and `blocks` those of all.
-    """
+    """Solids apart from each other, in the first's frame: `box` is that one's, `blocks` and `size` of all."""
 
     bodies: tuple["Solid", ...]  # along the body axes, from the centre
     center: Array = field(default_factory=at_origin, metadata=METRES)
@@ -290,10 +287,7 @@ def moved(body: Some, center: Array, rotation: Array | None = None) -> Some:
 
 
 def known_shape(part: Part) -> Solid | None:
-    """The shape that the part has, in the same place, or None for a solid of any other shape.
-
-    Its body axes are those of the shape: as near to the part's own as they can be.
-    """
+    """The shape that the part has, in the same place, its axes as near to the part's as can be; None for any other."""
     for local in _candidates(part):
         distances = np.abs(local.distance(part.triangles.reshape(-1, 3)))
         alike = np.allclose([local.volume, local.area], [part.volume, part.area], rtol=SAME_SHAPE, atol=0.0)

@@ -63,10 +63,7 @@ def _measured(text: str) -> tuple[Any, ...]:
 
 
 def measured(text: str) -> tuple[str, Array, Array, Array, float, float, Array]:
-    """Fields of a `Part` from its BREP text on, of the solid of a STEP file's text.
-
-    Raises InputError where there is not one closed solid, with the end of a sentence that begins with the file.
-    """
+    """Fields of a `Part` from its BREP on, of a STEP file's text. Raises InputError: not one closed solid."""
     solids, faces = _solids(text)
     named = max(len(SOLID.findall(text)), len(solids))
     if len(solids) != 1 or named > 1:

@@ -102,10 +102,7 @@ def _hanging(scene: Scene, table: FieldTable, family: Family) -> Array:
 
 
 def hanging_distance(scene: Scene, table: FieldTable) -> float:
-    """Farthest distance on the axis, m, at which attraction by an upright moment carries the weight of the floater.
-
-    Of a `scene` with gravity along the axis, in the field of `table`. Raises EquilibriumError where there is none.
-    """
+    """Farthest distance on the axis, m, where upright attraction carries the weight. Raises EquilibriumError."""
     weight = scene.floater.mass * abs(float(scene.gravity[2]))
 
     def excess(distance: float) -> float:
@@ -153,10 +150,7 @@ class StableRange:
 
 
 def reference_state(scene: Scene) -> tuple[Array, float]:
-    """Scaled state (12,) and frequency (Hz) of a stable equilibrium of point dipoles, amid those from the fold on.
-
-    Raises EquilibriumError where there is none up to `HIGHEST`.
-    """
+    """Scaled state (12,) and frequency, Hz, of stable point dipoles amid those from the fold on."""
     table = rotor_table(scene.rotor, "dipole")
     if not (found := levitating_ranges(scene, table, Rates(with_effects(scene, table)))):
         raise EquilibriumError("Point dipoles levitate stably at none of the frequencies that are looked at.")
@@ -186,10 +180,9 @@ def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[Sta
 def branch_through(scene: Scene, rates: Rates, start: Array, frequency: float, spin: float = 0.0) -> list[BranchPoint]:
     """The branch through an equilibrium, both ways to the first fold, contact with the rotor or border.
 
-    Raises EquilibriumError: there is no equilibrium near `start`.
-
-    `scene`: gravity along the axis; `rates`: its equations of motion; `start`: scaled state (12,) of the equilibrium;
-    `frequency`: where it is, Hz; `spin`: body spin.
+    Raises EquilibriumError: there is no equilibrium near `start`. `scene`: gravity along the axis; `rates`: its
+    equations of motion; `start`: scaled state (12,) of the equilibrium; `frequency`: where it is, Hz; `spin`: body
+    spin.
     """
     walk = partial(one_way, replace(scene, plate=None), by_frequency(scene, rates, spin), start, frequency)
     below = walk(LOWEST if frequency > LOWEST else frequency / WIDEST)
@@ -357,10 +350,7 @@ def way_out(
 
 
 def _levitating_frequency(scene: Scene, table: FieldTable, memory: PlateMemory | None) -> tuple[float | None, bool]:
-    """A frequency (Hz) in the nearest window with a stable equilibrium, and whether with the plate's currents.
-
-    Not in a window that holds the scene's own; one beyond the reach of the plate's table is the last resort.
-    """
+    """A frequency (Hz) in the nearest other window with a stable equilibrium, and whether with the plate's currents."""
     # A map without plate, in upright gravity, finds the windows; with all that acts a search has to find one too.
     own, rates = scene.frequency, Rates(with_effects(scene, table))
     upright = replace(scene, plate=None, gravity=np.array([0.0, 0.0, scene.gravity[2]]))

@@ -104,10 +104,7 @@ class Grid:
 
 
 def filled(grid: Grid, nodes: Indices) -> tuple[Indices, Array, Array]:
-    """Points (k,) in order, positions and moments (k, 3) of all equilibria in a grid's ranges, by searches at `nodes`.
-
-    An equilibrium that is continued from point to point is good to round-off like any other.
-    """
+    """Points (k,) in order, positions and moments (k, 3) of all equilibria of a grid, by searches at `nodes`."""
     random, seeds = np.random.default_rng(0), []
     for first in range(0, len(nodes), TOGETHER):
         some = range(first, min(first + TOGETHER, len(nodes)))

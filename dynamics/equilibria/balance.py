@@ -58,10 +58,7 @@ class Balance:
         return np.concatenate([position, velocity, moment, spin], axis=1)
 
     def __call__(self, position: Array, moment: Array) -> tuple[Array, Array]:
-        """Balances (n, 5): force x, y, z and torque along two tangents; and their derivatives (n, 5, 5).
-
-        The derivatives are by x, y, z and by tilts of the moment along the same two tangents.
-        """
+        """Balances (n, 5), force and torque along two tangents; derivatives (n, 5, 5) by place and such tilts."""
         tangents = tangent_basis(moment)
         return self.rates.balance(position, moment, tangents, np.asarray(self.spin), self.values, self.still)
 

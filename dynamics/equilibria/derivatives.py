@@ -125,10 +125,7 @@ def _eigenvalue(pencil: Pencil, near: _ModeAt, value: complex) -> complex:
 
 
 class Implicit:
-    """An equilibrium's equations, factorised once for derivatives by many numbers.
-
-    `known`: of a body that is round about its moment, or its mean; `setting`: its equations.
-    """
+    """An equilibrium's equations, of a round body or its mean, factorised for derivatives by many numbers."""
 
     def __init__(self, known: Equilibrium, setting: Setting) -> None:
         self.known, self.setting = known, setting

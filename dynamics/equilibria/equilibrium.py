@@ -103,10 +103,7 @@ def spectra(states: Array, slopes: Array) -> Modes:
 
 
 def left_eigenvectors(right: Array) -> Array:
-    """Rows (..., k, k) dual to right eigenvectors (..., k, k), its columns.
-
-    The inverse takes a sixth of the time of the pseudoinverse, which stands in where eigenvectors have run together.
-    """
+    """Rows (..., k, k) dual to right eigenvectors, columns; a pseudoinverse takes six times as long."""
     try:
         return np.asarray(np.linalg.inv(right))
     except np.linalg.LinAlgError:  # one of them is singular to the last bit
@@ -138,10 +135,7 @@ class Mode:
 
 
 def free_directions(state: Array) -> tuple[Array, Array]:
-    """Directions (m, k) of a scaled state (m,) that keep what the equations keep, and projections (k, m) on them.
-
-    Of a round body those of `tangent_spaces`, of another one its turn about the rotor's axes is among them.
-    """
+    """Directions (m, k) of a scaled state (m,) that keep what the equations keep, and projections (k, m) on them."""
     if len(state) == 12:
         tangents, projections = tangent_spaces(state[None])
         return tangents[0], projections[0]
@@ -182,10 +176,7 @@ class EquilibriumError(ComputationError):
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """One synchronous equilibrium, along the rotor's axes.
-
-    Where a plate or tilted gravity forces the floater once a turn it is a periodic motion, and `state` its mean.
-    """
+    """One synchronous equilibrium, along the rotor's axes; of one that is a periodic motion `state` is the mean."""
 
     state: State  #: position m, velocity m/s, moment direction, spin rad/s
     spin: float  #: body spin s = Ω·m̂/ω

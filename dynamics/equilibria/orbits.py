@@ -281,11 +281,7 @@ def floquet_modes(orbit: Orbit) -> Modes:
 
 
 def _propagated(derivatives: Array, own_size: int, steps: int) -> Array:
-    """Propagator of deviations (steps + 1, s, s) after every step of a turn, of the floater's states and the plate's.
-
-    The plate's states, each of which decays by itself, are eliminated from the equations of a step's stages: what is
-    solved for are the floater's slopes alone.
-    """
+    """Propagator (steps + 1, s, s) of deviations of the floater's states and the plate's, by steps of a turn."""
     count, size = derivatives.shape[:2]
     step = 2 * np.pi / steps
     spectrum = np.fft.rfft(derivatives, axis=0) / count
@@ -439,10 +435,7 @@ class ForcedMotion:
 
 
 def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None, str, float]:
-    """States of an orbit at the whole of the way, by arc length from those (n, m) at a part of it that is done.
-
-    Where there is none, why, and up to which part there is one: a curve that turns back is one of a fold.
-    """
+    """States of an orbit at the whole of the way, by arc length from those (n, m) at a part; or why, and to where."""
     last, tangent = np.append(states.ravel() / np.sqrt(len(states)), done), np.zeros(states.size + 1)
     farthest = done
 

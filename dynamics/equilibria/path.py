@@ -250,10 +250,8 @@ def continued(
     """Equilibria to which others lead while the parameters of their problem change steadily to those of another one.
 
     Returns which (k,) were followed; whether to the end, or beyond a fold to others at the start; position and moment
-    (k, 3).
-
-    `start`, `end`: with the same equations; `position`, `moment`: (n, 3) of equilibria at the start, scaled; `bound`:
-    farther from the origin than this, in floater radii, none is followed.
+    (k, 3). `start`, `end`: with the same equations; `position`, `moment`: (n, 3) of equilibria at the start, scaled;
+    `bound`: farther from the origin than this, in floater radii, none is followed.
     """
     places, turned, size = solve(end, position, moment, EVERY, NEWTON_STEPS)
     apart = np.linalg.norm(np.concatenate([places - position, turned - moment], axis=1), axis=1)

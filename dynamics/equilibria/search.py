@@ -158,10 +158,7 @@ def _survey_of_mean(
     watch: Watch,
     quick: Rates | None = None,
 ) -> Survey:
-    """Equilibria of a body's mean over turns about its moment, from those of its multipoles, which are quicker.
-
-    `means` are those of `mean_over_turns`, and `quick` the rates of the last; all else as in `survey`.
-    """
+    """`survey` of a body's mean over turns (`mean_over_turns`), from its multipoles, whose rates are `quick`."""
     round_scene, exactly, roughly = means
     scales, ratio = Scales.of(round_scene), round_scene.floater.spin_ratio
     values, own = parameters(round_scene, scales, frozen_spin=True), _own_spin(scene) * scales.time * ratio
@@ -279,10 +276,7 @@ def _of_shape(
 def _by_whole_body(
     scene: Scene, table: FieldTable, balance: Balance, where: Array, farthest: float
 ) -> tuple[Balance, Array]:
-    """Balance of a floater by as many dipoles all over it as its force takes, and the points (n, 6) where it vanishes.
-
-    From those of its multipoles, `where`; which overlap the rotor are left out, or reach where its field is not known.
-    """
+    """Balance of as many dipoles all over a floater as its force takes, and points (n, 6) where it vanishes."""
     round_scene, exactly, _ = mean_over_turns(scene, table)
     scales = Scales.of(round_scene)
     exact = replace(balance, rates=Rates(exactly), values=parameters(round_scene, scales, frozen_spin=True))
@@ -364,9 +358,8 @@ def with_plate(
     """The equilibria of a survey with the plate's currents: periodic motions, followed from those without.
 
     Those beyond the range of the plate's table stay as they are, without `currents`; those that the plate removes or
-    pushes against a body, and those that overlap one, are left out.
-
-    `scene`, `table`, `rates`: as for the survey `known` without the plate's currents; `memory`: these currents.
+    pushes against a body, and those that overlap one, are left out. `scene`, `table`, `rates`: as for the survey
+    `known` without the plate's currents; `memory`: these currents.
     """
     known, rates = free_of_bodies(scene, known), rates or Rates(with_effects(scene, table))
     whole = [e for e in known.equilibria if of_whole_body(scene, rates, e) and not scene.floater.mean]

@@ -40,10 +40,7 @@ class TooLargeError(ComputationError):
 
 
 def memory_need(space: ngsolve.FESpace, free: ngsolve.BitArray) -> tuple[float, float]:
-    """Bytes that a symmetric system on the `free` unknowns of a space will take, with static condensation.
-
-    For the matrix with what is condensed, and for the triangular factor; at one time `PEAK` of both at most.
-    """
+    """Bytes of a symmetric system on `free` unknowns: the matrix with what is condensed, and the factor."""
     mesh, number = space.mesh, 16 if space.is_complex else 8
     sizes = [sum(dof >= 0 for dof in space.GetDofNrs(ngsolve.ElementId(ngsolve.VOL, k))) for k in range(int(mesh.ne))]
     separator = free.NumSet() * mesh.ne ** (2 / 3) / max(mesh.nface, 1)
@@ -53,9 +50,8 @@ def memory_need(space: ngsolve.FESpace, free: ngsolve.BitArray) -> tuple[float, 
 def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str) -> None:
     """Refuse a system that the free memory does not hold, before anything of it is made.
 
-    Raises TooLargeError: it says how much is needed, how much there is, and `way_out`.
-
-    `space`, `free`: NGSolve space, and its unknowns that are solved for; `way_out`: what the user can do.
+    Raises TooLargeError: it says how much is needed, how much there is, and `way_out`. `space`, `free`: NGSolve space,
+    and its unknowns that are solved for; `way_out`: what the user can do.
     """
     need, there = PEAK * sum(memory_need(space, free)), free_memory()
     if need > there:

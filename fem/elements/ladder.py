@@ -130,10 +130,7 @@ def _images(
 
 
 def _face_moments(solution: Solution, k: int, degree: int, faces: tuple[Array, Array, Array]) -> Coefficients:
-    """Coefficients of (μ - 1) ∇ψ of box number k, from its meshed share; the cuts add up to nothing.
-
-    `faces` are points (n, 3) m on all boundaries, and there the areas and ψ in the units of the mesh.
-    """
+    """Coefficients of (μ - 1) ∇ψ of box number k, of points (n, 3) m on `faces`, areas and ψ; cuts add nothing."""
     mesh, (points, areas, potential) = solution.system.mesh, faces
     magnet = mesh.magnets[k]
     box, susceptibility = magnet.box, magnet.permeability_in_rotor - np.eye(3)
@@ -283,10 +280,8 @@ def potential_slopes(solution: RotorSolution, points: Array, beside: Array) -> t
 
     ∇ψ converges as h^p, its slope one order slower. Next to a face, nearer than some 1e-4 of an element, the mesh may
     find a point on the wrong side: where the material is not that of the place `beside`, ∇ψ is continued from there by
-    its slope.
-
-    `solution`: of the rotor; `points`: (n, 3) m in the ball; `beside`: (n, 3) m, for each point a place farther from
-    the face on the same side.
+    its slope. `solution`: of the rotor; `points`: (n, 3) m in the ball; `beside`: (n, 3) m, for each point a place
+    farther from the face on the same side.
     """
     mesh, planes, axes = solution.mesh, solution.symmetry.planes, solution.symmetry.axes
     places, others = _in_mesh(solution, points), _in_mesh(solution, beside)

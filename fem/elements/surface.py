@@ -77,10 +77,7 @@ def _lagrange(places: Array, count: int) -> Array:
 
 
 def _about(place: Array, scale: Array, half: float, count: int) -> tuple[Array, Array, Array]:
-    """Places (..., m), weights, and distances from (`place`, `scale`) of a rule from -half to half, fine about `place`.
-
-    It is graded towards both ends, too, where the polynomials in u have no derivatives.
-    """
+    """Places (..., m), weights, distances of a rule from -half to half, fine about `place` and at both ends."""
     x, weights = graded(count)
     low, high = np.arcsinh((-half - place) / scale)[..., None], np.arcsinh((half - place) / scale)[..., None]
     angle = (low + high) / 2 + (high - low) / 2 * x

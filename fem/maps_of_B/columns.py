@@ -17,11 +17,7 @@ class FieldMapError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class FieldMap:
-    """Observed field components at points in any order.
-
-    Raises FieldMapError: wrong shapes, a point or field that is infinite, a point that is NaN, an error that is not
-    positive.
-    """
+    """Observed field components at points in any order. Raises FieldMapError: wrong shapes, or values."""
 
     points: Array  #: (n, 3) m, rotor's frame
     field: Array  #: (n, 3) T; NaN where a component was not observed
@@ -176,9 +172,8 @@ def column_of(title: str) -> Column | None:
 def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = False) -> dict[int, Column]:
     """Columns of a map by number, also those that are one but for what `reading.columns` says.
 
-    `x_index` is none beside `x_mm`.
-
-    `titles`: of all columns; `reading`: of the scene; `vectors`: whether a column can hold all components.
+    `x_index` is none beside `x_mm`. `titles`: of all columns; `reading`: of the scene; `vectors`: whether a column can
+    hold all components.
     """
     found: dict[int, Column] = {}
     for k, title in enumerate(titles):
@@ -194,9 +189,8 @@ def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = Fa
 def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) -> dict[int, Column]:
     """The columns of a map among `titles` by number: each quantity once, of several those that `reading.columns` gives.
 
-    `vectors`: as of `known_columns`.
-
-    Raises FieldMapError: two columns for one quantity, or none that has what `reading.columns` says.
+    `vectors`: as of `known_columns`. Raises FieldMapError: two columns for one quantity, or none that has what
+    `reading.columns` says.
     """
     known = known_columns(titles, reading, vectors)
     if reading.columns and any(c.is_field for c in known.values()):

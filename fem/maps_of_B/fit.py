@@ -107,10 +107,9 @@ def fit_harmonics(
     that expectation (a ridge) decides where the data do not, and keeps the normal equations regular. The degree is the
     one that predicts held-out observations best (cross-validation); the fit is then made with all of them. How the fits
     without one group differ gives the error (jackknife; B. Efron, The Jackknife, SIAM 1982, ch. 3), whatever the
-    distribution of the noise; what the expectation alone decides is added to it.
-
-    `points`: (n, 3) m; `field`: (n, 3) T, NaN where a component was not observed; `errors`: (n, 3) standard errors, T;
-    only their ratios matter; `generator`: chooses the groups.
+    distribution of the noise; what the expectation alone decides is added to it. `points`: (n, 3) m; `field`: (n, 3) T,
+    NaN where a component was not observed; `errors`: (n, 3) standard errors, T; only their ratios matter; `generator`:
+    chooses the groups.
     """
     groups = generator.permutation(len(points)) % GROUPS
     parts = np.array([_normal_matrix(basis, points, field, errors, groups == k) for k in range(GROUPS)])

@@ -231,10 +231,7 @@ class GriddedTable:
 
     @keeps_shape
     def evaluate(self, points: Array) -> tuple[Array, Array]:
-        """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m in the rotor's frame.
-
-        Raises RangeError: a point lies where the map does not determine the field.
-        """
+        """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m, rotor's frame. Raises RangeError."""
         known = self.in_range(points)
         if not known.all():
             parts = [f"{e.radius * 1e3:.4g} mm from {millimetres(e.center)}" for e in self.expansions.expansions]
@@ -356,10 +353,7 @@ def _left_out(
 
 
 def _tail(spectrum: Array) -> Coefficients:
-    """Coefficients (T) that continue a spectrum to degree `TAIL`, nothing in its own degrees; which order is no matter.
-
-    Of the last eight degrees the field falls in the mean by a ratio each, or is level.
-    """
+    """Coefficients (T) that continue a spectrum to degree `TAIL`, falling as its last eight did, or level."""
     last, before = spectrum[-4:].max(), spectrum[-8:-4].max(initial=0.0)
     ratio = min((last / before) ** 0.25, 1.0) if before > 0 else 1.0
     coefficients = np.zeros((TAIL + 1, TAIL + 1), complex)

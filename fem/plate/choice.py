@@ -178,7 +178,6 @@ def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, rad
 
     The box about `center` and its image under the lowering are united; what is nearer to the plate than the floater's
     radius is cut off. Raises InputError: the centre is not farther than the radius from the plate's face, all the way.
-
     `center`, `half_edges`: (3,) m, box along the laboratory's axes, where the floater may be; `radius`: of the floater,
     m.
     """
@@ -253,10 +252,7 @@ def rotor_nearby(
 
 
 def _rastered(region: Region, plate: Plate, radius: float, shared: bool = False) -> Region:
-    """The region with bounds on the raster, but not nearer to the face that it lies over than `SKIN` radii (m).
-
-    What is nearly symmetric becomes so, which halves the work. To be `shared` it has its centre on a raster as well.
-    """
+    """The region on the raster, `SKIN` radii (m) off the face, made symmetric if nearly so; to be `shared` or not."""
     lower, upper = np.floor(region.lower / RASTER + 1e-6), np.ceil(region.upper / RASTER - 1e-6)
     if shared:
         step = CENTERS / RASTER

@@ -448,10 +448,7 @@ def solve_currents(
 
 
 def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
-    """Bound of the largest relative error of the sources' fields at the probes in the first box.
-
-    Dipoles in the second box stand for the sources (plate's frame); what is left of these counts in full.
-    """
+    """Bound of the relative error of sources' fields at the first box's probes; the second's stand for them."""
     space = solution.space
     inside = solution.boxes[0].contains(solution.probes)
     standing = solution.boxes[1].contains(solution.probes)

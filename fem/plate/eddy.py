@@ -146,10 +146,7 @@ class ShiftedSystem:
         self.form = form
 
     def solver(self, parity_class: Sequence[int]) -> tuple[Callable[[Array], NDArray[Any]], int]:
-        """A factor of one parity class, which turns loads into reactions (sources, unknowns), and its unknowns.
-
-        Reactions A = -s (curl curl + s μ0 σ)⁻¹ μ0 ∫ σ A_s·v, T m, are complex as the shift is.
-        """
+        """A class's factor, of loads to reactions -s (curl curl + s μ0 σ)⁻¹ μ0 ∫ σ A_s·v, and its unknowns."""
         free = self.space.free_unknowns(parity_class, self.fes)
         inverse = self.form.mat.Inverse(free, inverse="sparsecholesky")
         return lambda loads: solve_condensed(self.form, inverse, -self.shift * MU_0 / MILLIMETRE * loads), sum(free)
@@ -404,11 +401,9 @@ def plate_reaction(
     """Reaction tensors of `plate` at `positions` (n, 3), m, and `frequency`, Hz, phasors e^{+iωt}.
 
     Raises ValueError: a position inside the plate, a size, a conductivity or a frequency out of range; AccuracyError:
-    `rtol` not reached after all refinements of the mesh, or with `MOST_UNKNOWNS`.
-
-    `plate`: its body may have any pose; it is solved in its own frame; `positions`: laboratory frame, outside the
-    plate; `rtol`: estimated relative error asked of every own tensor; `rule`: first mesh; `refinements`: how often the
-    mesh may be refined.
+    `rtol` not reached after all refinements of the mesh, or with `MOST_UNKNOWNS`. `plate`: its body may have any pose;
+    it is solved in its own frame; `positions`: laboratory frame, outside the plate; `rtol`: estimated relative error
+    asked of every own tensor; `rule`: first mesh; `refinements`: how often the mesh may be refined.
     """
     places = np.asarray(positions, float).reshape(-1, 3)
     if frequency == 0:

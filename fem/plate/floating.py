@@ -179,10 +179,8 @@ class FloatingModes:
 
         Exact for fluxes that change steadily from place to place.  With G and its derivative along the way (n, 2,
         states, sources), √J/A, x G' is the drag, and x by the difference of two sources' G the force along what parts
-        them.
-
-        `way`: (n,) m, places as of `heights`, at equal distances; there are no currents at the first; `speed`: m/s; the
-        first source has 1 A.
+        them. `way`: (n,) m, places as of `heights`, at equal distances; there are no currents at the first; `speed`:
+        m/s; the first source has 1 A.
         """
         fluxes = np.array([self.flux(place) for place in way])
         lasts = self.rates * (way[1] - way[0]) / speed

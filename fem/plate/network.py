@@ -180,11 +180,9 @@ def from_elements(
 ) -> Reduction:
     """Networks of `plate` for a region within the boxes and frequencies (Hz) within those of a `solution`.
 
-    Raises AccuracyError: (the reduction) all of the solution's states do not suffice.
-
-    `rtol`: relative accuracy of reaction tensors (Frobenius norm) and of the fields of `others`; `others`: more sources
-    whose currents the networks shall hold: the rotor's; `space_error`: what the solution's states miss of these,
-    relative.
+    Raises AccuracyError: (the reduction) all of the solution's states do not suffice. `rtol`: relative accuracy of
+    reaction tensors (Frobenius norm) and of the fields of `others`; `others`: more sources whose currents the networks
+    shall hold: the rotor's; `space_error`: what the solution's states miss of these, relative.
     """
     space, (low, high) = solution.space, frequencies
     # Classes of the plate's mirrors that do not mirror the region are mixed by every source: they share their states.

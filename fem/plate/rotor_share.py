@@ -158,10 +158,9 @@ def rotor_share(
 ) -> RotorShare:
     """Signals of a rotor for the pose and the way of `plate`.
 
-    Raises AccuracyError: the tolerance is not met with the most terms.
-
-    `network`: of a plate of the same size and conductivity, or of what stands for it; `tolerance`: for the estimated
-    error; harmonics and depths are added until it is met; `watch`: progress callback.
+    Raises AccuracyError: the tolerance is not met with the most terms. `network`: of a plate of the same size and
+    conductivity, or of what stands for it; `tolerance`: for the estimated error; harmonics and depths are added until
+    it is met; `watch`: progress callback.
     """
     parts, distance = rotor_parts(rotor, plate, UNNOTICED * tolerance), plate.way
     cached: dict[tuple[float, float], Array] = {}

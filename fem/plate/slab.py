@@ -108,7 +108,6 @@ def drag_and_lift(slab: Slab, height: float, speed: float) -> tuple[float, float
     """Drag on and lift of a vertical dipole of 1 A m² over a `slab` that moves, N/(A m²)².
 
     Each wave of the dipole's field comes back at the frequency kₓv/2π (J. R. Reitz, J. Appl. Phys. 41, 2067 (1970)).
-
     `height`: of the dipole over the face, m; `speed`: m/s.
     """
     k, dk = wave_numbers(np.asarray(height))
@@ -203,10 +202,8 @@ def modes_needed(slab: Slab, wave_number: float, frequency: float, tolerance: fl
     """Number of modes that leave out less than a tolerance of the reflection.
 
     What N modes leave out is 4 k κ² t³ / (3 π⁴ N³), κ² = ωμ0σ, of a reflection near 1, and 16 (kt)³ / (3 π⁴ N³) of one
-    in the limit of slow changes; in between the sum is enough.
-
-    `slab`: its thickness t and conductivity σ; `wave_number`, `frequency`: the highest, 1/m and Hz; `tolerance`: of the
-    reflection, whose largest value is 1.
+    in the limit of slow changes; in between the sum is enough. `slab`: its thickness t and conductivity σ;
+    `wave_number`, `frequency`: the highest, 1/m and Hz; `tolerance`: of the reflection, whose largest value is 1.
     """
     kt, squared = wave_number * slab.thickness, 2 * np.pi * frequency * MU_0 * slab.conductivity * slab.thickness**2
     return int(np.ceil(np.cbrt(4 * kt * (squared + 4 * kt * kt) / (3 * np.pi**4 * tolerance)))) + 4

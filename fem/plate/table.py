@@ -168,15 +168,14 @@ class PlateTable:
 
         dp_i/dt = -λ_i (p_i - s_i),    s_i = b_i(x)·m + other sources,    y_i = p_i - s_i,
 
-    with the currents y_i.  On a dipole m at x act the field B = Σ y_i b_i(x), hence the torque m × B, and the force
-    Σ y_i ∇(m·b_i); the currents hold the energy ½ Σ y_i² and lose the power Σ λ_i y_i².  As the force is the exact
+    with the currents y_i.  On a dipole m at x act the field B = Σ y_i b_i(x), hence the torque m × B, and the force Σ
+    y_i ∇(m·b_i); the currents hold the energy ½ Σ y_i² and lose the power Σ λ_i y_i².  As the force is the exact
     gradient of the same b_i, work, stored energy and loss add up to nothing, always.  Phasors e^{+iωt}:
 
         B = G m,    G(x, ω) = -iω Σ b_i b_iᵀ / (λ_i + iω).
 
     The network is passive by construction.  There is no quasi-static remainder: added to the states left out, it was
     found to double their error at the highest frequency.
-
     """
 
     size: Array = field(metadata={"units": "m"})  # (3,) edges of the plate
@@ -205,10 +204,7 @@ class PlateTable:
         ])  # fmt: skip
 
     def field_functions(self, points: ArrayLike) -> tuple[Array, Array]:
-        """b_i (n, states, 3), T/√J, and ∂b_ia/∂x_c (n, states, 3, 3), T/(√J m), at points (n, 3), m.
-
-        Raises RangeError: a point outside the region.
-        """
+        """b_i (n, states, 3), T/√J, and ∂b_ia/∂x_c (n, states, 3, 3) at points (n, 3) m. Raises RangeError."""
         points = np.asarray(points, float).reshape(-1, 3)
         known = self.in_range(points)
         if not known.all():
@@ -228,10 +224,7 @@ class PlateTable:
         return self.region.contains(points)
 
     def reaction_tensor(self, points: ArrayLike, frequency: float) -> ComplexArray:
-        """G (n, 3, 3), T/(A m²), at points (n, 3), m, and a frequency, Hz: symmetric and passive to round-off.
-
-        Raises RangeError: a point outside the region, or a frequency not between 0 and the highest of the table.
-        """
+        """G (n, 3, 3), T/(A m²), at points (n, 3) m and a frequency, Hz: symmetric and passive. Raises RangeError."""
         if not 0 <= frequency <= self.frequencies[1]:
             raise RangeError(
                 f"Input frequency_hz must be between 0 and {self.frequencies[1]:g}, for which the table was made; "

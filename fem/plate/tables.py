@@ -144,10 +144,9 @@ def changed_shares(
 ) -> Array:
     """Series (k, 2H+1, states) √J in the angle of k other rotors and poses of a plate that has not gone down.
 
-    Raises ComputationError: the network comes out otherwise than when the table was made.
-
-    `known`: the table and the share, of whose network and harmonics they are; `requested`: what these were made of, see
-    `plate_and_rotor_table`; `others`: the plate in another pose, and another rotor; `slab`, `solve`, `watch`: as there.
+    Raises ComputationError: the network comes out otherwise than when the table was made. `known`: the table and the
+    share, of whose network and harmonics they are; `requested`: what these were made of, see `plate_and_rotor_table`;
+    `others`: the plate in another pose, and another rotor; `slab`, `solve`, `watch`: as there.
     """
     (table, share), (plate, rotor, region, frequencies, rtol) = known, requested
     reduced = _reduction(plate, rotor, region, frequencies, rtol, None, solve, slab, watch)

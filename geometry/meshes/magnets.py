@@ -223,10 +223,7 @@ MESHIO_SHAPES = {
 
 
 def to_meshio(mesh: MagnetMesh) -> meshio.Mesh:
-    """The mesh with straight edges, coordinates in m, and the region of every cell as Gmsh has it in cell data.
-
-    Region k + 1 is `magnet{k}`, the last one is `air`; the names are in `field_data`.
-    """
+    """The mesh with straight edges in m; Gmsh's regions are k + 1 of `magnet{k}`, and of air the last."""
     import meshio
 
     regions = {name: k + 1 for k, name in enumerate(mesh.mesh.GetMaterials())}

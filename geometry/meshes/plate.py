@@ -59,10 +59,7 @@ SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
 def graded_partition(breakpoints: Sequence[float], size: SizeFunction) -> Array:
-    """Increasing grid lines that hold all `breakpoints` and whose spacing follows `size`.
-
-    Between neighbouring breakpoints the lines share ∫ dx/size equally, so that no cell is larger than asked for.
-    """
+    """Increasing lines with all `breakpoints`, which share ∫ dx/size between: no cell is larger."""
     if np.any(np.diff(breakpoints) <= 0):
         raise ValueError(f"Input breakpoints must increase; instead received {list(breakpoints)}.")
     lines = [float(breakpoints[0])]

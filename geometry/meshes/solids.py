@@ -109,10 +109,7 @@ def _turned(shape: Any, rotation: Array) -> Any:
 
 
 def part_rule(body: Part, order: int) -> tuple[Array, Array]:
-    """Points (n, 3) m in a part and weights (n,) m³, on curved tetrahedra, for polynomials up to about `order`.
-
-    Raises MeshError for a part that cannot be meshed, ComputationError where that takes too long or too much memory.
-    """
+    """Points (n, 3) m and weights (n,) m³ in a part, to about `order`. Raises MeshError, ComputationError."""
     try:
         points, weights = _rule(body.brep, order)
     except LostError as error:

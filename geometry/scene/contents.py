@@ -81,10 +81,7 @@ class Plate:
 
 @dataclass(frozen=True, eq=False)
 class Coil:
-    """A round coil about an axis along z, of rectangular cross-section.
-
-    Its current is `current` sin(2π `frequency` t + `phase`), steady where `frequency` is 0, or a table of time.
-    """
+    """A round coil along z, its current steady, `current` sin(2π `frequency` t + `phase`), or a table of time."""
 
     center: Array  # (3,) m
     radius: float  # of the middle of the winding, m

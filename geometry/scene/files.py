@@ -160,10 +160,8 @@ def changed(scene: Scene, changes: Mapping[str, float], source: str = "scene", k
 def driven(scene: Scene, steps: Sequence[Mapping[str, Any]], source: str = "drive", **keys: Any) -> Scene:
     """The scene with other steps of its drive.
 
-    Raises SceneError: as of `changed`.
-
-    `scene`: it stays as it is; `steps`: tables of `[[drive]]`, with the keys of the scene file; `source`: what messages
-    call it; `keys`: others of the whole file, which take the place of the scene's.
+    Raises SceneError: as of `changed`. `scene`: it stays as it is; `steps`: tables of `[[drive]]`, with the keys of the
+    scene file; `source`: what messages call it; `keys`: others of the whole file, which take the place of the scene's.
     """
     found = assemble(scene_keys(scene) | {"drive": _plain(steps)} | keys, source, Path())
     _check_same(scene, found.files, source)
@@ -305,10 +303,7 @@ def startless_text(scene: Scene) -> str:
 
 
 def scene_keys(scene: Scene) -> dict[str, Any]:
-    """The keys of a scene file that describe a scene, as tables within tables, files named from the folder at hand.
-
-    What was replaced since the scene was made of keys, or never had any, is written from the object.
-    """
+    """The keys of a scene file that describe a scene; what was replaced since is written from the object."""
     own = scene.keys[0] if scene.keys else {}
     found = {
         name: copy.deepcopy(own.get(name)) if _as_written(scene, name) else written(scene)
@@ -350,10 +345,7 @@ def canonical_keys(scene: Scene) -> dict[str, Any]:
 
 
 def scene_digest(scene: Scene) -> str:
-    """SHA-256 of what a scene says and of the content of the files that it names, whatever their names are.
-
-    Comments do not count. Of a file that was read with the scene it is the content that was read.
-    """
+    """SHA-256 of what a scene says and of the contents of its files as they were read, whatever their names are."""
     keys, metal = canonical_keys(scene), scene.plate.body.placed if scene.plate else ()
     bodies = [*(magnet.body for magnet in scene.rotor), *metal]
     contents = {str(body.file): str(body.shape_numbers) for body in bodies if isinstance(body, Part)}

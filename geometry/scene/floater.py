@@ -215,10 +215,7 @@ class Floater:
         return Floater(radius, self.remanence, self.recoil_permeability, self.density)
 
     def axes(self, orientation: Array, near: Array | None = None) -> Array:
-        """(3, 3) axes of its frame as columns where the moment points along an `orientation` (3,); those if given.
-
-        Turned about it so that x of the scene file is near a direction (3,); left out, as little as can be.
-        """
+        """(3, 3) axes, columns; moment along an `orientation` (3,), the file's x `near` a direction; or as given."""
         if orientation.ndim == 2:
             return orientation
         moment = orientation

@@ -377,10 +377,7 @@ def _shape_faults(place: str, table: Any) -> Iterator[str]:
 
 
 def unusual(scene: Scene) -> str:
-    """A sentence about polarisations, sizes and distances that no magnet of a laboratory has; empty if all are usual.
-
-    Mistaken units are most often the cause: all keys name theirs.
-    """
+    """A sentence about sizes, distances, polarisations of no laboratory, as of wrong units; empty if usual."""
     floaters = [one.floater for one in scene.each]
     strongest = max(
         [*(one.remanence for one in floaters), *(float(np.linalg.norm(one.polarization)) for one in scene.rotor)]
