@@ -433,7 +433,7 @@ def solve_currents(
     while True:
         if ladder.expected() <= HOPEFUL * ladder.allowed or ladder.order + 1 == ladder.highest:
             space, missed, omegas, residuals = train(
-                ladder.next_space(), grid, probes, others, frequencies, SPACE_SHARE * rtol, watch
+                EddySpace(ladder.mesh, ladder.order + 1), grid, probes, others, frequencies, SPACE_SHARE * rtol, watch
             )
             couplings = space_couplings(space.dipole_couplings(corners), space.inductances, 2 * np.pi * frequencies[1])
             ladder.take(couplings)

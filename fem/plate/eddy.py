@@ -324,13 +324,10 @@ class Ladder:
     def error(self) -> float:
         return float(self.errors.max())
 
-    def next_space(self) -> EddySpace:
-        return EddySpace(self.mesh, self.order + 1)
-
     def climb(self) -> None:
         """Solve for the dipoles at the next order."""
         self.watch(f"error at order {self.order + 1}", 0.0)
-        space, dipoles = self.next_space(), unit_dipoles(self.places)
+        space, dipoles = EddySpace(self.mesh, self.order + 1), unit_dipoles(self.places)
         if self.growing:
             response = solve_shifted(space, 2 * np.pi * self.frequency, dipoles)
         else:

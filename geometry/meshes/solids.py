@@ -4,11 +4,11 @@ import contextlib
 import logging
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import netgen.occ as occ
 import ngsolve as ng
@@ -37,6 +37,8 @@ WITHIN = 1e-9  # Relative difference of volumes above which a cavity does not li
 # The time, and a count of the files that the process has written: the rest is the same for the same solid.
 OWN_WORDS = re.compile(r"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'|(?<=translator )[\d. ]+(?=')")
 SIMPLER = "Leave out small features of the part, or export it again."
+Try = TypeVar("Try")
+Made = TypeVar("Made")
 
 
 def occ_solid(body: Solid, center: Array, unit: float) -> Any:
@@ -77,20 +79,29 @@ def mesh_metal(bodies: Sequence[Solid]) -> SolidMesh:
     """Mesh of bodies that touch, without air. Raises MeshError."""
     center = np.mean([body.center for body in bodies], axis=0)
     unit = min(body.volume for body in bodies) ** (1 / 3)
-    shape = occ_solid(bodies[0], center, unit)
-    for body in bodies[1:]:
-        shape = shape + occ_solid(body, center, unit)
-    for finer in FINER:
-        sizes = {"maxh": METAL_LARGEST / finer, "curvaturesafety": METAL_ROUND}
-        try:
-            mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
-            break
-        except Exception as error:  # several kinds, as of a thin wall through which large elements would go
-            if finer == FINER[-1]:
-                said = " and ".join(body.described_size for body in bodies)
-                raise MeshError(f"Metal cannot be meshed for its currents: {error} ({said}). {SIMPLER}") from None
+    first, *others = (occ_solid(body, center, unit) for body in bodies)
+    what = f"Metal of {' and '.join(body.described_size for body in bodies)}"
+    sizes = [{"maxh": METAL_LARGEST / finer, "curvaturesafety": METAL_ROUND} for finer in FINER]
+    whole = sum(others, first)
+    mesh = first_made(sizes, lambda size: _generated(whole, what, **size))
     mesh.Curve(METAL_CURVED)
     return SolidMesh(mesh, frozen_array(center, (3,)), unit)
+
+
+def first_made(tries: Iterable[Try], make: Callable[[Try], Made]) -> Made:
+    """What is made of the first of several `tries` at which the mesher neither crashes nor raises MeshError."""
+    *others, last = tries
+    for one in others:
+        with contextlib.suppress(CrashError, MeshError):
+            return make(one)
+    return make(last)
+
+
+def _generated(shape: Any, what: str, **sizes: float) -> Any:
+    try:
+        return ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
+    except Exception as error:  # several kinds, as of a thin wall through which large elements would go
+        raise MeshError(f"{what} cannot be meshed: {error}. {SIMPLER}") from None
 
 
 def read_brep(brep: str) -> Any:
@@ -121,11 +132,7 @@ def part_rule(body: Part, order: int) -> tuple[Array, Array]:
 @lru_cache(maxsize=8)
 def _rule(brep: str, order: int) -> tuple[Array, Array]:
     logging.getLogger("spinlev").info("Mesh of a part from a STEP file ...")  # a damaged one takes its whole minute
-    *first, last = (share * SMALLEST for share in OTHERWISE)
-    for smallest in first:
-        with contextlib.suppress(CrashError, MeshError):
-            return call_apart(LONGEST, rule_in_solid, brep, order, smallest)
-    return call_apart(LONGEST, rule_in_solid, brep, order, last)
+    return first_made(OTHERWISE, lambda share: call_apart(LONGEST, rule_in_solid, brep, order, share * SMALLEST))
 
 
 def unmeshed(error: LostError, name: str) -> ComputationError:
@@ -142,10 +149,7 @@ def rule_in_solid(brep: str, order: int, smallest: float = SMALLEST) -> tuple[Ar
     solid = read_brep(brep)
     unit = float(solid.mass) ** (1 / 3)
     sizes = {"maxh": 0.6 * unit, "minh": smallest * unit, "curvaturesafety": ROUND, "grading": 0.6}
-    try:
-        mesh = ng.Mesh(occ.OCCGeometry(solid).GenerateMesh(**sizes, parallel_meshing=False))
-    except Exception as error:  # netgen raises several kinds
-        raise MeshError(f"The part cannot be meshed: {error}. {SIMPLER}") from None
+    mesh = _generated(solid, "The part", **sizes)
     mesh.Curve(CURVED)
     few, whole = ng.IntegrationRule(ng.TET, FEW), ng.IntegrationRule(ng.TET, max(order, FEW))
     corners = np.array([vertex.point for vertex in mesh.vertices])

@@ -179,7 +179,15 @@ def key_faults(table: schema.SceneTable) -> Iterator[str]:
     """One sentence for each rule between keys that is broken."""
     rotor, there = table.rotor, table.model_fields_set
     for k, start in enumerate(table.starts):
-        yield from _start_faults(f"start[{k}]" if isinstance(table.start, list) else "start", start)
+        place = f"start[{k}]" if isinstance(table.start, list) else "start"
+        if start.offset_mm is not None and start.position_mm is not None:
+            yield f"Input {place} must have offset_mm or position_mm; instead received both."
+        for key in ("velocity_mm_s", "moment", "spin_hz", "body_x"):
+            given = getattr(start, key)
+            if given is not None and start.position_mm is None:
+                yield f"Input {place}.{key} must come with {place}.position_mm; instead received it alone."
+            if given is not None and key in ("moment", "body_x") and not any(given):
+                yield f"Input {place}.{key} must be a direction, not zero; instead received {given}."
     if drag := table.drag:
         for key in ("linear_N_s_m", "angular_N_m_s"):
             if (getattr(drag, key) is not None) == bool(drag.model):
@@ -336,17 +344,6 @@ def _floater_faults(floater: schema.FloaterTable, whole: schema.SceneTable) -> I
             'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
             'sphere; instead received "air".'
         )
-
-
-def _start_faults(place: str, start: schema.StartTable) -> Iterator[str]:
-    if start.offset_mm is not None and start.position_mm is not None:
-        yield f"Input {place} must have offset_mm or position_mm; instead received both."
-    for key in ("velocity_mm_s", "moment", "spin_hz", "body_x"):
-        if getattr(start, key) is not None and start.position_mm is None:
-            yield f"Input {place}.{key} must come with {place}.position_mm; instead received it alone."
-    for key in ("moment", "body_x"):
-        if (given := getattr(start, key)) is not None and not any(given):
-            yield f"Input {place}.{key} must be a direction, not zero; instead received {given}."
 
 
 def _shape_faults(place: str, table: Any) -> Iterator[str]:
