@@ -12,29 +12,26 @@ solving again.
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
-from itertools import chain
 
 import ngsolve
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from ...geometry.common import MU_0, Array, Report, Watch, unwatched, watched
+from ...geometry.common import Array, Report, Watch, unwatched, watched
 from ...geometry.meshes.plate import PLANES, MeshRule
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box
 from ...geometry.solids import Solids
 from ..cache import TableKind
 from ..closed_forms.eddy_bodies import ComplexArray
+from ..closed_forms.potentials import unit_dipoles
 from ..elements.spaces import Parity
-from .eddy import CHUNK, MESH_SHARE, SILENT, EddySpace, Ladder, ShiftedSystem, Source, source_images
+from .eddy import MESH_SHARE, SILENT, EddySpace, Ladder, ShiftedSystem, Source, source_images
 from .table import Region
 
-# Component, moment's axis j, component of K and sign of what is not zero in e_j × K.
-CROSS = ((0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 0, 2, -1.0), (1, 2, 0, 1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0))
 PROBES = 6  # Dipoles at places off the grid, beside those at the region's corners
 # Places of the grid along an edge: at most, at least, and more for each distance to the plate that it is long.
 MOST_PLACES, FEWEST_PLACES, PER_GAP = 6, 3, 1.5
@@ -72,18 +69,9 @@ class CurrentSpace:
 
     def couplings(self, sources: Sequence[Source]) -> list[Array]:
         """b (sources, states) of each parity class."""
-        return self.image_couplings(source_images(self.parity, self.points, sources))
-
-    def dipole_couplings(self, places: ArrayLike) -> list[Array]:
-        """b (3 × places, states) of each parity class, of unit moments along x, y and z at places (m, 3), m."""
-        places = np.asarray(places, float).reshape(-1, 3)
-        return self.image_couplings(dipole_images(self.parity, self.points, places))
-
-    def image_couplings(self, images: Iterable[Array]) -> list[Array]:
-        """b (sources, states) of each parity class, of parts of potentials as `source_images` makes them."""
         weighted = [field * self.root for field in self.fields]
         found: list[list[Array]] = [[np.zeros((0, len(field)))] for field in weighted]
-        for part in images:
+        for part in source_images(self.parity, self.points, sources):
             for rows, image, states in zip(found, part, weighted, strict=True):
                 rows.append(image.reshape(len(image), -1) @ states.T)
         return [np.concatenate(rows) for rows in found]
@@ -96,29 +84,6 @@ def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: com
         for b_class, induct in zip(b, inductances, strict=True)
     ]
     return np.asarray(-shift * sum(parts))
-
-
-def dipole_images(parity: Parity, points: Array, places: Array) -> Iterator[Array]:
-    """Parity parts at `points`, as of `source_images`, of unit moments along x, y and z at each of `places` (m, 3) m.
-
-    A mirrored potential e_j × K is that of the mirrored kernel K = μ0/4π r/r³ but for a sign that depends on component
-    and moment, so that one kernel's parity parts serve all three moments of a place.
-    """
-    flips, characters = parity.flips, parity.characters
-    # By component: the class whose character is that of each class times the component's own sign.
-    partner = [
-        [int(np.flatnonzero((characters == row).all(axis=1))[0]) for row in characters * flip] for flip in flips.T
-    ]
-    for start in range(0, len(places), CHUNK):
-        some = places[start : start + CHUNK]
-        offset = (points * flips[:, None])[:, None] - some[:, None]
-        square = np.einsum("fmna,fmna->fmn", offset, offset)
-        offset *= (MU_0 / (4 * np.pi) / (square * np.sqrt(square)))[..., None]  # a power would take five times as long
-        parts = parity.project(offset)
-        images = np.zeros((len(flips), len(some), 3, len(points), 3))
-        for component, moment, kernel, sign in CROSS:
-            images[:, :, moment, :, component] = sign * parts[partner[component], :, :, kernel]
-        yield images.reshape(len(flips), -1, len(points), 3)
 
 
 def grid_counts(region: Region, body: Solids) -> tuple[int, int, int]:
@@ -180,7 +145,7 @@ class FieldRows:
         parity, points = self.space.parity, self.space.points
         found = np.empty((len(parity.classes), 3 * len(places) + len(others), self.space.root.size))
         start = 0
-        for part in chain(dipole_images(parity, points, places), source_images(parity, points, others)):
+        for part in source_images(parity, points, [*unit_dipoles(places), *others]):
             found[:, start : start + part.shape[1]] = part.reshape(len(found), -1, self.space.root.size)
             start += part.shape[1]
         found *= self.space.root
@@ -435,7 +400,9 @@ def solve_currents(
             space, missed, omegas, residuals = train(
                 EddySpace(ladder.mesh, ladder.order + 1), grid, probes, others, frequencies, SPACE_SHARE * rtol, watch
             )
-            couplings = space_couplings(space.dipole_couplings(corners), space.inductances, 2 * np.pi * frequencies[1])
+            couplings = space_couplings(
+                space.couplings(unit_dipoles(corners)), space.inductances, 2 * np.pi * frequencies[1]
+            )
             ladder.take(couplings)
             if ladder.error <= KEPT * ladder.allowed:
                 break
@@ -455,7 +422,7 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     images = np.concatenate(list(source_images(space.parity, space.points, sources)), axis=1)
     amplitudes, rest = _fitted(space, solution.probes[standing], images)
     stands, tested = np.repeat(standing, 3), np.repeat(inside, 3)
-    driving, testing = space.image_couplings([images]), space.dipole_couplings(solution.probes[inside])
+    driving, testing = space.couplings(sources), space.couplings(unit_dipoles(solution.probes[inside]))
     worst = 0.0
     for omega, residuals in zip(solution.angular_frequencies, solution.residuals, strict=True):
         left = np.sqrt(np.sum(amplitudes @ residuals[np.ix_(stands, stands)].real * amplitudes, axis=1)) + rest
@@ -471,7 +438,7 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
 def _fitted(space: CurrentSpace, places: Array, images: Array) -> tuple[Array, Array]:
     """Amplitudes (sources, 3 × places) of dipoles that stand for the sources, and norms (sources,) of the rest."""
     wanted = images.reshape(*images.shape[:2], -1)
-    standing = np.concatenate(list(dipole_images(space.parity, space.points, places)), axis=1)
+    standing = np.concatenate(list(source_images(space.parity, space.points, unit_dipoles(places))), axis=1)
     standing = standing.reshape(*standing.shape[:2], -1)
     squares = space.root**2
     products = sum((part * squares) @ part.T for part in standing)

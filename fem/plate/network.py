@@ -24,6 +24,7 @@ from ...geometry.common import Array, Watch
 from ...geometry.scene.contents import Plate
 from ...geometry.solids import Solids
 from ..closed_forms.eddy_bodies import ComplexArray
+from ..closed_forms.potentials import unit_dipoles
 from .currents import STRICT, OtherSources, PlateSolution, grid_counts, probe_places, space_couplings, unit_power
 from .eddy import Source
 from .multipoles import Multipoles, fit_multipoles, real_kinds
@@ -198,7 +199,7 @@ def from_elements(
     probes = probe_places(region, plate.body.mirrors)
     grid = region.grid(grid_counts(region, plate.body), plate.body.mirrors)
     driving, testing = (
-        [np.concatenate(pair) for pair in zip(space.dipole_couplings(places), space.couplings(more), strict=True)]
+        space.couplings([*unit_dipoles(places), *more])
         for places, more in ((grid, others.training), (probes, others.probes))
     )
     scale = unit_power(np.sum([np.sum(part**2, axis=1) for part in driving], axis=0), len(others.training))
@@ -234,29 +235,26 @@ def from_elements(
                 rows[number] = part @ space.fields[number]
         held = replace(space, fields=tuple(rows))  # for couplings only: these inductances are 1
 
-        def by_state(parts: Sequence[Array]) -> Array:
+        def couplings(sources: Sequence[Source]) -> Array:
+            parts = held.couplings(sources)
             return np.concatenate([np.sum([parts[number] for number in group], axis=0) for group in groups], axis=1)
 
-        every = np.concatenate(rates)
         return PassiveNetwork(
-            plate, region, frequencies, every, lambda sources: by_state(held.couplings(sources)),
-            partial(_functions, lambda places: by_state(held.dipole_couplings(places))),
-            solution.mesh_error, state_error + space_error,
+            plate, region, frequencies, np.concatenate(rates), couplings,
+            _functions, solution.mesh_error, state_error + space_error,
             {"ngsolve": version("ngsolve"), "order": float(space.order), "cells": float(space.cells)}, solution.seconds,
         )  # fmt: skip
 
     return reduced
 
 
-def _functions(
-    dipole_couplings: Callable[[Array], Array], network: PassiveNetwork, rtol: float, watch: Watch
-) -> tuple[Multipoles, Array, float]:
+def _functions(network: PassiveNetwork, rtol: float, watch: Watch) -> tuple[Multipoles, Array, float]:
     """`PassiveNetwork.field_functions` from the fields on the region's surface, which determine those within."""
     region, rates = network.region, network.rates
     extent = region.upper - region.lower
     x, y, z = np.clip(np.ceil(13 * np.sqrt(extent / extent.max())), 6, 13).astype(int)  # more along the longer edges
     points = region.surface((int(x), int(y), int(z)))
-    values = dipole_couplings(points).T.reshape(len(rates), -1, 3)
+    values = network.couplings(unit_dipoles(points)).T.reshape(len(rates), -1, 3)
     low, high = (2 * np.pi * f for f in network.frequencies)
     middle = np.sqrt(low * high)
     state_scale = 1 / np.sqrt(rates + middle)

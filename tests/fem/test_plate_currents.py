@@ -11,7 +11,6 @@ from spinlev.fem.plate.choice import reachable_region
 from spinlev.fem.plate.currents import (
     CURRENTS,
     OtherSources,
-    dipole_images,
     error_of,
     outer_box,
     outer_frequencies,
@@ -19,7 +18,7 @@ from spinlev.fem.plate.currents import (
     space_couplings,
     train,
 )
-from spinlev.fem.plate.eddy import MESH_SHARE, EddySpace, Ladder, solve_eddy, source_images
+from spinlev.fem.plate.eddy import MESH_SHARE, EddySpace, Ladder, solve_eddy
 from spinlev.fem.plate.rotor_share import rotor_box, turning_rotor
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import plate_and_rotor_table
@@ -55,14 +54,6 @@ def solution(boxes):
     return solve_currents(PLATE, boxes, FREQUENCIES, RTOL, RULE)
 
 
-def test_parity_parts_of_many_dipoles_are_those_of_one(space):
-    """The fast sum over mirror images against the potentials themselves: round-off."""
-    places = REGION.lower + (REGION.upper - REGION.lower) * np.random.default_rng(0).random((3, 3))
-    fast = np.concatenate(list(dipole_images(space.parity, space.points, places)), axis=1)
-    slow = np.concatenate(list(source_images(space.parity, space.points, unit_dipoles(places))), axis=1)
-    assert fast.reshape(slow.shape) == pytest.approx(slow, abs=1e-14 * abs(slow).max())
-
-
 @pytest.mark.parametrize("frequency", [5.0, 40.0, 250.0])
 def test_what_residuals_bound_is_no_larger(space, frequency):
     """Own tensors of unseen dipoles against the complex solution on the same elements, for two tolerances."""
@@ -71,7 +62,7 @@ def test_what_residuals_bound_is_no_larger(space, frequency):
     for allowed in (1e-2, 1e-4):
         grid = REGION.grid((3, 3, 3), fold=(0, 1, 2))
         made, worst, *_ = train(space, grid, probes, OtherSources(), FREQUENCIES, allowed)
-        found = space_couplings(made.dipole_couplings(probes), made.inductances, 2j * np.pi * frequency)
+        found = space_couplings(made.couplings(unit_dipoles(probes)), made.inductances, 2j * np.pi * frequency)
         blocks = [np.einsum("iaib->iab", c.reshape(3, 3, 3, 3)) for c in (found, exact)]
         error = np.max(np.linalg.norm(blocks[0] - blocks[1], axis=(1, 2)) / np.linalg.norm(blocks[1], axis=(1, 2)))
         print(f"\n{frequency:g} Hz: error {error:.1e}, stated {worst:.1e}, asked {allowed:.0e}")
@@ -92,7 +83,7 @@ def test_the_bound_for_a_rotor_that_was_not_trained_holds(solution, rotor):
     omega = 2 * np.pi * 250.0
     pairs = zip(
         solution.space.couplings(probes),
-        solution.space.dipole_couplings(places),
+        solution.space.couplings(unit_dipoles(places)),
         solution.space.inductances,
         strict=True,
     )
@@ -156,7 +147,9 @@ def test_a_solution_survives_the_disk(solution, tmp_path):
     CURRENTS.save(solution, tmp_path / "s.nc")
     read = CURRENTS.load(tmp_path / "s.nc")
     place = REGION.center
-    for kept, back in zip(solution.space.dipole_couplings(place), read.space.dipole_couplings(place), strict=True):
+    for kept, back in zip(
+        solution.space.couplings(unit_dipoles(place)), read.space.couplings(unit_dipoles(place)), strict=True
+    ):
         assert back == pytest.approx(kept, abs=1e-6 * abs(kept).max())
     assert np.array_equal(read.residuals, solution.residuals)
     assert (read.mesh_error, read.space_error, read.frequencies) == (
