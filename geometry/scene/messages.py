@@ -4,7 +4,7 @@ import difflib
 import re
 from collections.abc import Iterator, Sequence
 from itertools import combinations, product
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic_core import ErrorDetails
@@ -26,24 +26,9 @@ NAMED = re.compile(r"(?:unknown key `|Input )([\w.\[\]-]+)")
 COMMA = re.compile(r"[-+]?\d+,\d+")  # a number as many languages write it
 OPPOSITE = 1 - 1e-9  # cosine of the angle between two axes from which on they are opposite
 MOST = 20  # Faults of a scene that are listed; the rest are counted
-# By their keys; rotors by their configuration, but for that of `rotor.magnets`.
-TABLES: dict[str, type[schema.Table]] = {
-    "": schema.SceneTable,
-    "horizontal": schema.DisplacedRotor,
-    "vertical": schema.DisplacedRotor,
-    "tilt": schema.TiltRotor,
-    "magnets": schema.MagnetTable,
-    "conductors": schema.ConductorTable,
-    "floater": schema.FloaterTable,
-    "floater.magnets": schema.FloaterMagnetTable,
-    "bodies": schema.BallastTable,
-    "plate": schema.PlateTable,
-    "lowering": schema.LoweringTable,
-    "coils": schema.CoilTable,
-    "drag": schema.DragTable,
-    "start": schema.StartTable,
-    "drive": schema.DriveTable,
-}
+# By their configuration.
+ROTORS: dict[Any, type[schema.Table]] = dict.fromkeys(("horizontal", "vertical"), schema.DisplacedRotor)
+ROTORS |= {"tilt": schema.TiltRotor, "magnets": ExplicitRotor}
 # The kinds of error of pydantic.
 RULES = {
     "greater_than": "greater than {gt:g}",
@@ -158,16 +143,19 @@ def _named(key: str) -> str:
 
 
 def _allowed(place: Sequence[Any]) -> list[str]:
-    """The keys allowed beside the one at a place of pydantic's."""
-    if len(place) == 3 and place[:2] == ("rotor", "magnets"):
-        return list(ExplicitRotor.model_fields)
-    if place[0] == "plate":
-        return list(TABLES["lowering" if "lowering" in place[1:-1] else "plate"].model_fields)
-    if place[0] in ("floater", "start"):
-        place = [p for p in place if p not in ("one", "several")]
-        if "magnets" in place[:-1]:
-            return list(TABLES["floater.magnets"].model_fields)
-    return list(TABLES[next((p for p in reversed(place[:-1]) if isinstance(p, str)), "")].model_fields)
+    """The keys allowed beside the one at a place of pydantic's, in which kinds of tables stand as keys do."""
+    table: type[schema.Table] = schema.SceneTable
+    for part in place[:-1]:
+        field = table.model_fields.get(part)
+        table = ROTORS.get(part, table) if field is None else _table(field.annotation) or table
+    return list(table.model_fields)
+
+
+def _table(form: Any) -> type[schema.Table] | None:
+    """The table, or the first of several, in a key's type."""
+    if isinstance(form, type) and issubclass(form, schema.Table):
+        return form
+    return next((found for part in get_args(form) if (found := _table(part))), None)
 
 
 def _close(place: Sequence[Any]) -> list[str]:
