@@ -1,6 +1,5 @@
 """From the keys of a scene file to the scene in SI units, and the tables of such keys in Python."""
 
-import copy
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
@@ -16,10 +15,10 @@ from ..files import regular_file
 from ..step_file import read_part
 from .contents import Scene
 from .messages import SceneError, described_faults, key_faults, overlap_faults
-from .schema import FLOATER, ExplicitRotor, SceneTable
+from .schema import ExplicitRotor, SceneTable
 
 LARGEST = 2**30  # Bytes of a file that a scene may name
-MAP = "rotor", -1  # the number of the map of the rotor's field among the files
+FILES = "file", "field_map"  # keys that name a file: of a body, or the map of the rotor's field
 MOST_BODIES = 64  # Magnets and conductors of a scene beside a known one, unless that has more
 
 
@@ -52,27 +51,17 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
     if faults:
         raise SceneError(source, faults)
     try:
-        paths = _named_files(table, Path(source).parent if folder is None else folder, known)
-        read = {part.file: part for part in known.parts} if known else {}
-        of_bodies = {key: path for key, path in paths.items() if key != MAP}
-        parts = {path: read.get(path) or read_part(path) for path in of_bodies.values()}
-        field_map = paths.get(MAP)
-        scene = table.scene({key: parts[path] for key, path in of_bodies.items()}, field_map)
-        files = {str(path): content_digest(path) for path in paths.values()} if known is None else dict(known.files)
+        found: dict[str, list[str]] = {key: [] for key in FILES}
+        own = _with_paths(keys, Path(source).parent if folder is None else folder, known, found)
+        parts = {str(part.file): part for part in known.parts} if known else {}
+        parts = {path: parts.get(path) or read_part(Path(path)) for path in found["file"]}
+        scene = SceneTable.model_validate(own).scene(parts)
+        files = {path: content_digest(Path(path)) for paths in found.values() for path in paths}
+        files = files if known is None else dict(known.files)
     except InputError as error:  # a file
         raise SceneError(source, [str(error)]) from None
     if faults := list(overlap_faults(scene)):
         raise SceneError(source, faults)
-    own = copy.deepcopy(dict(keys))
-    if field_map:
-        own["rotor"]["field_map"] = str(field_map)
-    for (owner, k), path in of_bodies.items():
-        floater = FLOATER.fullmatch(owner)
-        of_owner = own["floater"] if floater else own[owner]
-        of_owner = of_owner[int(floater[1])] if floater and floater[1] else of_owner
-        if k >= 0 and owner != "plate":
-            of_owner = of_owner.get("magnets", []) + (of_owner.get("bodies", []) if floater else [])
-        (of_owner if k < 0 else of_owner[k])["file"] = str(path)
     scene = replace(
         scene, files=tuple(files.items()), parts=tuple(parts.values()), tolerances=tuple(tolerances.items())
     )
@@ -130,33 +119,34 @@ def _digest(path: Path, state: tuple[int, ...]) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _named_files(table: SceneTable, folder: Path, known: Scene | None) -> dict[tuple[str, int], Path]:
-    """The files that a scene names: of the rotor's magnets and the floater's parts by their number, and the `MAP`.
+def _with_paths(keys: Any, folder: Path, known: Scene | None, found: dict[str, list[str]], place: str = "") -> Any:
+    """Keys whose files are paths from a folder, which are `found` by their keys.
 
-    Those of the plate and of the floater itself have the number -1. Beside a known scene a name means one of its files:
-    that which is `folder / name` or ends so. No disk is asked.
+    Beside a known scene a name means one of its files: that which is `folder / name` or ends so. No disk is asked.
     """
-    rotor, names = table.rotor, {MAP: table.rotor.field_map}
-    names |= {("plate", k): plate.file for k, plate in table.plates}
-    if isinstance(rotor, ExplicitRotor):
-        names |= {("rotor", k): magnet.file for k, magnet in enumerate(rotor.magnets)}
-    names |= {(owner, k): name for owner, floater in table.floaters.items() for k, name in floater.named.items()}
-    found = {key: folder / name for key, name in names.items() if name}
-    for key, path in found.items() if known else ():
-        assert known is not None
-        name, own = str(names[key]), [known.field_map] if key == MAP else [part.file for part in known.parts]
-        end = Path(name).parts
-        alike = [file for file in own if file and (file == path or file.parts[-len(end) :] == end)]
-        if not alike:
-            owner, k = key
-            place = ".field_map" if key == MAP else ".file" if k < 0 else f".magnets[{k}].file"
-            place = f"[{k}].file" if owner == "plate" and k >= 0 else place
-            raise InputError(
-                f"Input {owner}{place} must be a file of the scene that was opened first; instead received "
-                f"{shown(name)}. Give the scene to the command line."
-            )
-        found[key] = path if path in alike else alike[0]
-    return found
+    if isinstance(keys, list):
+        return [_with_paths(entry, folder, known, found, f"{place}[{k}]") for k, entry in enumerate(keys)]
+    if not isinstance(keys, Mapping):
+        return keys
+    result = {}
+    for key, entry in keys.items():
+        there = f"{place}.{key}".removeprefix(".")
+        if key not in FILES or entry is None:
+            result[key] = _with_paths(entry, folder, known, found, there)
+            continue
+        path, end = folder / entry, Path(entry).parts
+        if known:
+            own = [known.field_map] if key == "field_map" else [part.file for part in known.parts]
+            alike = [file for file in own if file and (file == path or file.parts[-len(end) :] == end)]
+            if not alike:
+                raise InputError(
+                    f"Input {there} must be a file of the scene that was opened first; instead received "
+                    f"{shown(entry)}. Give the scene to the command line."
+                )
+            path = path if path in alike else alike[0]
+        found[key].append(str(path))
+        result[key] = str(path)
+    return result
 
 
 Table = Mapping[str, Any]  # A table of the scene file

@@ -1,6 +1,5 @@
 """The scene file's keys, types and ranges, the rules between keys, and what they say in SI units."""
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from .floater import Floater, FloaterPart
 
 MILLI = 1e-3
 ORIGIN = (0.0, 0.0, 0.0)
+Parts = Mapping[str, Part]  # Solids of files by what the keys call these
 
 
 def _zero_or(least: float) -> AfterValidator:
@@ -108,11 +108,11 @@ class _Shaped(_Placed):
     inner_diameter_mm: Length | None = None
     file: Name | None = None
 
-    def body(self, part: Part | None) -> Solid:
+    def body(self, parts: Parts) -> Solid:
         """The body, or that of a file with the file's origin in its place, turned about it."""
-        if part is None:
+        if not self.file:
             return solid_of(self)
-        turn = rotation_matrix(self.rotation_deg)
+        part, turn = parts[self.file], rotation_matrix(self.rotation_deg)
         part = replace(part, center=MILLI * np.array(self.center_mm) - turn @ part.origin, rotation=turn)
         return known_shape(part) or part
 
@@ -141,11 +141,11 @@ class MagnetTable(_Shaped):
     conductivity_S_m: Conductivity | None = None
     coercivity_kA_m: Coercivity | None = None
 
-    def magnet(self, part: Part | None, rotor: "AnyRotor") -> Magnet:
+    def magnet(self, parts: Parts, rotor: "AnyRotor") -> Magnet:
         """The magnet, its body from a file where that is given; what it does not say, its `rotor` says."""
         conductivity = rotor.conductivity_S_m if self.conductivity_S_m is None else self.conductivity_S_m
         knee = self.coercivity_kA_m or rotor.coercivity_kA_m
-        (along, across), body = self.recoil_permeability, self.body(part)
+        (along, across), body = self.recoil_permeability, self.body(parts)
         material = along, across, conductivity, 1e3 * knee if knee else None
         return Magnet(body, self.along(body, self.polarization_T), *material)
 
@@ -184,7 +184,7 @@ class DisplacedRotor(ArticleRotor):
     configuration: Literal["horizontal", "vertical"]
     displacement_mm: Annotated[NotNegative, Field(le=1e6)]
 
-    def in_si(self, parts: Mapping[int, Part]) -> Rotor:
+    def in_si(self, parts: Parts) -> Rotor:
         return self._of(horizontal if self.configuration == "horizontal" else vertical, self.displacement_mm * MILLI)
 
 
@@ -194,7 +194,7 @@ class TiltRotor(ArticleRotor):
     configuration: Literal["tilt"]
     angle_deg: Annotated[Number, Field(ge=-90.0, le=90.0)]
 
-    def in_si(self, parts: Mapping[int, Part]) -> Rotor:
+    def in_si(self, parts: Parts) -> Rotor:
         return self._of(tilt, float(np.radians(self.angle_deg)))
 
 
@@ -203,8 +203,8 @@ class ExplicitRotor(AnyRotor):
 
     magnets: Annotated[list[MagnetTable], Field(min_length=1)]
 
-    def in_si(self, parts: Mapping[int, Part]) -> Rotor:
-        return tuple(magnet.magnet(parts.get(k), self) for k, magnet in enumerate(self.magnets))
+    def in_si(self, parts: Parts) -> Rotor:
+        return tuple(magnet.magnet(parts, self) for magnet in self.magnets)
 
 
 def _rotor_kind(rotor: Any) -> str | None:
@@ -220,9 +220,11 @@ class BallastTable(_Shaped):
     density_kg_m3: Density
     conductivity_S_m: Conductivity | None = None
 
-    def piece(self, part: Part | None, conductivity: float | None) -> FloaterPart:
+    def piece(self, parts: Parts, conductivity: float | None) -> FloaterPart:
         """The part; `conductivity` is that of all magnets that do not name their own."""
-        return FloaterPart(Magnet(self.body(part), np.zeros(3), conductivity=self.conductivity_S_m), self.density_kg_m3)
+        return FloaterPart(
+            Magnet(self.body(parts), np.zeros(3), conductivity=self.conductivity_S_m), self.density_kg_m3
+        )
 
 
 class FloaterMagnetTable(BallastTable):
@@ -231,8 +233,8 @@ class FloaterMagnetTable(BallastTable):
     polarization_T: Annotated[Three[Polarization], _zero_or(1e-12)]
     recoil_permeability: Permeability = RECOIL_PERMEABILITY
 
-    def piece(self, part: Part | None, conductivity: float | None) -> FloaterPart:
-        body, own = self.body(part), self.conductivity_S_m
+    def piece(self, parts: Parts, conductivity: float | None) -> FloaterPart:
+        body, own = self.body(parts), self.conductivity_S_m
         polarization = self.along(body, self.polarization_T)
         metal = conductivity if own is None else own
         magnet = Magnet(body, polarization, self.recoil_permeability, conductivity=metal)
@@ -260,17 +262,16 @@ class FloaterTable(Table):
     def composite(self) -> bool:
         return bool(self.model_fields_set & {"magnets", "bodies"})
 
-    def floater(self, parts: Mapping[int, Part]) -> Floater:
-        """The floater, its `parts` from files by the numbers of `named`; -1 is its own file."""
+    def floater(self, parts: Parts) -> Floater:
         permeability = self.recoil_permeability or RECOIL_PERMEABILITY
         given = None if self.inertia_kg_m2 is None else tuple(self.inertia_kg_m2)
         if self.composite:
-            pieces = [table.piece(parts.get(k), self.conductivity_S_m) for k, table in enumerate(self.tables)]
+            pieces = [table.piece(parts, self.conductivity_S_m) for table in self.tables]
             return Floater.composed(pieces, given)  # type: ignore[arg-type]
         assert self.remanence_T is not None
         assert self.density_kg_m3 is not None
-        if self.shape == "file":
-            body = known_shape(parts[-1]) or parts[-1]
+        if self.file:
+            body = known_shape(parts[self.file]) or parts[self.file]
             polarization = body.rotation.T @ np.array([0.0, 0.0, self.remanence_T])
             magnet = Magnet(body, polarization, permeability, conductivity=self.conductivity_S_m)
             return Floater.composed([FloaterPart(magnet, self.density_kg_m3)], given)  # type: ignore[arg-type]
@@ -283,12 +284,6 @@ class FloaterTable(Table):
     def tables(self) -> list[BallastTable]:
         """Its magnets, then its ballast."""
         return [*self.magnets, *self.bodies]
-
-    @property
-    def named(self) -> dict[int, str]:
-        """The files that its parts name, by their numbers in `tables`; its own by -1."""
-        files = {-1: self.file} | {k: table.file for k, table in enumerate(self.tables)}
-        return {k: file for k, file in files.items() if file}
 
 
 class LoweringTable(Table):
@@ -306,10 +301,10 @@ class PlateTable(_Shaped):
     conductivity_S_m: Metal
     lowering: LoweringTable | None = None
 
-    def plate(self, part: Part | None) -> Plate:
+    def plate(self, parts: Parts) -> Plate:
         down = self.lowering
         lowering = Lowering(down.start_s, down.speed_mm_s * MILLI, down.distance_mm * MILLI) if down else None
-        return Plate(self.body(part), self.conductivity_S_m, lowering)
+        return Plate(self.body(parts), self.conductivity_S_m, lowering)
 
 
 class CoilTable(Table):
@@ -386,7 +381,6 @@ class DriveTable(Table):
 
 
 ONE_OR_SEVERAL = Discriminator(lambda given: "several" if isinstance(given, list) else "one")
-FLOATER = re.compile(r"floater(?:\[(\d+)\])?")  # how messages call a floater's table, with its number among several
 
 
 class SceneTable(Table):
@@ -432,27 +426,23 @@ class SceneTable(Table):
     def starts(self) -> list[StartTable]:
         return self.start if isinstance(self.start, list) else [self.start or StartTable()]
 
-    def scene(self, parts: Mapping[tuple[str, int], Part], field_map: Path | None) -> Scene:
-        """The scene in SI units; `parts` by their tables' names and numbers, -1 that of a table in no list."""
-
-        def of(whose: str) -> dict[int, Part]:
-            return {k: part for (owner, k), part in parts.items() if owner == whose}
-
+    def scene(self, parts: Parts) -> Scene:
+        """The scene in SI units."""
         rotor, drag = self.rotor, self.drag or DragTable()
-        floater, *others = (table.floater(of(name)) for name, table in self.floaters.items())
+        floater, *others = (table.floater(parts) for table in self.floaters.values())
         start, *elsewhere = (table.start() for table in self.starts)
         return Scene(
             frequency=self.frequency_hz,
             gravity=np.array(self.gravity_m_s2),
-            rotor=rotor.in_si(of("rotor")),
+            rotor=rotor.in_si(parts),
             floater=floater,
             companions=tuple(
                 Companion(one, drag.drag(one), begins) for one, begins in zip(others, elsewhere, strict=True)
             ),
-            plate=Plate.of([table.plate(parts.get(("plate", k))) for k, table in self.plates]) if self.plate else None,
+            plate=Plate.of([table.plate(parts) for _, table in self.plates]) if self.plate else None,
             drag=drag.drag(floater),
             start=start,
-            field_map=field_map,
+            field_map=Path(rotor.field_map) if rotor.field_map else None,
             map_reading=MapReading(rotor.map_length_unit, rotor.map_field_unit, rotor.map_columns),
             conductors=tuple(conductor.conductor() for conductor in rotor.conductors),
             drive=tuple(step.step() for step in self.drive or ()),
