@@ -35,7 +35,11 @@ def grid_of(name, side, model="dipole"):
 
 def found_by(grid, points, random=None, reach=filling.REACH, far=filling.FAR):
     """Points (k,) and places (k, 6) that one call finds at several points of a grid."""
-    starts = [filling._starts(grid, point, random) for point in points]
+    every = [(point, grid.range(point).starts()) for point in points]
+    some = [
+        (p, s if random is None else s[random.choice(len(s), len(s) // filling.PART, replace=False)]) for p, s in every
+    ]
+    starts = [(np.full(len(chosen), point), chosen) for point, chosen in some]
     starts = (np.concatenate(part) for part in zip(*starts, strict=True))
     return newton_search(grid.balance, grid.holds, *starts, EVERY, filling.MARGIN, reach, far)
 
