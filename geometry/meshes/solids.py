@@ -80,7 +80,7 @@ def mesh_metal(bodies: Sequence[Solid]) -> SolidMesh:
     center = np.mean([body.center for body in bodies], axis=0)
     unit = min(body.volume for body in bodies) ** (1 / 3)
     first, *others = (occ_solid(body, center, unit) for body in bodies)
-    what = f"Metal of {' and '.join(body.described_size for body in bodies)}"
+    what = f"metal of {' and '.join(body.described_size for body in bodies)}"
     sizes = [{"maxh": METAL_LARGEST / finer, "curvaturesafety": METAL_ROUND} for finer in FINER]
     whole = sum(others, first)
     mesh = first_made(sizes, lambda size: _generated(whole, what, **size))
@@ -101,7 +101,7 @@ def _generated(shape: Any, what: str, **sizes: float) -> Any:
     try:
         return ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(**sizes, parallel_meshing=False))
     except Exception as error:  # several kinds, as of a thin wall through which large elements would go
-        raise MeshError(f"{what} cannot be meshed: {error}. {SIMPLER}") from None
+        raise MeshError(f"The mesher gives up {what}: {error}. {SIMPLER}") from None
 
 
 def read_brep(brep: str) -> Any:
@@ -149,7 +149,7 @@ def rule_in_solid(brep: str, order: int, smallest: float = SMALLEST) -> tuple[Ar
     solid = read_brep(brep)
     unit = float(solid.mass) ** (1 / 3)
     sizes = {"maxh": 0.6 * unit, "minh": smallest * unit, "curvaturesafety": ROUND, "grading": 0.6}
-    mesh = _generated(solid, "The part", **sizes)
+    mesh = _generated(solid, "the part", **sizes)
     mesh.Curve(CURVED)
     few, whole = ng.IntegrationRule(ng.TET, FEW), ng.IntegrationRule(ng.TET, max(order, FEW))
     corners = np.array([vertex.point for vertex in mesh.vertices])
