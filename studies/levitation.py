@@ -30,9 +30,10 @@ from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..dynamics.motion.state import Scales
 from ..fem.mutual.making import cached_mutual_table, mutual_key
 from ..fem.mutual.table import MutualTable
-from ..fem.plate.choice import PlateAround, plate_around, rotor_nearby, wider_region
+from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
+from ..fem.plate.tables import PlateAround
 from ..fem.rotor.changed import ChangedTable, changed_table, follows
 from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rotor_table
 from ..fem.rotor.models import AccuracyError

@@ -1,26 +1,23 @@
 """Which model of the plate a scene needs."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.common import MU_0, Array, InputError, Report, Watch, unwatched
+from ...geometry.common import MU_0, Array, InputError, Report
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Plate, Scene
 from ...geometry.shapes import Box
-from ..cache import TableKind
 from ..rotor.models import Accuracy, AccuracyError, shortened_table
 from ..rotor.table import RotorTable
-from .currents import cached_currents
 from .rotor_share import DOWN
 from .slab import cached_edge_error, edge_error
-from .table import PlateTable, Region, RotorShare
-from .tables import CHANGED, DRIVEN, SLAB, changed_shares, deciding, plate_and_rotor_table
+from .table import Region
+from .tables import PlateAround
 
 NEGLIGIBLE = 1e-6  # Part of the floater's weight below which the largest conceivable force of the plate is left out
 REACH = 0.003  # The floater may move so far from where it begins, along each axis, m
@@ -97,49 +94,6 @@ def resolve_plate_model(
     return PlateChoice("reduced", "the floater is beside the plate's edge")
 
 
-@dataclass(frozen=True, eq=False)
-class PlateAround:
-    """What a plate's table for a floater about a place is made from."""
-
-    plate: Plate  # as the model sees it
-    model: str  # "slab", or "reduced" for the network of the finite elements
-    rotor: RotorTable  # its field
-    region: Region  # as of `plate_and_rotor_table`
-    frequencies: tuple[float, float]
-    rtol: float
-
-    @cached_property
-    def key(self) -> str:
-        return self._kind.key(*deciding(*self._requested))
-
-    def made(self, report: Report, watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
-        """The table, the rotor's share in it, and whether they were cached. Raises what the models raise."""
-        solve = partial(cached_currents, report=report, watch=watch)
-        make = partial(plate_and_rotor_table, *self._requested, solve=solve, slab=self.model == "slab", watch=watch)
-        (table, share), cached = self._kind.cached(deciding(*self._requested), make, report)
-        return table, share, cached
-
-    def changed_shares(
-        self, known: tuple[PlateTable, RotorShare], others: Sequence[tuple[Plate, RotorTable]], report: Report
-    ) -> Array:
-        """`tables.changed_shares` of what was `made`, from the cache if they are there; `report` gets messages."""
-        solve, slab = partial(cached_currents, report=report), self.model == "slab"
-        more = tuple((plate.body, rotor.uniform, rotor.expansions) for plate, rotor in others)
-
-        def make() -> tuple[Array, float]:
-            return changed_shares(known, self._requested, others, slab, solve), 0.0
-
-        return CHANGED.cached((self.key, more), make, report)[0][0]
-
-    @property
-    def _kind(self) -> TableKind[tuple[PlateTable, RotorShare]]:
-        return SLAB if self.model == "slab" else DRIVEN
-
-    @property
-    def _requested(self) -> tuple[Plate, RotorTable, Region, tuple[float, float], float]:
-        return self.plate, self.rotor, self.region, self.frequencies, self.rtol
-
-
 def plate_around(
     plate: Plate,
     model: str,
@@ -170,7 +124,7 @@ def plate_around(
         region = reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius)
         region = _rastered(region, plate, radius, shared=True)
     highest = HIGHEST * 2.0 ** max(0, math.ceil(math.log2(HARMONICS * max(frequency, 1.0) / HIGHEST) - 1e-9))
-    return PlateAround(plate, model, table, region, (LOWEST, highest), rtol)
+    return PlateAround(plate, table, region, (LOWEST, highest), rtol, model == "slab")
 
 
 def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, radius: float = 0.0) -> Region:

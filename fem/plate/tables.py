@@ -2,17 +2,26 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from ...geometry.common import Array, ComputationError, Report, Watch, unwatched, watched
+from ...geometry.common import Array, ComputationError, Report, Watch, unwatched
 from ...geometry.meshes.plate import MeshRule
 from ...geometry.scene.contents import Plate
 from ..cache import TableKind
 from ..rotor.table import RotorTable
-from .currents import OtherSources, PlateSolution, error_of, outer_box, outer_frequencies, solve_currents
+from .currents import (
+    OtherSources,
+    PlateSolution,
+    cached_currents,
+    error_of,
+    outer_box,
+    outer_frequencies,
+    solve_currents,
+)
 from .network import CONDUCTOR, NETWORK_SHARE, PassiveNetwork, Reduction, checked_ranges, from_elements
 from .rotor_share import (
     MISSED,
@@ -56,118 +65,118 @@ def plate_table(
     return _reduced_table(reduced, rtol, CONDUCTOR, unwatched)[1]
 
 
-def plate_and_rotor_table(
-    plate: Plate,
-    rotor: RotorTable,
-    region: Region,
-    frequencies: tuple[float, float] = (0.5, 250.0),
-    rtol: float = 1e-3,
-    rule: MeshRule | None = None,
-    solve: Callable[..., PlateSolution] = solve_currents,
-    slab: bool = False,
-    watch: Watch = unwatched,
-) -> tuple[PlateTable, RotorShare]:
-    """Table of `plate` and the rotor's share of its signals, of one network.
+SEEN = 8  # angles of a turn at which changed rotors are looked at: what they alias are harmonics from the seventh on
+Both = tuple[PlateTable, RotorShare]
 
-    Raises InputError: the plate is too near to the rotor, or, as a slab, not beside all of it and the region with one
-    of its two largest faces; ValueError: region in the plate, or a parameter out of range; AccuracyError: `rtol` not
-    reached.
 
-    Parameters
-    ----------
-    plate : with its pose at the start and its lowering
-    rotor : field table; whatever it knows drives the plate
-    region : where the floater may be, in the plate's frame, during all of its way: see `reachable_region`
-    frequencies : lowest and highest, Hz, of currents in the plate.  The field of a turning rotor has all multiples of
-        its frequency.  Of a cube on the axis all but the first are below 3e-4; of one 2 mm off it, the second is 3 to
-        6 per cent and the third below 4e-3: then the highest should be twice the rotor's
-    rtol : relative accuracy of reaction tensors in the region, and there of the field of the rotor's currents
-    rule : mesh (default by `rtol`)
-    solve : finite elements; `cached_currents` has them from the cache
-    slab : take the plate without edges; the errors do not tell how far it is from that
-    watch : progress callback
+@dataclass(frozen=True, eq=False)
+class PlateAround:
+    """What the table of a plate about a floater and the rotor's share of its signals, of one network, are made from.
 
     The finite elements are solved for dipoles in boxes around the region and around the rotor, on a coarse raster, so
     that neighbours of the scene and other models of the rotor need the same ones.  A rotor that these dipoles do not
     stand for gets its own.
     """
-    reduced = _reduction(plate, rotor, region, frequencies, rtol, rule, solve, slab, watch)
-    conductor = "this plate, taken as an infinite slab, and this place of the floater" if slab else CONDUCTOR
-    network, table = _reduced_table(reduced, rtol, conductor, watch)
-    share = rotor_share(network, _seen(plate, slab), rotor, SHARE_PART * rtol, watch)
-    return table, without_high_harmonics(share, table, MISSED * rtol)
 
+    plate: Plate  # with its pose at the start and its lowering
+    rotor: RotorTable  # whatever its field knows drives the plate
+    region: Region  # where the floater may be, in the plate's frame, during all of its way: see `reachable_region`
+    # Lowest and highest, Hz, of currents in the plate.  The field of a rotor has all multiples of its frequency.
+    # Of a cube on the axis all but the first are below 3e-4; of one 2 mm off it, the second is 3 to 6 per cent and the
+    # third below 4e-3: then the highest should be twice the rotor's
+    frequencies: tuple[float, float] = (0.5, 250.0)
+    rtol: float = 1e-3  # relative accuracy of reaction tensors in the region, and of the rotor's currents' field there
+    slab: bool = False  # whether it is taken without edges; the errors do not tell how far it is from that
+    rule: MeshRule | None = None  # of its mesh; None: by `rtol`
 
-def _reduction(
-    plate: Plate,
-    rotor: RotorTable,
-    region: Region,
-    frequencies: tuple[float, float],
-    rtol: float,
-    rule: MeshRule | None,
-    solve: Callable[..., PlateSolution],
-    slab: bool,
-    watch: Watch,
-) -> Reduction:
-    if slab:
-        far = rotor_reach(plate, rotor, slab_frame(plate, region))
-        return from_slab(plate, region, frequencies, rtol, turning_rotor(_seen(plate, slab), rotor), far)
-    others = turning_rotor(plate, rotor)
-    boxes = [outer_box(region, plate.body), outer_box(rotor_box(plate, rotor), plate.body)]
-    outer = outer_frequencies(frequencies)
-    solution = solve(plate, boxes, outer, rtol, rule)
-    watch("reduced plate model", 0.0)
-    error = error_of(solution, others.probes)
-    if error > OTHERS_SHARE * (NETWORK_SHARE * rtol - solution.mesh_error):
-        solution = solve(plate, boxes, outer, rtol, rule, others)
-        error = solution.space_error
-    watch("reduced plate model", 0.5)
-    return from_elements(plate, solution, region, frequencies, rtol, others, max(error, solution.space_error))
+    def tables(self, solve: Callable[..., PlateSolution] = solve_currents, watch: Watch = unwatched) -> Both:
+        """Both, by `solve` for the finite elements; `cached_currents` has them from the cache.
+
+        Raises InputError: the plate is too near to the rotor, or, as a slab, not beside all of it and the region with
+        one of its two largest faces; ValueError: region in the plate, or a parameter out of range; AccuracyError:
+        `rtol` not reached.
+        """
+        conductor = "this plate, taken as an infinite slab, and this place of the floater" if self.slab else CONDUCTOR
+        network, table = _reduced_table(self._reduction(solve, watch), self.rtol, conductor, watch)
+        share = rotor_share(network, _seen(self.plate, self.slab), self.rotor, SHARE_PART * self.rtol, watch)
+        return table, without_high_harmonics(share, table, MISSED * self.rtol)
+
+    def _reduction(self, solve: Callable[..., PlateSolution], watch: Watch) -> Reduction:
+        plate, rotor, region, frequencies, rtol = self.plate, self.rotor, self.region, self.frequencies, self.rtol
+        others = turning_rotor(_seen(plate, self.slab), rotor)
+        if self.slab:
+            far = rotor_reach(plate, rotor, slab_frame(plate, region))
+            return from_slab(plate, region, frequencies, rtol, others, far)
+        boxes = [outer_box(region, plate.body), outer_box(rotor_box(plate, rotor), plate.body)]
+        outer = outer_frequencies(frequencies)
+        solution = solve(plate, boxes, outer, rtol, self.rule)
+        watch("reduced plate model", 0.0)
+        error = error_of(solution, others.probes)
+        if error > OTHERS_SHARE * (NETWORK_SHARE * rtol - solution.mesh_error):
+            solution = solve(plate, boxes, outer, rtol, self.rule, others)
+            error = solution.space_error
+        watch("reduced plate model", 0.5)
+        return from_elements(plate, solution, region, frequencies, rtol, others, max(error, solution.space_error))
+
+    @property
+    def deciding(self) -> tuple[Any, ...]:
+        """What decides the tables; of a lowering its way alone, and no mesh."""
+        plate, rotor = self.plate, self.rotor
+        body = plate.body, plate.metal, plate.way
+        return *body, rotor.uniform, rotor.expansions, self.region, self.frequencies, self.rtol
+
+    @property
+    def _kind(self) -> TableKind[Both]:
+        return SLAB if self.slab else DRIVEN
+
+    @cached_property
+    def key(self) -> str:
+        return self._kind.key(*self.deciding)
+
+    def made(self, report: Report, watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
+        """The `tables`, and whether they were cached."""
+        make = partial(self.tables, partial(cached_currents, report=report, watch=watch), watch)
+        (table, share), cached = self._kind.cached(self.deciding, make, report)
+        return table, share, cached
+
+    def changed_shares(self, known: Both, others: Sequence[tuple[Plate, RotorTable]], report: Report) -> Array:
+        """Series (k, 2H+1, states) √J in the angle of k other rotors and poses of a plate that has not gone down.
+
+        Of the network and harmonics of what was made, `known`, from the cache if they are there. Raises
+        ComputationError: the network comes out otherwise than when the table was made.
+        """
+        more = tuple((plate.body, rotor.uniform, rotor.expansions) for plate, rotor in others)
+        return CHANGED.cached((self.key, more), lambda: (self._changed(known, others, report), 0.0), report)[0][0]
+
+    def _changed(self, known: Both, others: Sequence[tuple[Plate, RotorTable]], report: Report) -> Array:
+        reduced, (table, share) = self._reduction(partial(cached_currents, report=report), unwatched), known
+        network = reduced(0.0)
+        if network.rates.shape != table.rates.shape:
+            network = _reduced_table(reduced, self.rtol, CONDUCTOR, unwatched)[0]
+        angles = 2 * np.pi * np.arange(SEEN) / SEEN
+        fourier = np.linalg.pinv(turn_harmonics(angles, SEEN - 1))[: len(share.series)]
+
+        def series(plate: Plate, rotor: RotorTable) -> Array:
+            plate = _seen(plate, self.slab)
+            parts = rotor_parts(rotor, plate, 0.0)  # degrees that come and go would be steps
+            return fourier @ network.couplings([posed_rotor(parts, plate, angle, 0.0) for angle in angles])
+
+        first, stored = series(self.plate, self.rotor), share.series @ share.by_depth(0.0)
+        same = first.shape == stored.shape
+        signs = (
+            np.where(np.sum(first * stored, axis=0) < 0, -1.0, 1.0) if same else 1.0
+        )  # of states nothing decides them
+        if not same or np.abs(signs * first - stored).max() > self.rtol * np.abs(stored).max():
+            raise ComputationError(
+                "The network of the plate's currents comes out otherwise than when its table was made."
+            )
+        return np.array([stored + signs * (series(*other) - first) for other in others])
 
 
 def _seen(plate: Plate, slab: bool) -> Plate:
     """The plate as its model sees it: a slab has no edges."""
     size = np.where(np.arange(3) == np.argmin(plate.box.size), plate.box.size, ENDLESS)
     return replace(plate, body=replace(plate.box, size=size)) if slab else plate
-
-
-SEEN = 8  # angles of a turn at which changed rotors are looked at: what they alias are harmonics from the seventh on
-
-
-def changed_shares(
-    known: tuple[PlateTable, RotorShare],
-    requested: tuple[Plate, RotorTable, Region, tuple[float, float], float],
-    others: Sequence[tuple[Plate, RotorTable]],
-    slab: bool,
-    solve: Callable[..., PlateSolution] = solve_currents,
-    watch: Watch = unwatched,
-) -> Array:
-    """Series (k, 2H+1, states) √J in the angle of k other rotors and poses of a plate that has not gone down.
-
-    Raises ComputationError: the network comes out otherwise than when the table was made. `known`: the table and the
-    share, of whose network and harmonics they are; `requested`: what these were made of, see `plate_and_rotor_table`;
-    `others`: the plate in another pose, and another rotor; `slab`, `solve`, `watch`: as there.
-    """
-    (table, share), (plate, rotor, region, frequencies, rtol) = known, requested
-    reduced = _reduction(plate, rotor, region, frequencies, rtol, None, solve, slab, watch)
-    network = reduced(0.0)
-    if network.rates.shape != table.rates.shape:
-        network = _reduced_table(reduced, rtol, CONDUCTOR, watch)[0]
-    angles = 2 * np.pi * np.arange(SEEN) / SEEN
-    fourier = np.linalg.pinv(turn_harmonics(angles, SEEN - 1))[: len(share.series)]
-
-    def series(plate: Plate, rotor: RotorTable) -> Array:
-        plate = _seen(plate, slab)
-        parts = rotor_parts(rotor, plate, 0.0)  # degrees that come and go would be steps
-        return fourier @ network.couplings([posed_rotor(parts, plate, angle, 0.0) for angle in angles])
-
-    first, stored = series(plate, rotor), share.series @ share.by_depth(0.0)
-    same = first.shape == stored.shape
-    signs = np.where(np.sum(first * stored, axis=0) < 0, -1.0, 1.0) if same else 1.0  # of states nothing decides them
-    if not same or np.abs(signs * first - stored).max() > rtol * np.abs(stored).max():
-        raise ComputationError("The network of the plate's currents comes out otherwise than when its table was made.")
-    places = watched(range(len(others)), watch, "changed rotors in the plate")
-    return np.array([stored + signs * (series(*others[place]) - first) for place in places])
 
 
 def _reduced_table(reduced: Reduction, rtol: float, conductor: str, watch: Watch) -> tuple[PassiveNetwork, PlateTable]:
@@ -203,10 +212,3 @@ def cached_plate_table(
     """`plate_table`, from the cache if it is there, and whether it was; `report` gets messages."""
     inputs = plate.body.shape_numbers, plate.metal, region, frequencies, rtol
     return PLATE.cached(inputs, lambda: plate_table(plate, region, frequencies, rtol), report)
-
-
-def deciding(
-    plate: Plate, rotor: RotorTable, region: Region, frequencies: tuple[float, float], rtol: float
-) -> tuple[Any, ...]:
-    """What decides `plate_and_rotor_table` (`region`, `frequencies`, `rtol`); of a lowering its way alone."""
-    return plate.body, plate.metal, plate.way, rotor.uniform, rotor.expansions, region, frequencies, rtol

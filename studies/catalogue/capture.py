@@ -23,7 +23,7 @@ from ...dynamics.motion.events import CONTACT
 from ...dynamics.motion.plate import PlateMemory
 from ...dynamics.motion.state import State
 from ...fem.plate.choice import reachable_region
-from ...fem.plate.tables import plate_and_rotor_table
+from ...fem.plate.tables import PlateAround
 from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Lowering, Scene
@@ -95,7 +95,7 @@ def plate_under(place: Place, lowered: bool = False) -> PlateMemory:
     middle = np.array([0.0, 0.0, -place.distance - (FARTHER - NEARER) / 2])
     region = reachable_region(plate, middle, [SIDEWAYS, SIDEWAYS, (FARTHER + NEARER) / 2], scene.floater.radius)
     frequencies = (0.5, max(250.0, 2 * scene.frequency))
-    table, share = plate_and_rotor_table(plate, place.field, region, frequencies, PLATE_RTOL, slab=True)
+    table, share = PlateAround(plate, place.field, region, frequencies, PLATE_RTOL, slab=True).tables()
     return PlateMemory(plate, table, share, "slab")
 
 

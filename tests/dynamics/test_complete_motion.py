@@ -21,7 +21,7 @@ from spinlev.dynamics.motion.rotor_effects import MUTUAL, ROTOR_CURRENTS, Mutual
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
 from spinlev.geometry.magnets import horizontal
@@ -43,7 +43,9 @@ SCALES = Scales.of(SCENE)
 @pytest.fixture(scope="module")
 def memory():
     """A rough plate off the axis: its table errs by some per cent, its identities do not."""
-    return PlateMemory(PLATE, *plate_and_rotor_table(PLATE, FIELD, REGION, (5.0, 250.0), 0.1, MeshRule(2.0, 3.0, 3.0)))
+    return PlateMemory(
+        PLATE, *PlateAround(PLATE, FIELD, REGION, (5.0, 250.0), 0.1, rule=MeshRule(2.0, 3.0, 3.0)).tables()
+    )
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, OffsetStart, Plate, Scene
@@ -196,7 +196,7 @@ def test_plate_one_millimetre_below(rates):
     height = plate.box.to_body(fixed.position)[2]
     region = Region(np.array([-2e-3, -2e-3, height - 9e-4]), np.array([2e-3, 2e-3, height + 14e-4]))
     scene = replace(SCENE, plate=plate)
-    memory = PlateMemory(plate, *plate_and_rotor_table(plate, TABLE, region, rtol=1e-2, slab=True), "slab")
+    memory = PlateMemory(plate, *PlateAround(plate, TABLE, region, rtol=1e-2, slab=True).tables(), "slab")
     found = with_plate(scene, TABLE, Survey((fixed,), ()), memory, rates).equilibria[0]
     assert found.stable
     assert found.growth_per_s < -10

@@ -21,7 +21,7 @@ from spinlev.dynamics.motion.plate import PlateForce, PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales
 from spinlev.fem.plate.table import Region, RotorShare
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Drag, Lowering, OffsetStart, Plate, Scene
@@ -42,7 +42,7 @@ UNEVEN = replace(
 @pytest.fixture(scope="module")
 def memory():
     """A rough plate off the axis: its table errs by some per cent, its identities do not."""
-    table, share = plate_and_rotor_table(PLATE, CUBOID, REGION, (5.0, 250.0), 0.1, MeshRule(2.0, 3.0, 3.0))
+    table, share = PlateAround(PLATE, CUBOID, REGION, (5.0, 250.0), 0.1, rule=MeshRule(2.0, 3.0, 3.0)).tables()
     return PlateMemory(PLATE, table, share)
 
 
@@ -219,7 +219,7 @@ def test_over_an_infinite_slab_multipliers_are_the_eigenvalues_of_the_turning_fr
     In the rotor's frame everything is then autonomous; its eigenvalues are Floquet's to 1e-6 of the rotor's rate.
     """
     plate = replace(PLATE, lowering=None)
-    table, share = plate_and_rotor_table(plate, CUBOID, REGION, rtol=1e-2, slab=True)
+    table, share = PlateAround(plate, CUBOID, REGION, rtol=1e-2, slab=True).tables()
     force = PlateForce(PlateMemory(plate, table, share, "slab"), VALUES)
     orbit = periodic_orbit(rates, VALUES, 0.0, force, Scales.of(SCENE).pack(known.equilibria[0].state))
     assert np.ptp(orbit.states, axis=0).max() < 1e-9
@@ -240,7 +240,7 @@ def test_over_an_infinite_slab_multipliers_are_the_eigenvalues_of_the_turning_fr
 def test_what_the_plate_burns_comes_from_the_turn(known, rates):
     """Without the rotor's share the loss is the plate's torque about the rotor's axis times its rate: 1e-9."""
     plate, scales = replace(PLATE, lowering=None), Scales.of(SCENE)
-    table, share = plate_and_rotor_table(plate, CUBOID, REGION, rtol=1e-2, slab=True)
+    table, share = PlateAround(plate, CUBOID, REGION, rtol=1e-2, slab=True).tables()
     alone = PlateMemory(plate, table, replace(share, series=0 * share.series), "slab")
     found = with_plate(SCENE, CUBOID, Survey(known.equilibria[:1], ()), alone, rates).equilibria[0]
     action = plate_action(SCENE, alone, found)

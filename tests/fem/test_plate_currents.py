@@ -21,7 +21,7 @@ from spinlev.fem.plate.currents import (
 from spinlev.fem.plate.eddy import MESH_SHARE, EddySpace, Ladder, solve_eddy
 from spinlev.fem.plate.rotor_share import rotor_box, turning_rotor
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import AccuracyError
 from spinlev.geometry.magnets import horizontal, vertical
@@ -103,7 +103,7 @@ def test_one_solution_serves_other_rotors_and_nearby_places(boxes, solution):
         asked.append(asked_boxes)
         return solution
 
-    table, share = plate_and_rotor_table(PLATE, other, shifted, FREQUENCIES, RTOL, RULE, solve)
+    table, share = PlateAround(PLATE, other, shifted, FREQUENCIES, RTOL, rule=RULE).tables(solve)
     assert len(asked) == 1
     for wanted, there in zip(asked[0], boxes, strict=True):
         assert np.array_equal(wanted.lower, there.lower)
@@ -124,7 +124,7 @@ def test_a_rotor_that_no_dipole_stands_for_is_solved_for_itself(solution):
         return solution
 
     with pytest.raises(InterruptedError):
-        plate_and_rotor_table(PLATE, far, REGION, FREQUENCIES, 1e-4, RULE, solve)
+        PlateAround(PLATE, far, REGION, FREQUENCIES, 1e-4, rule=RULE).tables(solve)
     assert asked[0] is None
     assert len(asked[1].training) > 0
 

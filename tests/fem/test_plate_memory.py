@@ -19,7 +19,7 @@ from spinlev.fem.closed_forms.potentials import Dipole, unit_dipoles
 from spinlev.fem.plate.currents import OtherSources, solve_currents
 from spinlev.fem.plate.eddy import EddySpace
 from spinlev.fem.plate.network import from_elements
-from spinlev.fem.plate.tables import plate_and_rotor_table, tabulate
+from spinlev.fem.plate.tables import PlateAround, tabulate
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
@@ -37,7 +37,7 @@ MOMENT = 1.1
 @pytest.fixture(scope="module")
 def made():
     """Table of the slab and the rotor's share."""
-    return plate_and_rotor_table(PLATE, ROTOR, REGION, (20.0, 250.0), RTOL, slab=True)
+    return PlateAround(PLATE, ROTOR, REGION, (20.0, 250.0), RTOL, slab=True).tables()
 
 
 @pytest.fixture(scope="module")

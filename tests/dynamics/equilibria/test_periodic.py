@@ -13,7 +13,7 @@ from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import horizontal, vertical
 from spinlev.geometry.scene.contents import Drag, Plate, Scene
@@ -45,7 +45,7 @@ def over_slab():
     table = rotor_table(HORIZONTAL.rotor, "cuboid")
     rates = Rates(table)
     scene = replace(HORIZONTAL, plate=PLATE)
-    memory = PlateMemory(PLATE, *plate_and_rotor_table(PLATE, table, REGION, rtol=3e-2, slab=True), "slab")
+    memory = PlateMemory(PLATE, *PlateAround(PLATE, table, REGION, rtol=3e-2, slab=True).tables(), "slab")
     known = survey(scene, table, rates=rates)
     near = [e for e in known.equilibria if e.position[2] > -32e-3 and (e.stable or e.growth_per_s < 200)]
     return scene, table, memory, with_plate(scene, table, Survey(tuple(near), ()), memory, rates)

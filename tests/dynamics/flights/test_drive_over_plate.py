@@ -13,7 +13,7 @@ from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.state import State, turned_about_z
 from spinlev.fem.plate.slab import Slab, reaction_tensor
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.magnets import horizontal
@@ -29,7 +29,7 @@ START = initial_state(replace(SCENE, plate=None), TABLE)[0]
 
 @pytest.fixture(scope="module")
 def memory():
-    return PlateMemory(PLATE, *plate_and_rotor_table(PLATE, TABLE, REGION, rtol=1e-2, slab=True), "slab")
+    return PlateMemory(PLATE, *PlateAround(PLATE, TABLE, REGION, rtol=1e-2, slab=True).tables(), "slab")
 
 
 def flown(scene, memory, duration, start=START):
@@ -86,7 +86,7 @@ def test_what_the_plate_takes_from_a_rotor_alone(memory):
     magnets, still = horizontal(0.0, 10e-3, 1.305, 1.0), replace(PLATE, lowering=None)
     table, floater = rotor_table(magnets, "dipole"), replace(FLOATER, remanence=1e-6)
     scene = Scene(110.0, magnets, floater, NO_DRAG, np.zeros(3), still, drive=(DriveStep(None, 0.1),))
-    alone = PlateMemory(still, *plate_and_rotor_table(still, table, REGION, rtol=1e-2, slab=True), "slab")
+    alone = PlateMemory(still, *PlateAround(still, table, REGION, rtol=1e-2, slab=True).tables(), "slab")
     scene = replace(scene, start=AbsoluteStart(np.array([0.0, 0.0, -19e-3]), np.zeros(3), np.eye(3)[2], np.zeros(3)))
     state, currents = initial_state(scene, table, memory=alone)
     found = integrate(Flight(scene, table, 0.1, PLATE_TOLERANCE, memory=alone), state, 0.1, currents=currents)

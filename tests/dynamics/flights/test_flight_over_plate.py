@@ -10,7 +10,7 @@ from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_sta
 from spinlev.dynamics.flights.trajectory import Checkpoint, FlightStopped
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.contents import Drag, Lowering, Plate, Scene
 from spinlev.geometry.shapes import Box
@@ -24,7 +24,7 @@ DURATION = 0.08
 
 @pytest.fixture(scope="module")
 def memory():
-    return PlateMemory(PLATE, *plate_and_rotor_table(PLATE, TABLE, REGION, rtol=1e-2, slab=True), "slab")
+    return PlateMemory(PLATE, *PlateAround(PLATE, TABLE, REGION, rtol=1e-2, slab=True).tables(), "slab")
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.harmonics.interior import Ball, BallField
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.scene.contents import AbsoluteStart, Lowering, Plate
 from spinlev.geometry.shapes import Box
@@ -149,7 +149,7 @@ def test_over_a_plate_that_is_lowered_it_flies_as_in_the_table(start):
     """Changes of the ball while the plate moves; the energy of currents and motion balances as without balls."""
     plate = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.047)), 3.5e7, Lowering(0.05, 0.02, 4e-3))
     region = Region(np.array([-3e-3, -3e-3, 0.024]), np.array([3e-3, 3e-3, 0.037]))
-    memory = PlateMemory(plate, *plate_and_rotor_table(plate, TABLE, region, rtol=1e-2, slab=True), "slab")
+    memory = PlateMemory(plate, *PlateAround(plate, TABLE, region, rtol=1e-2, slab=True).tables(), "slab")
     scene, still = replace(SCENE, plate=plate), np.zeros(len(memory.table.rates))
     state = replace(start, velocity=start.velocity + np.array([0.03, 0.02, 0.06]))
     near, whole = [

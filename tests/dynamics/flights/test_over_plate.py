@@ -11,7 +11,7 @@ from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_sta
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import tilt
@@ -31,7 +31,7 @@ DURATION = 0.1
 
 def memory_of(plate, deepest=0.0):
     region = Region(np.array([-0.004, -0.004, 0.0214]), np.array([0.004, 0.004, 0.038 + deepest]))
-    return PlateMemory(plate, *plate_and_rotor_table(plate, TABLE, region, (0.5, 330.0), 3e-2, slab=True), model="slab")
+    return PlateMemory(plate, *PlateAround(plate, TABLE, region, (0.5, 330.0), 3e-2, slab=True).tables(), model="slab")
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import State
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import horizontal
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Plate, Scene
@@ -28,7 +28,7 @@ SCENE = Scene(110.0, MAGNETS, FLOATER, Drag.stokes(RADIUS), plate=PLATE)
 
 
 def memory_of(table):
-    return PlateMemory(PLATE, *plate_and_rotor_table(PLATE, table, REGION, rtol=1e-2, slab=True), "slab")
+    return PlateMemory(PLATE, *PlateAround(PLATE, table, REGION, rtol=1e-2, slab=True).tables(), "slab")
 
 
 def test_what_a_steady_turn_loses_is_that_of_the_frequency_domain():

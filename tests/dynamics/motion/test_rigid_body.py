@@ -21,7 +21,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter, Scales, State, matrices_of, quaternions_of
 from spinlev.fem.harmonics.interior import shells, sizes
 from spinlev.fem.plate.table import Region
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import tilt
 from spinlev.geometry.scene.contents import AbsoluteStart, Plate
@@ -278,7 +278,7 @@ def test_a_locked_cube_over_a_plate_stays_on_its_motion():
     corners = box.to_body(np.array([0.0, 0.0, -0.0455]) + 4e-3 * np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]))
     region = Region(corners.min(axis=0) - 5e-4, corners.max(axis=0) + 5e-4)
     memory = PlateMemory(
-        scene.plate, *plate_and_rotor_table(scene.plate, TABLE, region, (5.0, 300.0), 1e-2, slab=True), "slab"
+        scene.plate, *PlateAround(scene.plate, TABLE, region, (5.0, 300.0), 1e-2, slab=True).tables(), "slab"
     )
     rates = Rates(with_effects(scene, TABLE))
     known = survey(scene, TABLE, rates=rates)

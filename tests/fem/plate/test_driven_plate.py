@@ -10,14 +10,10 @@ from article import RADIUS
 from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms.potentials import unit_dipoles
-from spinlev.fem.plate.choice import PlateAround, reachable_region
+from spinlev.fem.plate.choice import reachable_region
 from spinlev.fem.plate.eddy import solve_eddy
 from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
-from spinlev.fem.plate.tables import (
-    DRIVEN,
-    deciding,
-    plate_and_rotor_table,
-)
+from spinlev.fem.plate.tables import DRIVEN, PlateAround
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import tilt
@@ -44,7 +40,7 @@ def region():
 
 @pytest.fixture(scope="module")
 def made(rotor, region):
-    return plate_and_rotor_table(PLATE, rotor, region, FREQUENCIES, RTOL, RULE)
+    return PlateAround(PLATE, rotor, region, FREQUENCIES, RTOL, rule=RULE).tables()
 
 
 def test_curl_of_the_rotors_potential_is_its_field(rotor):
@@ -95,10 +91,10 @@ def test_permeability_reaches_the_plate(rotor):
 def test_one_file_holds_table_and_share(made, rotor, region, tmp_path, monkeypatch):
     table, share = made
     monkeypatch.setenv("SPINLEV_CACHE", str(tmp_path))
-    arguments = (PLATE, rotor, region, FREQUENCIES, RTOL)
-    key = DRIVEN.key(*deciding(*arguments))
+    requested = PlateAround(PLATE, rotor, region, FREQUENCIES, RTOL)
+    key = requested.key
     DRIVEN.save((table, share), tmp_path / f"driven-plate-{key}.nc", key)
-    read, read_share, found = PlateAround(PLATE, "reduced", rotor, region, FREQUENCIES, RTOL).made(pytest.fail)
+    read, read_share, found = requested.made(pytest.fail)
     assert found
     assert np.array_equal(read.weights, table.weights)
     assert np.array_equal(read_share.series, share.series)
@@ -121,10 +117,10 @@ def test_everything_that_decides_is_in_the_key(rotor, region):
         (PLATE, rotor, region, (5.0, 251.0), RTOL),
         (PLATE, rotor, region, FREQUENCIES, 0.09),
     ]
-    keys = [DRIVEN.key(*deciding(*arguments)) for arguments in changed]
+    keys = [PlateAround(*arguments).key for arguments in changed]
     assert len(set(keys)) == len(keys)
     faster = replace(PLATE, lowering=Lowering(1.0, 0.02, 0.02))
-    assert DRIVEN.key(*deciding(faster, *changed[0][1:])) == keys[0]
+    assert PlateAround(faster, *changed[0][1:]).key == keys[0]
 
 
 def test_reachable_region_holds_the_box_all_the_way(region):

@@ -14,7 +14,7 @@ from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.plate.rotor_share import DOWN, ExpansionSource, posed_rotor, rotor_parts
 from spinlev.fem.plate.slab import Slab, modes_needed, mutual_tensor, reaction_tensor, slab_modes
 from spinlev.fem.plate.table import Region, refuse
-from spinlev.fem.plate.tables import plate_and_rotor_table
+from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.plate.waves import cylinder_moments
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import AccuracyError
@@ -49,12 +49,12 @@ def region_of(plate):
 @pytest.fixture(scope="module", params=PLATES)
 def made(request):
     plate = PLATES[request.param]
-    return plate, region_of(plate), *plate_and_rotor_table(plate, ROTOR, region_of(plate), rtol=RTOL, slab=True)
+    return plate, region_of(plate), *PlateAround(plate, ROTOR, region_of(plate), rtol=RTOL, slab=True).tables()
 
 
 @pytest.fixture(scope="module")
 def flat():
-    return plate_and_rotor_table(FLAT, ROTOR, region_of(FLAT), rtol=RTOL, slab=True)
+    return PlateAround(FLAT, ROTOR, region_of(FLAT), rtol=RTOL, slab=True).tables()
 
 
 def places(region, count, seed):
@@ -234,7 +234,7 @@ def test_rotors_permeability_is_heard():
 )
 def test_a_plate_that_no_slab_can_stand_for_is_refused(plate, region, message):
     with pytest.raises(InputError, match=message):
-        plate_and_rotor_table(plate, ROTOR, region or region_of(plate), slab=True)
+        PlateAround(plate, ROTOR, region or region_of(plate), slab=True).tables()
 
 
 @pytest.mark.slow
@@ -244,10 +244,10 @@ def test_a_tolerance_that_is_refused_names_one_that_is_met():
     near = Region(np.array([-0.004, -0.004, 0.003]), np.array([0.004, 0.004, 0.009]))
     asked = plate, ROTOR, near, (0.5, 6000.0)
     with pytest.raises(AccuracyError, match=r"Input --plate-rtol .*must be at least [\d.]+ for this plate") as refused:
-        plate_and_rotor_table(*asked, rtol=2e-3, slab=True)
+        PlateAround(*asked, rtol=2e-3, slab=True).tables()
     assert "PlateErrors" not in str(refused.value)
     named = float(re.findall(r"at least ([\d.]+) for", str(refused.value))[0])
-    table, _ = plate_and_rotor_table(*asked, rtol=named, slab=True)
+    table, _ = PlateAround(*asked, rtol=named, slab=True).tables()
     assert table.errors.total <= named < 0.1
 
 
@@ -260,6 +260,6 @@ def test_a_tolerance_that_cannot_be_met_is_told_in_words():
 
 def test_bad_ranges_are_named():
     with pytest.raises(ValueError, match="Input frequencies_hz must be positive and increasing"):
-        plate_and_rotor_table(FLAT, ROTOR, region_of(FLAT), (0.0, 250.0), slab=True)
+        PlateAround(FLAT, ROTOR, region_of(FLAT), (0.0, 250.0), slab=True).tables()
     with pytest.raises(ValueError, match="Input rtol must be between 0 and 1"):
-        plate_and_rotor_table(FLAT, ROTOR, region_of(FLAT), rtol=0.0, slab=True)
+        PlateAround(FLAT, ROTOR, region_of(FLAT), rtol=0.0, slab=True).tables()
