@@ -31,7 +31,6 @@ from .levitation import Levitation
 from .words import spoken_time
 
 PLATE_NEGLECTED = "The plate's eddy currents are neglected: the plate is only an obstacle."
-OF_SPHERES = "known for spherical floaters alone"
 CLEARLY_SLOW = 0.02  # relative error of what an effect adds to the growth of modes that goes without saying
 
 
@@ -168,16 +167,23 @@ def _why(key: str, included: bool, growth: float | None, doubt: float) -> str:
 
 def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     scene = levitation.scene
-    if scene.drag.air:
+    if scene.floater.is_sphere and scene.drag.air:
         return ListedEffect(REAL_AIR, True, 0.0, None, 'drag.model is "air"')
     if not scene.floater.is_sphere:
         floater = scene.floater
-        ends = np.array([floater.inner_radius, floater.radius]) / np.cbrt(floater.volume * 0.75 / np.pi)
+        ends = np.array([floater.inner_radius, floater.radius]) / floater.equal_radius
         # A body has no less drag than one that it holds, and no more than one that holds it: R. Hill and G. Power,
-        # Q. J. Mech. Appl. Math. 9 (1956) 313; of forces, and for torques alike.
+        # Q. J. Mech. Appl. Math. 9 (1956) 313; of forces, and for torques alike. Beyond Stokes nobody has shown it.
         (low, high), (less, more) = ends.tolist(), (ends**3).tolist()
-        why = f"{OF_SPHERES}; the drag is Stokes' on a sphere of its volume: a slow motion of its own shape meets "
-        why += f"{low:.2f} to {high:.2f} times that force and {less:.2f} to {more:.2f} times that torque"
+        if scene.drag.air:
+            swings = swinging(reynolds(floater.radius, scene.angular_velocity) * np.array([low / high, 1.0]) ** 2)
+            swings /= swinging(reynolds(floater.equal_radius, scene.angular_velocity))
+            less, more = less * swings[0], more * swings[1]
+            why = 'drag.model is "air": drag by its sphericity in the mean over attitudes; torques on a sphere of its '
+            why += f"volume, known to {less:.2g} to {more:.2g} times, as a sphere in it and one about it would meet"
+            return ListedEffect(REAL_AIR, True, 0.0, None, why)
+        why = 'drag.model is not "air"; the drag is Stokes\' on a sphere of its volume: a slow motion of its own shape '
+        why += f"meets {low:.2f} to {high:.2f} times that force and {less:.2f} to {more:.2f} times that torque"
         return ListedEffect(REAL_AIR, False, None, None, why)
     h = float(swinging(reynolds(scene.floater.radius, scene.angular_velocity)))
     why = f'drag.model is not "air"; the torque on an oscillating floater would be {h:.2g} times that of Stokes'

@@ -17,6 +17,7 @@ from .effect import Interaction
 from .floater_effects import (
     FLOATER_CURRENTS,
     FLOATER_SHAPE,
+    REAL_AIR,
     FloaterShape,
     check_floater_metal,
     scene_effects,
@@ -124,7 +125,7 @@ def mean_over_turns(scene: Scene, table: FieldFormula) -> tuple[Scene, Interacti
     """
     whole, round_scene = with_coils(scene, table), replace(scene, floater=scene.floater.averaged)
     # Beside what its shape decides all effects are those of a round body as well.
-    of_shape = FLOATER_SHAPE, INDUCED_SHAPE, FLOATER_CURRENTS
+    of_shape = FLOATER_SHAPE, INDUCED_SHAPE, FLOATER_CURRENTS, REAL_AIR
     kept = tuple(e for e in whole.effects if e.name not in of_shape)
     others = replace(whole, turning=False, effects=kept)
     rough = FloaterShape.of(round_scene.floater, floater_sources(round_scene.floater), whole.field)

@@ -22,6 +22,12 @@ up to Re = 800 (L. Schiller and A. Naumann, Z. VDI 77 (1933) 318; R. Clift, J. R
 and Particles, 1978, table 5.2).  Left out is the memory of the layer in translation, which damps a small shaking at
 frequency f by 1 + R/δ(f) times Stokes', ten at 10 Hz.  The air is far from walls, and the rotor does not stir it.
 
+Bodies of other shapes have the drag of A. Haider and O. Levenspiel (Powder Technol. 58 (1989) 63), a fit to free falls
+of compact bodies and discs in whatever attitude, by the sphericity φ, the surface of the sphere of their volume over
+theirs; of cubes and octahedra it is within 5 % of the laws of E. S. Pettyjohn and E. B. Christiansen (Chem. Eng. Prog.
+44 (1948) 157).  There is no such law of torques: theirs are those of the sphere of their volume, and what spheres in
+them and about them would meet is the range that results state.
+
 Eddy currents follow the rotor's field as the turning and moving floater sees it change.  In a field that turns against
 the ball with angular velocity -w, each of its modes follows the field with a delay τ = μ0σR²/z², z a zero of the
 spherical Bessel function j_{l-1} for a field of potential degree l (W. R. Smythe, Static and Dynamic Electricity, 3rd
@@ -70,6 +76,8 @@ BOUNDARY_LAYER, REST = 6.45, 32.1
 STOKES_UP_TO = ((16 * np.pi - REST) / BOUNDARY_LAYER) ** 2
 # Reynolds number that is added in square to that of translation, so that its power is smooth at rest: 3 % there.
 SLOW = 0.1
+# Of Haider and Levenspiel's A, C and D: of their logarithms by powers of the sphericity, the highest first
+HAIDER = (2.4486, -6.4581, 2.3288), (-10.2599, 18.4222, -13.8944, 4.905), (15.8855, -20.7322, 12.2584, 1.4681)
 Value = TypeVar("Value", Array, hy.expression)
 
 
@@ -88,9 +96,10 @@ def swinging(reynolds_number: ArrayLike) -> Array:
     return np.asarray(_layered(np.sqrt(np.asarray(reynolds_number, float) / 2)))
 
 
-def moving(reynolds_number: ArrayLike) -> Array:
-    """Drag of a steady way over Stokes' 6πηRv, at Re = 2Rv/ν: 1 if slow, about 5.6 at 150."""
-    return np.asarray(_separated(np.asarray(reynolds_number, float) ** 2))
+def moving(reynolds_number: ArrayLike, sphericity: float | None = None) -> Array:
+    """Drag of a steady way over Stokes' 6πηRv, at Re = 2Rv/ν, R of the sphere of its volume: 5.6 for one at 150."""
+    square = np.asarray(reynolds_number, float) ** 2
+    return np.asarray(_separated(square) if sphericity is None else _of_shape(square, sphericity))
 
 
 @dataclass(frozen=True)
@@ -98,23 +107,43 @@ class RealAir:
     """What air does beyond the Stokes drag that the runtime parameters hold."""
 
     name: str = REAL_AIR
+    # of a body that is no sphere: the radius of the sphere of its volume over its own, its sphericity, and, where it is
+    # round about its moment, its moment of inertia about that over the one across it
+    size: float = 1.0
+    sphericity: float | None = None
+    spin_ratio: float = 1.0
 
     @classmethod
     def of(cls, scene: Scene) -> "RealAir | None":
         """See `OF_SCENE`."""
-        return cls() if scene.drag.air else None
+        floater = scene.floater
+        if not scene.drag.air or floater.is_sphere:
+            return cls() if scene.drag.air else None
+        radius, ratio = floater.equal_radius, floater.spin_ratio if floater.round else 1.0
+        area = sum(body.area for body in floater.bodies)
+        return cls(REAL_AIR, radius / floater.radius, min(4 * np.pi * radius**2 / area, 1.0), ratio)
+
+    @property
+    def compiled_in(self) -> tuple[float, ...]:
+        """Numbers in the code of the equations, see `Rates.elsewhere`."""
+        return self.size, self.sphericity or 1.0, self.spin_ratio
 
     def added(self, motion: Motion) -> Added:
         length, time, spin, moment = hy.par[Parameter.LENGTH], hy.par[Parameter.TIME], motion.spin, motion.moment
-        unit = length * length / time * (AIR_DENSITY / AIR_VISCOSITY)  # Reynolds number of unit spin or speed
+        if self.spin_ratio != 1.0:  # it is L/I, see `Scales`
+            along = (1.0 / self.spin_ratio - 1.0) * dot(spin, moment)
+            spin = [s + along * m for s, m in zip(spin, moment, strict=True)]
+        # Reynolds number of unit spin or speed, by the sphere of its volume
+        unit = length * length / time * (self.size**2 * AIR_DENSITY / AIR_VISCOSITY)
         fast = hy.relu(spin[2]) + hy.relu(-spin[2])
         steady = _beyond(STOKES_UP_TO + hy.relu(unit * fast - STOKES_UP_TO)) - 1.0
         swing = _layered(hy.sqrt(0.5 * unit * motion.turn.pace)) - 1.0
         torque = [-swing * spin[0], -swing * spin[1], -steady * spin[2]]
         tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
-        excess = (along - tilt) * dot(torque, moment)
-        speed = 4.0 * unit * unit * dot(motion.velocity, motion.velocity)
-        push = hy.par[Parameter.LINEAR_DRAG] * (1.0 - _separated(speed + SLOW**2))
+        excess = (self.spin_ratio * along - tilt) * dot(torque, moment) if motion.axes is None else ZERO
+        speed = 4.0 / self.size**2 * unit * unit * dot(motion.velocity, motion.velocity) + SLOW**2
+        drag = _separated(speed) if self.sphericity is None else _of_shape(speed, self.sphericity)
+        push = hy.par[Parameter.LINEAR_DRAG] * (1.0 - drag)
         force = [push * v for v in motion.velocity]
         brake = [tilt * torque[i] + excess * moment[i] for i in range(3)]
         return replace(dissipative(force, brake, motion), motor=ZERO)
@@ -130,6 +159,11 @@ def _layered(q: Value) -> Value:
 
 def _separated(square: Value) -> Value:
     return 1.0 + 0.15 * square ** (0.687 / 2)
+
+
+def _of_shape(square: Value, sphericity: float) -> Value:
+    a, c, d = (float(np.exp(np.polyval(powers, sphericity))) for powers in HAIDER)
+    return 1.0 + a * square ** ((0.0964 + 0.5565 * sphericity) / 2) + c / 24 * square / (square**0.5 + d)
 
 
 FLOATER_SHAPE = "the floater's shape"

@@ -151,7 +151,7 @@ class Drag:
     @classmethod
     def of(cls, floater: Floater) -> Self:
         """Stokes drag of a floater: that of the sphere of its volume."""
-        return cls.stokes(floater.radius if floater.is_sphere else float(np.cbrt(floater.volume * 0.75 / np.pi)))
+        return cls.stokes(floater.equal_radius)
 
 
 @dataclass(frozen=True)

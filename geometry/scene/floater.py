@@ -131,6 +131,11 @@ class Floater:
         return sum(body.volume for body in self.bodies)
 
     @property
+    def equal_radius(self) -> float:
+        """Radius of the sphere of its volume, m."""
+        return self.radius if self.is_sphere else float(np.cbrt(self.volume * 0.75 / np.pi))
+
+    @property
     def mass(self) -> float:
         return self.density * self.volume
 

@@ -327,11 +327,6 @@ def _floater_faults(floater: schema.FloaterTable, whole: schema.SceneTable) -> I
                 "Input floater.inertia_kg_m2 must be moments of inertia, of which none is larger than the other two "
                 f"together; instead received {high:g} beside {low:g} and {middle:g}."
             )
-    if not sphere and whole.drag and whole.drag.model == "air":
-        yield (
-            'Input drag.model must be "stokes", or linear_N_s_m and angular_N_m_s be given, where the floater is no '
-            'sphere; instead received "air".'
-        )
 
 
 def _shape_faults(place: str, table: Any) -> Iterator[str]:

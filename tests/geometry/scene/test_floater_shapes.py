@@ -196,11 +196,6 @@ def test_given_moments_of_inertia_take_the_place_of_the_shapes():
     assert parse_scene(scene_text(made({**CUBOID, "inertia_kg_m2": given}))).floater.moments_of_inertia == tuple(given)
 
 
-def test_air_beyond_stokes_is_that_of_spheres():
-    with pytest.raises(SceneError, match=r'drag.model must be "stokes"'):
-        made(CYLINDER, drag={"model": "air"})
-
-
 def test_what_needs_another_shape_says_so():
     with pytest.raises(InputError, match=r'floater.shape must be "sphere" there; instead received "cuboid". Do this.'):
         made(CUBOID).floater.must_be("sphere", where="there", instead="Do this.")
