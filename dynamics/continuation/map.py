@@ -223,7 +223,7 @@ def family_grid(family: RotorFamily, frequencies: Array, measures: Array, spin: 
         rates=family.rates,
         values=family.values(frequencies[row], measures[column]),
         spin=np.full(len(row), spin * family.scene.floater.spin_ratio),
-        ranges=[SearchRange(family.at(frequencies[0], measure)) for measure in measures],
+        ranges=[SearchRange(family.at(frequencies[0], x), ball=family.scene.floater.mean) for x in measures],
         region=column,
         places=np.column_stack([row, column]),
     )

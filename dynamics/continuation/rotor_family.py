@@ -24,7 +24,7 @@ from ...geometry.scene.contents import Scene
 from ...geometry.shapes import rotation_matrix
 from ...geometry.solids import moved
 from ..motion.effect import Added, Effect, Interaction, Motion, Placeable, Poses
-from ..motion.effects import mutual_choice, with_effects
+from ..motion.effects import mean_over_turns, mutual_choice, with_effects
 from ..motion.equations import parameters
 from ..motion.floater_effects import check_floater_metal
 from ..motion.rates import Rates
@@ -171,8 +171,9 @@ class RotorFamily:
         """Compiled once for all frequencies and measures."""
         # Currents in the rotor's magnets are among the effects already.
         bare = tuple(replace(magnet, conductivity=None) for magnet in self.scene.rotor)
-        scene = replace(self.scene, rotor=bare)
-        return Rates(with_effects(scene, Interaction(cast(FieldFormula, self.field), self.effects)), optimised=True)
+        scene, whole = replace(self.scene, rotor=bare), Interaction(cast(FieldFormula, self.field), self.effects)
+        acting = mean_over_turns(scene, whole)[2] if scene.floater.mean else with_effects(scene, whole)
+        return Rates(acting, optimised=True)
 
 
 def rotor_family(
@@ -197,6 +198,7 @@ def rotor_family(
     interaction : "rigid", "mutual" or "auto", see `effects.mutual_choice`; "vertical" is rigid
 
     A rotor that moves as a whole keeps its tables, whatever the model: the family is as good as its scenes' tables.
+    A floater that is not round about its moment is its mean over turns about that, by its multipoles.
     """
     moves = MOVES.get(configuration, ())
     if not moves or len(moves) != len(scene.rotor):
@@ -210,6 +212,14 @@ def rotor_family(
             f"they magnetise each other changes with their distance; instead received {model}. Take one scene a "
             "distance (spinlev.sweep over rotor.displacement_mm), which makes a table for each."
         )
+    if not scene.floater.round:
+        if not scene.floater.turns_freely:
+            raise InputError(
+                "Input floater must have its moment along a principal axis of inertia for a family of rotors, as the "
+                "equilibria of another body are of no one kind; instead it has not. Take one scene a rotor "
+                "(spinlev.sweep)."
+            )
+        scene = replace(scene, floater=scene.floater.averaged)
     rotor = tuple(
         magnet if move == Move() else replace(magnet, body=moved(magnet.body, np.zeros(3), np.eye(3)))
         for magnet, move in zip(scene.rotor, moves, strict=True)

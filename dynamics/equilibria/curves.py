@@ -38,6 +38,7 @@ class SearchRange:
 
     scene: Scene  # its rotor and floater
     farthest: float = FARTHEST  # largest depth, and distance from the axis, m
+    ball: bool = False  # whether the whole ball about the floater has to be free, where its multipoles hold
 
     @property
     def bound(self) -> float:
@@ -45,7 +46,8 @@ class SearchRange:
 
     def holds(self, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Which of the scaled positions (n, 3) belong to the range, or lie at most a margin (radii) outside: (n,)."""
-        radius, inner = self.scene.floater.radius, self.scene.floater.inner_radius
+        radius = self.scene.floater.radius
+        inner = radius if self.ball else self.scene.floater.inner_radius
         bound, height = self.bound + margin, position[:, 2]
         inside = (-bound <= height) & (height <= margin) & (np.hypot(position[:, 0], position[:, 1]) <= bound)
         for magnet in self.scene.rotor:

@@ -79,6 +79,7 @@
   const article = grow(map.svg, "g"), here = grow(map.svg, "circle", { r: 6, fill: COLORS.north, stroke: "white" });
   const slice = grow(side.plane, "image", { preserveAspectRatio: "none", opacity: 0.6 });
   const bodies = grow(side.plane, "g"), crosses = grow(side.plane, "path", { stroke: COLORS.ink, "stroke-width": 2 });
+  const shape = grow(side.plane, "path", { id: "shape", fill: COLORS.ball, "fill-opacity": 0.95, stroke: COLORS.ball, "stroke-width": 0.5 });
   const ball = grow(side.plane, "circle", { id: "ball", class: "ball", fill: COLORS.ball, "fill-opacity": 0.75, stroke: COLORS.north });
   const curves = Object.fromEntries(Object.entries(running).map(([key, chart]) =>
     [key, grow(chart.plane, "path", { fill: "none", stroke: COLORS.curve, "stroke-width": 1.5 })]));
@@ -93,14 +94,19 @@
     if (side.y[0] !== low) { side.range([-half, half], [low, 15]); drawSide(); }
     for (const [key, value] of Object.entries({ cx: side.px(x), cy: side.py(z), r: side.px(drawn.radius) - side.px(0) })) ball.setAttribute(key, value);
     ball.place = [x, z];
+    const [moment] = turned([pose.moment], pose.flying ? -pose.angle : 0);
+    shape.setAttribute("d", drawn.floater.map(body => outline(body.faces, moved(body.at, [x, 0, z], moment))).join(""));
+    ball.setAttribute("fill-opacity", drawn.floater.length ? 0.1 : 0.75);  // about another body, to take it by
   };
+  // Faces from the side, all turned one way: else front and back are a hole.
+  const outline = (faces, corners) => faces.map(face => face.map(k => [corners[k][0], corners[k][2]]))
+    .map(([a, b, c]) => (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0]) ? [a, c, b] : [a, b, c])
+    .map(face => `${side.path(face)}Z`).join("");
   const drawSide = () => {
     bodies.replaceChildren();
     const sunk = drawn.fixed.map(body => ({ ...body, at: body.at.map(([x, y, z]) => [x, y, z - pose.plate]) }));
     for (const { at: corners, faces, color, opacity } of [...drawn.turning, ...sunk]) {
-      const flat = faces.map(face => face.map(k => [corners[k][0], corners[k][2]]))
-        .map(([a, b, c]) => (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0]) ? [a, c, b] : [a, b, c]);  // else front and back are a hole
-      grow(bodies, "path", { d: flat.map(face => `${side.path(face)}Z`).join(""), fill: color, stroke: color, "stroke-width": 0.5, opacity });
+      grow(bodies, "path", { d: outline(faces, corners), fill: color, stroke: color, "stroke-width": 0.5, opacity });
     }
     for (const [[x, , z], [u, , w]] of drawn.arrows) {
       const head = [[1, 0], [0.45, 0.2], [0.45, 0.07], [-1, 0.07], [-1, -0.07], [0.45, -0.07], [0.45, -0.2]];

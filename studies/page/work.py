@@ -357,7 +357,7 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
     begin, end = (
         np.array([[axis[k] for axis, k in zip(axes, pair[side], strict=True)] for pair in pairs]) for side in (0, 1)
     )
-    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    low, high, spin = np.zeros(len(pairs)), np.ones(len(pairs)), spin * family.scene.floater.spin_ratio
     # All pairs are halved together: a call of compiled code costs more than the pairs in it.
     for _ in range(HALVINGS):
         middle = (low + high) / 2

@@ -1,5 +1,7 @@
 """Maps of equilibria against searches that know nothing of their neighbours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from article import PERMEABLE
@@ -13,8 +15,10 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Parameter
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import InputError
-from spinlev.geometry.magnets import horizontal, tilt, vertical
+from spinlev.geometry.magnets import Magnet, horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
+from spinlev.geometry.scene.floater import Floater, FloaterPart
+from spinlev.geometry.shapes import Box
 
 SHAPE = (10e-3, 1.305, 1.05)
 ROTORS = {
@@ -102,7 +106,26 @@ def test_sheets_are_found_around_their_folds():
     np.testing.assert_array_equal(one.number, many.number)
 
 
+@pytest.mark.slow
+def test_a_cube_has_the_map_of_its_mean():
+    """Where it levitates by its multipoles about the moment: 3 µm from where all its charges have it."""
+    body = Box((10e-3,) * 3)
+    cube = Floater(body.circumradius, 1.305, 1.0, 7500.0, None, body)
+    scene = replace(scene_of("horizontal"), floater=cube)
+    family = rotor_family(scene, "horizontal", "cuboid", interaction="rigid")
+    found = equilibrium_map(family, [105.0, 110.0], [2e-3])
+    assert found.stable.sum() == 2
+    for row, place in zip(found.row[found.stable], found.position[found.stable], strict=True):
+        at = replace(scene, frequency=float(found.frequencies[row]))
+        (true,) = (e for e in find_equilibria(at, rotor_table(at.rotor, "cuboid")) if e.stable)
+        assert 0 < np.linalg.norm(place - true.position) < 1e-5
+
+
 def test_what_has_no_map_says_so():
+    body = Box((4e-3, 6e-3, 10e-3))
+    oblique = FloaterPart(Magnet(body, 1.3 * np.array([0.0, 0.6, 0.8])), 7500.0)
+    with pytest.raises(InputError, match="its moment along a principal axis"):
+        rotor_family(replace(scene_of("horizontal"), floater=Floater.composed([oblique])), "horizontal", "dipole")
     family = rotor_family(scene_of("horizontal"), "horizontal", "dipole")
     with pytest.raises(EquilibriumError, match="only where the rotor turns"):
         equilibrium_map(family, [0.0, 10.0], [1e-3])
