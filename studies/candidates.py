@@ -13,17 +13,8 @@ from typing import Any, cast
 import numpy as np
 from scipy.stats import qmc
 
+from ..dynamics.continuation import frequencies
 from ..dynamics.continuation.branch import BranchPoint
-from ..dynamics.continuation.frequencies import (
-    BORDER,
-    HIGHEST,
-    LONG_STEPS,
-    LOWEST,
-    by_frequency,
-    levitates,
-    one_way,
-    tracked_end,
-)
 from ..dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
 from ..dynamics.equilibria.equilibrium import LOCKED, Equilibrium, EquilibriumError, Survey, nearest_of
 from ..dynamics.equilibria.path import NEAR, NEWTON_STEPS
@@ -47,7 +38,7 @@ DRAWS, SEED = 32, 20250708  # of scenes to begin at where the given one has no e
 
 
 def survey_near(levitation: Levitation, places: Array, moments: Array) -> Survey | None:
-    """What becomes of equilibria of a scene nearby at places (n, 3) m with moments (n, 3), without plate.
+    """What becomes of equilibria of a scene nearby at `places` (n, 3) m with `moments` (n, 3), without plate.
 
     None where one of them is lost, or is no fixed point.
     """
@@ -94,10 +85,7 @@ class Candidate:
 
     @cached_property
     def ends(self) -> tuple[BranchPoint, BranchPoint]:
-        """The equilibria at which stable levitation ends below and above the frequency, without the plate.
-
-        Of a floater that is not round about its moment those of its mean over turns about that.
-        """
+        """Where stable levitation ends below and above the frequency, without plate, for the mean if not round."""
         followed = self.levitation if self.levitation.scene.floater.round else self.levitation.mean
         scene = replace(followed.still, plate=None)
         if scene.gravity[:2].any() or self.bare.kind == LOCKED:
@@ -105,17 +93,18 @@ class Candidate:
                 "Input margin must be asked for where gravity is along the axis and the equilibrium not frequency-"
                 "locked; instead this scene's is not so."
             )
-        family, found = by_frequency(scene, followed.rates, self.levitation.spin), []
+        family, found = frequencies.by_frequency(scene, followed.rates, self.levitation.spin), []
         start = Scales.of(scene).pack(self.bare.start)
-        for number, border in enumerate((LOWEST, HIGHEST)):
+        for number, border in enumerate((frequencies.LOWEST, frequencies.HIGHEST)):
             end = None
             if self.near is not None and "ends" in self.near.__dict__:
                 moved = float(self.near.ends_by[number] @ self.step) if "ends_by" in self.near.__dict__ else 0.0
-                end = tracked_end(scene, family, self.near.ends[number], moved)
+                end = frequencies.tracked_end(scene, family, self.near.ends[number], moved)
             if end is None:  # tracked from a scene nearby, it may be on the other side of the frequency
-                if not levitates(family.point(start[:3], start[6:9], scene.frequency)):
+                if not frequencies.levitates(family.point(start[:3], start[6:9], scene.frequency)):
                     raise EquilibriumError(f"At {scene.frequency:.4g} Hz it is not stable without the plate.")
-                walk = one_way(scene, family, start, scene.frequency, border, LONG_STEPS)
+                far = frequencies.LONG_STEPS
+                walk = frequencies.one_way(scene, family, start, scene.frequency, border, far)
                 end = next(point for point in walk if point.kind)
             found.append(end)
         self.near = None
@@ -130,7 +119,7 @@ class Candidate:
         if name == "decay_per_s":
             return -np.array([mode.growth_per_s for mode in known.modes])
         if name == "gap_mm":
-            return 1e3 * np.array([rotor_gap(scene, known.position, known.state.orientation)])
+            return _gap_mm(scene, known)
         if name in OF_SCENE:
             return np.array([OF_SCENE[name](scene)])
         stem, scale = _answer(name)
@@ -149,14 +138,8 @@ class Candidate:
         if name == "decay_per_s":
             return -np.array([[way.modes[mode.name].real for way in ways] for mode in known.modes])
         if name == "gap_mm":
-
-            def gap(one: Equilibrium) -> Array:
-                return 1e3 * np.array([rotor_gap(scene, one.position, one.state.orientation)])
-
-            own = self._of_scenes(
-                lambda there: 1e3 * np.array([rotor_gap(there, known.position, known.state.orientation)])
-            )
-            return np.asarray(own + np.array([way.of(gap) for way in ways]).T)
+            own = self._of_scenes(lambda there: _gap_mm(there, known))
+            return np.asarray(own + np.array([way.of(lambda one: _gap_mm(scene, one)) for way in ways]).T)
         stem, scale = _answer(name)
         return np.array([[np.asarray(derivative(known, way, stem.removesuffix("_deg"))) / scale for way in ways]])
 
@@ -166,7 +149,7 @@ class Candidate:
         rows = []
         for end in self.ends:
             there = Gradient(self.levitation.elsewhere(frequency=end.parameter))
-            rows.append([0.0 if end.kind == BORDER else there.end_by(end, key)[0] for key in self.keys])
+            rows.append([0.0 if end.kind == frequencies.BORDER else there.end_by(end, key)[0] for key in self.keys])
         return np.array(rows)
 
     def _of_scenes(self, quantity: Callable[[Scene], Array]) -> Array:
@@ -187,21 +170,18 @@ OF_SCENE: Mapping[str, Callable[[Scene], float]] = {
 }
 
 
+def _gap_mm(scene: Scene, known: Equilibrium) -> Array:
+    return 1e3 * np.array([rotor_gap(scene, known.position, known.state.orientation)])
+
+
 def _answer(name: str) -> tuple[str, float]:
-    """Attribute of an equilibrium for a measure, and its unit in SI."""
     if name.endswith("_deg"):
         return name, 1.0
     return name.removesuffix("_mm"), IN_JSON["m"][1]
 
 
 class Search:
-    """Scenes that differ in some numbers, each with the equilibrium that is followed from the last.
-
-    Parameters
-    ----------
-    levitation : of the scene to begin at
-    free : ends of each number, by key
-    """
+    """Scenes that differ in numbers with ends `free`, by key, each with the equilibrium followed from the last."""
 
     def __init__(self, levitation: Levitation, free: Mapping[str, tuple[float, float]]) -> None:
         self.scene, numbers = scene_numbers(levitation.scene)

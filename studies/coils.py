@@ -7,18 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics.flights.conductor import (
-    LOWEST,
-    ConductorMotion,
-    Supply,
-    conductor_motion,
-    free_motion,
-    heights_over,
-    levitation_height,
-    on_axis,
-    room_over,
-    sources_of,
-)
+from ..dynamics.flights import conductor
 from ..fem.closed_forms.coil import coils_field
 from ..fem.plate.floating import FloatingModes, FreeModes, cached_floating_modes
 from ..geometry.common import Array
@@ -45,69 +34,46 @@ def coils_at_start(scene: Scene, points: Array) -> tuple[Array, Array]:
 
 def modes_of(scene: Scene, rtol: float = 1e-3) -> tuple[FloatingModes | FreeModes, bool]:
     """The modes of a scene's floater over its coils, and whether they were cached. Raises what `heights_over` does."""
-    heights, supply = heights_over(scene), Supply(scene.coils, sources_of(scene.coils))
-    region = heights if on_axis(scene) else room_over(scene)
-    frequency = max(LOWEST, *(coil.frequency for coil in scene.coils))
+    heights, supply = conductor.heights_over(scene), conductor.Supply(scene.coils, conductor.sources_of(scene.coils))
+    region = heights if conductor.on_axis(scene) else conductor.room_over(scene)
+    frequency = max(conductor.LOWEST, *(coil.frequency for coil in scene.coils))
     assert scene.floater.conductivity is not None
     return cached_floating_modes(
         scene.floater.bodies[0], scene.floater.conductivity, scene.coils, supply.shares, region, frequency, rtol, note
     )
 
 
-def motion_dataset(scene: Scene, motion: ConductorMotion) -> xr.Dataset:
-    """A trajectory over `time`, SI units."""
+def coils_summary(scene: Scene, duration: float, modes: FloatingModes | FreeModes) -> tuple[xr.Dataset, dict[str, Any]]:
+    """Trajectory of a `scene` with coils for a `duration` (s) by `modes` of its conductor, and numbers for JSON."""
+    height = np.nan
+    if isinstance(modes, FreeModes):
+        motion = conductor.free_motion(scene, modes, duration)
+    else:
+        motion = conductor.conductor_motion(scene, modes, duration)
+        if all(isinstance(coil.current, float) for coil in scene.coils):  # no table of time
+            supply = conductor.Supply(scene.coils, conductor.sources_of(scene.coils))
+            height = conductor.levitation_height(modes, supply, -scene.floater.mass * float(scene.gravity[2]))
     currents = np.stack([coil.amperes(motion.time) for coil in scene.coils], axis=1)
     spin = np.einsum("nab,nb->na", motion.axes, motion.spin)
     found = columns(COLUMNS, (motion.position, motion.velocity, motion.axes, spin, motion.heat, currents))
     axes = {"time": variable(("time",), motion.time, "s", "time"), "axis": list("xyz")}
-    said = {"study": "coils", "ended_by": motion.ended_by, "energy_error": motion.energy_error}
-    return xr.Dataset(found, axes, said)
-
-
-def coils_summary(scene: Scene, duration: float, modes: FloatingModes | FreeModes) -> tuple[xr.Dataset, dict[str, Any]]:
-    """The trajectory of a scene with coils, and its numbers for JSON.
-
-    Parameters
-    ----------
-    scene, modes : as of `conductor_motion`
-    duration : s
-    """
-    mean = float("nan")
-    if isinstance(modes, FreeModes):
-        motion = free_motion(scene, modes, duration)
-    else:
-        motion = conductor_motion(scene, modes, duration)
-    if isinstance(modes, FloatingModes) and all(
-        isinstance(coil.current, float) for coil in scene.coils
-    ):  # no table of time
-        supply = Supply(scene.coils, sources_of(scene.coils))
-        mean = levitation_height(modes, supply, -scene.floater.mass * float(scene.gravity[2]))
+    said = {"ended_by": motion.ended_by, "energy_error": motion.energy_error}
     levitated = float(motion.time[-1])
-    values = {
+    place = [*(1e3 * scene.coils[0].center[:2]).tolist(), 1e3 * height]
+    return xr.Dataset(found, axes, {"study": "coils", **said}), {
         "model": "fem",
         "error_estimate": modes.error,
         "levitated_s": levitated,
-        "ended_by": motion.ended_by,
-        "energy_error": motion.energy_error,
-        "realtime_factor": levitated / motion.seconds if motion.seconds else float("nan"),
-        "levitation_position_mm": None if np.isnan(mean) else [*(1e3 * scene.coils[0].center[:2]).tolist(), 1e3 * mean],
+        **said,
+        "realtime_factor": levitated / motion.seconds if motion.seconds else np.nan,
+        "levitation_position_mm": None if np.isnan(height) else place,
     }
-    return motion_dataset(scene, motion), values
 
 
 def coils_job(scene: Scene, duration: float, rtol: float, out: Path) -> Answer:
-    """`simulate` of a scene with coils; writes trajectory.nc and its figure.
+    """`simulate` of a `scene` with coils, without rotor and plate, for a `duration` (s); writes trajectory.nc to `out`.
 
-    Parameters
-    ----------
-    scene : without rotor and plate
-    duration : s
-    rtol : relative accuracy asked of the mean force
-    out : folder of the files
-
-    Raises
-    ------
-    InputError : as of `heights_over`
+    The mean force is accurate to `rtol`. Raises InputError as `heights_over` does.
     """
     modes, cached = modes_of(scene, rtol)
     result, values = coils_summary(scene, duration, modes)

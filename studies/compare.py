@@ -22,7 +22,7 @@ from ..geometry.files import write_whole
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from ..geometry.solids import Part
-from .cli.console import note, to_json
+from .cli.console import aligned, note, to_json
 from .cli.options import Answer, FieldModel, Models
 from .figures.style import COLORS, NAMES, PALETTE, legend_below, panels, save_figures, styled
 from .levitation import Levitation
@@ -69,15 +69,10 @@ class Compared:
 
 
 def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:
-    """Levitation distances (mm) by the point dipole, that of the true moment and the best model, without the plate.
+    """Levitation distances (mm) by the point dipole, that of the true moment and the `best` model, without the plate.
 
-    Of the dipoles' equilibria those nearest to where the floater levitates by the best model, or else where it does by
-    the dipole; a model without any has None. None where neither has one.
-
-    Parameters
-    ----------
-    dipole, true_moment, best : equilibria of one scene by these models
-    name : of the best model
+    Of the dipoles' equilibria those nearest to where the floater levitates by the best model, of this `name`, or else
+    where it does by the dipole; a model without any has None. None where neither has one.
     """
     true = most_like_levitation(best.equilibria)
     rough = nearest_of(dipole.equilibria, true.position) if true else most_like_levitation(dipole.equilibria)
@@ -106,17 +101,9 @@ def field_rtol(scene: Scene) -> float:
 def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compared]:
     """A scene by dipole, dipole of the true moment, closed form, finite elements, and with mutual magnetisation.
 
-    What mutual magnetisation cannot be computed for is left out with a message.
-
-    Parameters
-    ----------
-    scene : one with a field map has that in the place of the finite elements
-    requested : model of the plate and tolerances
-    spin : body spin
-
-    Raises
-    ------
-    EquilibriumError : the rotor is at rest
+    With body `spin`, tolerances and plate as `requested`; a map of the field takes the place of finite elements. What
+    mutual magnetisation cannot be computed for is left out with a message. Raises EquilibriumError: the rotor is at
+    rest.
     """
     if not scene.floater.round:
         note("All models have the mean of the floater over turns about its moment.")
@@ -153,9 +140,7 @@ def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compare
 
 def _nearest(equilibria: Sequence[Equilibrium], to: Equilibrium | None) -> Equilibrium | None:
     """The one nearest to another, or, where there is no other, where the floater levitates; None without any."""
-    if to is None:
-        return most_like_levitation(equilibria)
-    return nearest_of(equilibria, to.position)
+    return nearest_of(equilibria, to.position) if to else most_like_levitation(equilibria)
 
 
 def _with_branch(one: Compared) -> Compared:
@@ -176,13 +161,7 @@ def _with_branch(one: Compared) -> Compared:
 
 
 def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None) -> xr.Dataset:
-    """All of it over `model`, and the branches over `frequency`.
-
-    Parameters
-    ----------
-    rows : of `compared`
-    frequencies : (n,) Hz of the branches; None: about the ranges of stability
-    """
+    """All of it over `model`, and the branches over `frequencies` (n,) Hz, by default about the ranges of stability."""
     scene = rows[0].levitation.scene
     if frequencies is None:
         ends = [f for row in rows for f in row.stable or ()] or [scene.frequency * (1 - BESIDE)]
@@ -257,11 +236,7 @@ def compare_words(rows: Sequence[Compared]) -> list[str]:
     elif best.found is not None:
         said = [f"At {scene.frequency:g} Hz there is no equilibrium by the point dipole, but one by {name}."]
     table = [COLUMNS, *(_cells(row) for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = [
-        "  ".join([cells[0].ljust(widths[0]), *map(str.rjust, cells[1:-1], widths[1:-1]), cells[-1]]).rstrip()
-        for cells in table
-    ]
+    lines = aligned(table, "<" + ">" * (len(COLUMNS) - 2) + "<")
     plate = best.levitation.plate
     conditions = "without a plate" if scene.plate is None else "without eddy currents in the plate"
     if plate is not None:
@@ -313,18 +288,7 @@ def compare_figure(result: xr.Dataset) -> Figure:
 
 
 def compare_job(scene: Scene, requested: Models, spin: float, frequencies: Array | None, out: Path) -> Answer:
-    """Every model's results; writes compare.nc, compare.json and the figure.
-
-    Parameters
-    ----------
-    scene, requested, spin : as of `compared`
-    frequencies : (n,) Hz at which the distances are compared too, or None
-    out : folder of the files
-
-    Raises
-    ------
-    EquilibriumError : as of `compared`
-    """
+    """Results as of `compared`, at `frequencies` (n,) Hz too; writes compare.nc, .json and the figure to `out`."""
     rows = compared(scene, requested, spin)
     best = rows[-1]
     result = compared_dataset(rows, frequencies)

@@ -50,9 +50,7 @@ COLUMNS: Columns = {
 def working_point_dataset(levitation: Levitation) -> xr.Dataset:
     """The working point of every magnet that has a polarisation, over `magnet`, with a section through each.
 
-    Raises
-    ------
-    InputError : no magnet has a polarisation
+    Raises InputError where no magnet has one.
     """
     scene = levitation.scene
     numbers = [k for k, magnet in enumerate(scene.rotor) if magnet.polarization.any()]
@@ -118,7 +116,6 @@ def working_point_answer(found: xr.Dataset) -> dict[str, Any]:
 
 
 def working_point_lines(answer: Mapping[str, Any]) -> list[str]:
-    """Working points as lines for a person."""
     lines = [] if answer["floater_position_mm"] is not None else ["The floater has no equilibrium: it is left out."]
     for one in answer["working_points"]:
         text = (

@@ -16,10 +16,7 @@ import scipy
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics.continuation.frequencies import (
-    branch_through,
-    levitates,
-)
+from ..dynamics.continuation.frequencies import branch_through, levitates
 from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
 from ..dynamics.motion.state import Scales
 from ..geometry.common import Array, ComputationError, InputError, SpinlevError, check_names, shown
@@ -125,11 +122,9 @@ class _Problem:
         return max([0.1 if name == "margin" else float(np.abs(self.search.near.values(name)).min()), *ends, 1e-2])
 
     def _count(self, name: str) -> int:
-        """Of how many numbers a measure is the least."""
         return {"margin": 2, "decay_per_s": len(self.search.start.known.modes)}.get(name, 1)
 
     def numbers(self, z: Array) -> Array:
-        """Numbers of the scene for SLSQP's unknowns."""
         return np.asarray(
             np.clip(self.search.low + z[: len(self.width)] * self.width, self.search.low, self.search.high)
         )
@@ -173,13 +168,11 @@ class _Problem:
         return -np.eye(len(z))[-1] if self.raised else np.asarray(-self.sense * self.slopes(z, self.name)[0])
 
     def excess(self, z: Array, name: str, end: float, sign: int, equal: bool) -> Array:
-        """By how much a limit is met."""
         if (value := self.values(z, name, sign)) is None:
             return np.full(self._count(name) if sign > 0 else 1, FAILED if equal else -FAILED)
         return sign * (value - end / self.sizes[name])
 
     def above(self, z: Array) -> Array:
-        """By how much all that the goal is the least of is above the bound that is raised."""
         value = self.values(z, self.name)
         return np.full(self._count(self.name), -FAILED) if value is None else value - z[-1]
 
@@ -206,7 +199,6 @@ class _Problem:
             self.nearest = worst[0], f": {worst[1]} is {known.values(worst[1]).min():.4g} where it is nearest to them"
 
     def solved(self) -> tuple[Candidate, Array]:
-        """The best scene that was met, and its numbers."""
         search = self.search
         z = (search.at_near - search.low) / self.width
         if self.raised:
@@ -240,7 +232,7 @@ class _Problem:
 
 
 def optimised(search: Search, goal: tuple[str, int], limits: Limits) -> tuple[Candidate, Array]:
-    """The scene that makes a measure large (1) or small (-1) within limits, and its numbers.
+    """The scene that makes a measure large (1) or small (-1) within `limits`, and its numbers.
 
     Raises ComputationError where no scene that was looked at meets them.
     """
@@ -410,7 +402,6 @@ def _dataset(
     search: Search, first: Levitation, goals: Sequence[str], bounds: Mapping[str, tuple[float, float]],
     limits: Limits, found: Sequence[Array],
 ) -> xr.Dataset:  # fmt: skip
-    """Scenes that were found, each searched anew, and the one given."""
     note("The scene that was found, searched anew ...")
     begun = replace(first.models, model=search.models.model)
     given = scene_numbers(first.scene)[1]
@@ -455,7 +446,6 @@ def _dataset(
 
 
 def _measured(levitation: Levitation, known: Equilibrium | None, keys: tuple[str, ...]) -> list[float]:
-    """All measures of a scene; NaN where it has none."""
     found = []
     for name in MEASURES:
         try:
@@ -483,7 +473,6 @@ def _curve(levitation: Levitation, known: Equilibrium | None) -> Array:
 
 
 def _lines(result: xr.Dataset) -> list[str]:
-    """What was found, in lines."""
     lines = []
     for k in range(result.sizes["point"]):
         one = result.isel(point=k)
@@ -529,13 +518,8 @@ def design_figure(result: xr.Dataset) -> Figure:
     left.set_ylim(-0.7, len(places) - 0.3)
     for curve, color in ((0, PALETTE[1]), (1, PALETTE[0])):
         some = result.isel(curve=curve).dropna("step")
-        plot_branch(
-            right,
-            some["followed_frequency"],
-            1e3 * some["followed_distance"],
-            some["followed_stable"].values == 1,
-            color=color,
-        )
+        frequency, distance, stable = (some[f"followed_{name}"] for name in ("frequency", "distance", "stable"))
+        plot_branch(right, frequency, 1e3 * distance, stable.values == 1, color=color)
         values = result["first_value"] if curve == 0 else result["value"].isel(point=0)
         right.plot(values.sel(measure="frequency_hz"), values.sel(measure="distance_mm"), "o", color=color, ms=4)
     right.set(xlabel="rotor frequency (Hz)", ylabel="levitation distance (mm)")

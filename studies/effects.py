@@ -145,7 +145,6 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
 
 
 def _shape(levitation: Levitation) -> ListedEffect:
-    """The shape of a floater that is no sphere, and where it is left out."""
     floater = levitation.scene.floater
     coils = f", {COILS}," if levitation.scene.other_coils else ""
     why = (

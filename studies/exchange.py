@@ -97,9 +97,7 @@ AIR, ROTOR, FLOATER, PLATE = range(4)
 def export_job(scene: Scene, requested: Models, path: Path) -> Answer:
     """Write B (T), H and M (A/m), J (A/m²) and the body's number of a `scene` with `requested` models to `path`.
 
-    Raises
-    ------
-    InputError : the file's name does not end in .vtu
+    Raises InputError where the file's name does not end in .vtu.
     """
     if path.suffix != ".vtu":
         raise InputError(f"Input OUT must end in .vtu; instead received {path}.")
@@ -188,14 +186,10 @@ HIGHEST = 5  # order of the elements in a map; its error is part of it
 
 
 def field_map_job(scene: Scene, plane: str, extent: Array | None, offset: float, steps: int, out: Path) -> Answer:
-    """Write field-map.nc, .png, .pdf and .vtu of a `scene`'s rotor field on a plane to `out`.
+    """Write field-map.nc, .png, .pdf and .vtu of a `scene`'s rotor field on a `plane` ("xy", "xz" or "yz") to `out`.
 
-    Parameters
-    ----------
-    plane : "xy", "xz" or "yz", in the rotor's frame
-    extent : (4,) m, ends of the map along both axes; None: twice the rotor's
-    offset : third coordinate, m
-    steps : points along the longer side
+    In the rotor's frame, with the third coordinate `offset` in m; `extent` (4,) m are the ends along both axes (None:
+    twice the rotor's), `steps` the points along the longer side.
     """
     found = field_map(scene, plane, extent, offset, steps)
     write_dataset(found, out / "field-map.nc", scene)

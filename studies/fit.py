@@ -74,8 +74,8 @@ def table_of(data: Data) -> dict[str, Array]:
 def rows_of_tracks(table: Mapping[str, Array]) -> dict[str, Array]:
     """A row for each track: its depth, and frequency and decay rate of its axial mode, with their standard deviations.
 
-    Tracks of one table differ in what was set. Each is c + e^{-γt} (a cos 2πft + b sin 2πft), by least squares, what
-    is left of it is white noise. Where nothing oscillates the depth alone is known. Raises InputError.
+    Tracks of one table differ in what was set. Each is c + e^{-γt} (a cos 2πft + b sin 2πft), by least squares, what is
+    left of it is white noise. Where nothing oscillates the depth alone is known. Raises InputError.
     """
     keys = [name for name in table if name not in (TIME, HEIGHT)]
     settings = np.stack([table[name] for name in keys] or [0.0 * table[TIME]], axis=1)

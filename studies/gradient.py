@@ -7,7 +7,7 @@ What a number changes at a fixed state is differenced, and nothing else: the equ
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -25,6 +25,7 @@ from ..fem.rotor.choice import PERMEABLE
 from ..geometry.common import Array, InputError, check_names, shown
 from ..geometry.cutting import united
 from ..geometry.scene.files import changed, scene_numbers, scene_text
+from .cli.console import aligned
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented
 from .levitation import Levitation
 from .nearby_scenes import CENTRAL, NearbyScenes, unknown_over_plate
@@ -61,9 +62,7 @@ AT_FOLD = "at a fold an equilibrium has no derivatives"
 class Gradient:
     """Derivatives of the equilibria of a `levitation` by numbers of its scene.
 
-    Raises
-    ------
-    InputError : the rotor is at rest, or its field is a map
+    Raises InputError where the rotor is at rest, its field is a map, or its magnets are parts of one.
     """
 
     def __init__(self, levitation: Levitation) -> None:
@@ -117,7 +116,6 @@ class Gradient:
         return found, implicit, base
 
     def _by_mean(self, known: Equilibrium) -> bool:
-        """Whether an equilibrium is one of the floater's mean, which has dipoles all over the body."""
         return of_whole_body(self.levitation.scene, self.levitation.rates, known)
 
     def end_by(self, point: BranchPoint, key: str) -> tuple[float, float]:
@@ -174,42 +172,33 @@ class Gradient:
             if "plate_damping" in of:
                 values["plate_damping"][row] = answer_of(known, "plate_damping")
         data = {}
+
+        def add(name: str, over: tuple[str, ...], unit: str, label: str, derivatives: Array, doubts: Array) -> None:
+            data[name] = variable(over, derivatives, unit, f"derivative: {label}")
+            data[f"{name}_error"] = variable(over, doubts, unit, f"estimated error of the derivative: {label}")
+
         for name in of:
             unit, label, dims = answers[name]
-            over = ("equilibrium", "key", *dims)
-            data[name] = variable(over, columns[name], unit, f"derivative: {label}")
-            data[f"{name}_error"] = variable(over, errors[name], unit, f"estimated error of the derivative: {label}")
+            add(name, ("equilibrium", "key", *dims), unit, label, columns[name], errors[name])
             if name in MORE:
                 data[f"{name}_value"] = variable(("equilibrium", *dims), values[name], unit, label)
         if ends:
-            places, slopes, doubts = range_ends(self, by)
-            for name in ends:
-                row, label = list(ENDS).index(name), ENDS[name]
-                data[name] = variable(("key",), slopes[row], "Hz", f"derivative: {label}")
-                data[f"{name}_error"] = variable(
-                    ("key",), doubts[row], "Hz", f"estimated error of the derivative: {label}"
-                )
-                data[f"{name}_value"] = variable((), places[row], "Hz", label)
+            for name, place, *found in zip(ENDS, *range_ends(self, by), strict=True):
+                if name in ends:
+                    add(name, ("key",), "Hz", ENDS[name], *found)
+                    data[f"{name}_value"] = variable((), place, "Hz", ENDS[name])
         data["number"] = variable(("key",), [self.numbers[key] for key in by], "as the key", "number of the scene")
-        units = [label_of_key(key)["units"] for key in by]
-        return xr.Dataset(
-            data,
-            {
-                "equilibrium": np.arange(len(equilibria)),
-                "key": list(by),
-                "unit": ("key", units),
-                "mode": list(MODES),
-                "axis": list("xyz"),
-            },
-            {"study": "gradient", "not_known": "; ".join(self.reasons.values()), **self.levitation.labels},
-        )
+        axes = {"equilibrium": np.arange(len(equilibria)), "key": list(by), "mode": list(MODES), "axis": list("xyz")}
+        axes["unit"] = ("key", [label_of_key(key)["units"] for key in by])
+        said = {"study": "gradient", "not_known": "; ".join(self.reasons.values()), **self.levitation.labels}
+        return xr.Dataset(data, axes, said)
 
     def with_errors(
         self, known: Equilibrium, tangent: Tangent, names: Sequence[str], key: str
     ) -> tuple[list[Array], list[Array]]:
-        """Derivatives of answers along a way, and their estimated errors.
+        """Derivatives of answers `names` along the way `tangent` by `key`, and their estimated errors.
 
-        These are of the differences, of the equilibrium that is known, and of the tables of field, mutual
+        These are of the differences, of the equilibrium that is `known`, and of the tables of field, mutual
         magnetisation, currents in the rotor and plate, each relative to what it adds to the derivative.
         """
         assert tangent.lower is not None
@@ -431,44 +420,23 @@ def gradient_job(levitation: Levitation, out: Path) -> Answer:
         return {"gradient": []}, []
     result = found.dataset(levitation.equilibria, list(ANSWERS), found.checked_keys(None))
     write_dataset(result, out / "gradient.nc", levitation.scene)
-    rows = [
-        {
-            str(key): {
-                "unit": str(one["unit"].values),
-                **{
-                    f"{name}{IN_JSON[unit][0]}": float(one[name]) / IN_JSON[unit][1]
-                    for name, (unit, _, dims) in ANSWERS.items()
-                    if not dims
-                },
-                "modes": [
-                    {
-                        "name": str(m),
-                        "growth_per_s": float(one["mode_growth"].sel(mode=m)),
-                        "frequency_hz": float(one["mode_frequency"].sel(mode=m)),
-                    }
-                    for m in one["mode"].values
-                ],
+    plain = {name: IN_JSON[unit] for name, (unit, _, dims) in ANSWERS.items() if not dims}
+    rows: list[dict[str, Any]] = []
+    for number in range(result.sizes["equilibrium"]):
+        rows.append({})
+        for key in result["key"].values.tolist():
+            one = result.isel(equilibrium=number).sel(key=key)
+            modes = zip(MODES, one["mode_growth"].values.tolist(), one["mode_frequency"].values.tolist(), strict=True)
+            rows[-1][key] = {
+                "unit": one["unit"].item(),
+                **{name + end: float(one[name]) / scale for name, (end, scale) in plain.items()},
+                "modes": [{"name": name, "growth_per_s": rate, "frequency_hz": hertz} for name, rate, hertz in modes],
             }
-            for key in each["key"].values
-            for one in [each.sel(key=key)]
-        }
-        for each in (result.isel(equilibrium=k) for k in range(result.sizes["equilibrium"]))
-    ]
-    head = (
-        "derivative of the first by",
-        "unit",
-        "distance (mm)",
-        "polar angle (°)",
-        "growth rate (s⁻¹)",
-        "axial mode (Hz)",
-    )
-    first = result.isel(equilibrium=0)
-    cells: list[tuple[str, ...]] = [head]
-    for key in first["key"].values:
-        one = first.sel(key=key)
-        numbers = 1e3 * one["distance"], one["polar_angle"], one["growth"], one["mode_frequency"].sel(mode=MODES[0])
-        cells.append((str(key), str(one["unit"].values), *(f"{float(number):.5g}" for number in numbers)))
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    lines = ["  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in cells]
+    heads = {"distance_mm": "distance (mm)", "polar_angle_deg": "polar angle (°)", "growth_per_s": "growth rate (s⁻¹)"}
+    cells: list[tuple[str, ...]] = [("derivative of the first by", "unit", *heads.values(), "axial mode (Hz)")]
+    for key, one in rows[0].items():
+        numbers = *(one[name] for name in heads), one["modes"][0]["frequency_hz"]
+        cells.append((key, one["unit"], *(f"{number:.5g}" for number in numbers)))
     not_known = str(result.attrs["not_known"])
-    return {"gradient": rows, "not_known": not_known}, [*lines, *([f"Derivatives: {not_known}."] if not_known else [])]
+    lines = [*aligned(cells, "<>"), *([f"Derivatives: {not_known}."] if not_known else [])]
+    return {"gradient": rows, "not_known": not_known}, lines

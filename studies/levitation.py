@@ -10,14 +10,7 @@ import numpy as np
 from ..dynamics.continuation.branch import BranchPoint, follow_branch
 from ..dynamics.continuation.frequencies import branch_through, by_frequency, on_branch
 from ..dynamics.equilibria.equilibrium import FOLD, LOCKED, PAST_TABLE, Equilibrium, EquilibriumError, Survey
-from ..dynamics.equilibria.search import (
-    FixedPoints,
-    cached_points,
-    free_of_bodies,
-    of_whole_body,
-    survey,
-    with_plate,
-)
+from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, of_whole_body, survey, with_plate
 from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
 from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
@@ -70,21 +63,12 @@ PLACES = 50  # on a trajectory, at which the error by a slab's missing edges is 
 
 
 class Levitation:
-    """Equilibria, stability and trajectory of one scene by the models that are asked for.
+    """Equilibria, stability and trajectory of a `scene` by the `models` asked for, at body `spin` S = Ω·m̂/ω.
 
     Every member is computed when it is first used and then kept: the rotor's `table`, the `survey` of all equilibria,
     the currents of the `plate`, the `stability` of the equilibrium at which a `flight` begins, and its trajectory.
-
-    Parameters
-    ----------
-    scene : a scene file's path, or a scene
-    models : of the field and of the plate, with their tolerances
-    spin : body spin S = Ω·m̂/ω of the equilibria
-
-    Raises
-    ------
-    SceneError : the file cannot be used
-    InputError : a model that does not exist, or a tolerance out of range
+    Raises SceneError where a scene's file cannot be used; InputError for a model that does not exist, or a tolerance
+    out of range.
     """
 
     def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
@@ -141,10 +125,7 @@ class Levitation:
 
     @cached_property
     def quiet(self) -> "Levitation":
-        """That without coils off the axis and currents that change, where a trajectory begins; this one without such.
-
-        Of steady coils about the axis the field stands still in the rotor's frame, and there are equilibria.
-        """
+        """That without coils off the axis and changing currents, where a trajectory begins; else this one."""
         return self.elsewhere(coils=self.scene.axial_coils) if self.scene.other_coils else self
 
     # What a result says of its models
@@ -169,16 +150,10 @@ class Levitation:
 
     @cached_property
     def table(self) -> RotorField:
-        """The rotor's field by the model that was asked for; `auto` chooses and says why."""
         return self.field(self.models.model)
 
     def field(self, model: str) -> RotorField:
-        """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on.
-
-        Raises
-        ------
-        InputError : the map cannot be used
-        """
+        """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
         scene, rtol, nearest = self.scene, self.models.rtol, nearest_faces(self.scene.floater)
         if model == "map":
             return self._tables.once(field_key(scene, model, rtol), lambda: map_of(scene))
@@ -212,12 +187,7 @@ class Levitation:
 
     @cached_property
     def losses(self) -> RotorLosses | None:
-        """The losses in the rotor's metal, or None where none has a conductivity.
-
-        Raises
-        ------
-        InputError : the rotor turns too fast for its metal
-        """
+        """The losses in the rotor's metal, None without any. Raises InputError where it turns too fast."""
         if not self._has_metal():
             return None
         make = partial(cached_rotor_losses, self.scene, note)
@@ -227,9 +197,7 @@ class Levitation:
     def interaction(self) -> Interaction:
         """The rotor's field with what else acts on the floater.
 
-        Raises
-        ------
-        InputError : mutual magnetisation is asked for where it cannot be known
+        Raises InputError where mutual magnetisation is asked for and cannot be known.
         """
         self._has_metal()  # refused before the field's table is made, which takes minutes
         return self._with_effects(self.table)
@@ -256,13 +224,10 @@ class Levitation:
 
     @cached_property
     def without_plate(self) -> Survey:
-        """All equilibria as if there were no plate.
+        """All equilibria as if there were no plate. Raises EquilibriumError: the rotor is at rest; and InputError.
 
-        Raises
-        ------
-        EquilibriumError : the rotor is at rest
-        InputError : a conductor is in the floater's way, the rotor turns too fast for its metal, or the field of a coil
-            does not stand still in the rotor's frame
+        The latter where a conductor is in the floater's way, the rotor turns too fast for its metal, or the field of a
+        coil does not stand still in the rotor's frame.
         """
         check_coils(self.scene)
         interaction = self.interaction
@@ -314,16 +279,13 @@ class Levitation:
 
     @property
     def equilibria(self) -> tuple[Equilibrium, ...]:
-        """Those of the survey."""
         return self.survey.equilibria
 
     @cached_property
     def stability(self) -> Equilibrium:
         """The equilibrium at which a trajectory begins, with its modes; if none will do, the nearest of all.
 
-        Raises
-        ------
-        EquilibriumError : there is none
+        Raises EquilibriumError where there is none.
         """
         if (chosen := _first(self.equilibria)) is None:
             with_spin = f"with body spin {self.spin:g}" if self.scene.frequency else "for any spin"
@@ -381,9 +343,7 @@ class Levitation:
     def plate(self) -> PlateMemory | None:
         """The plate's currents around the place where the floater levitates; None where none are modelled.
 
-        Raises
-        ------
-        InputError : the plate leaves the floater no room, or the model does not fit it
+        Raises InputError where the plate leaves the floater no room, or the model does not fit it.
         """
         scene = self.scene
         alone = self.absolute or scene.plate is None or not scene.frequency
@@ -400,10 +360,7 @@ class Levitation:
         return self.plate_about(place, plan)
 
     def plate_about(self, place: Array, plan: PlatePlan) -> PlateMemory:
-        """The plate's currents as planned, for a floater about a place (3,) m that turns with the rotor.
-
-        Raises what `plate_around` and the plate's models raise.
-        """
+        """The plate's currents as planned, for a floater about a place (3,) m that turns with the rotor."""
         assert self.scene.plate is not None
         radius, frequency = self.scene.floater.radius, self.scene.fastest
         field = sources(self.table), place, radius, frequency
@@ -490,15 +447,12 @@ class Levitation:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
 
         A floater that leaves the range of the plate's table begins anew with one for where it goes: states of other
-        currents begin without the earlier ones.  Where none can be made, the trajectory ends there as lost
+        currents begin without the earlier ones. Where none can be made, the trajectory ends there as lost
         (`Trajectory.left_plate_table`).
 
-        Raises
-        ------
-        EquilibriumError : it shall begin at an equilibrium, and there is none that will do
-        InputError : `duration` is not positive or shorter than the drive, the trajectory would begin in contact, or the
-            plate is in the floater's way after a step of the drive
-        FlightStopped : the user stopped it; the error holds what was simulated
+        Raises EquilibriumError where it shall begin at an equilibrium, and there is none that will do; InputError where
+        `duration` is not positive or shorter than the drive, it would begin in contact, or the plate is in the way
+        after a step of the drive; FlightStopped, which holds what was simulated, where the user stopped it.
         """
         positive("duration", duration)
         check_drive(self.scene, duration)

@@ -124,7 +124,6 @@ def _table(magnet: _Magnet, recoil_permeability: float, folder: Path) -> dict[st
 
 
 def _sources(collection: Any) -> Iterator[Any]:
-    """All sources of collections and lists in each other."""
     if isinstance(collection, magpylib.Collection):
         yield from collection.sources_all
     elif isinstance(collection, list | tuple | set):

@@ -247,11 +247,9 @@ class _Line:
         return base + self.share * (last - first)
 
     def derivatives(self, places: Array, moments: Array) -> tuple[Array, ...]:
-        """See `MutualTable`."""
         parts = (table.derivatives(places, moments) for table in (self.base, self.first, self.last))
         return tuple(a + self.share * (c - b) for a, b, c in zip(*parts, strict=True))
 
     def products(self, places: Array) -> Array:
-        """See `RotorLosses`."""
         base, first, last = (table.products(places) for table in (self.base, self.first, self.last))
         return np.asarray(base + self.share * (last - first))

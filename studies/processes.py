@@ -51,19 +51,13 @@ def program() -> str:
 def results(
     number: int, function: Function, items: deque[Any], showing: bool = False
 ) -> Generator[tuple[Any, Any], None, None]:
-    """Results of a function for each item as they come, with their item; a `Death` in place of what is missing.
+    """Results of a `function`, which gives an iterable, for `items` as they come; a `Death` for what is missing.
 
-    Parameters
-    ----------
-    number : of processes, at most
-    function : gives an iterable
-    items : who iterates may append others
-    showing : whether they only draw, by whichever version of the program, and nobody reads what libraries print there
+    Each comes with its item; who iterates may append others. At most `number` processes work; those that only draw
+    (`showing`) may be of whichever version of the program, and nobody reads what libraries print there.
 
-    Raises
-    ------
-    NoProcessError : not one process can begin; `items` still has all that was not begun
-    ComputationError : the function raised, or the program was changed since this process began
+    Raises NoProcessError where not one process can begin, and `items` still has all that was not begun;
+    ComputationError where the function raised, or the program was changed since this process began.
     """
     busy: dict[Connection, tuple[_Process, Any]] = {}
     free: list[_Process] = []

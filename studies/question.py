@@ -212,10 +212,7 @@ class Question:
         return answer.expand_dims("case").assign_coords({key: ("case", [value]) for key, value in point.items()})
 
     def gather(self, parts: Sequence[xr.Dataset], values: Mapping[str, Sequence[Any]]) -> xr.Dataset:
-        """The points on the grid of the values.
-
-        NaN, or not stable, where a point failed or has fewer equilibria than another.
-        """
+        """The points on the grid of the `values`; NaN, or not stable, where a point failed or has fewer equilibria."""
         nothing = {"stable": False}
         how: dict[str, Any] = {"data_vars": "all", "coords": "different", "compat": "equals"}
         alike: dict[tuple[int, ...], list[xr.Dataset]] = {}

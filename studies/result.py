@@ -22,17 +22,9 @@ from ..fem.rotor.table import FieldTable
 from ..geometry.common import Array, millimetres
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
+from . import words
 from .effects import PLATE_NEGLECTED, ListedEffect, effects_summary, listed_effects, would_end
 from .levitation import Levitation
-from .words import (
-    comparison_words,
-    drive_words,
-    equilibria_words,
-    flight_words,
-    kind_of_flight,
-    plate_words,
-    stable_near_start,
-)
 
 AXIS = ("x", "y", "z")
 MODES = ("bounce", *SIDE, *TILT)
@@ -123,7 +115,16 @@ class Result:
                 "error_estimate": float(table.relative_error(places)[0].max()) if found else None,
                 **_plate(levitation.plate),
                 "equilibria": [equilibrium_summary(equilibrium) for equilibrium in found],
-                "left_out": [_left_out(one) for one in self.survey.left_out],
+                "left_out": [
+                    {
+                        "position_mm": one.known.position / 1e-3,
+                        "laboratory_position_mm": one.known.laboratory_position / 1e-3,
+                        "with_plate": one.known.currents is not None,
+                        "why": one.why,
+                        "followed_to": one.part,
+                    }
+                    for one in self.survey.left_out
+                ],
             }
         if (flight := self.flight) is not None:
             table = levitation.flight_table
@@ -136,14 +137,14 @@ class Result:
                 "left_plate_table": flight.left_plate_table,
                 "levitated_s": flight.levitated_s,
                 "ended_by": flight.ended_by,
-                "kind": kind_of_flight(levitation, flight),
+                "kind": words.kind_of_flight(levitation, flight),
                 "energy_error": flight.energy_error,
                 "field_changes": vars(flight.field_changes),
                 "realtime_factor": flight.realtime_factor,
             }
             if flight.given is not None:
                 momentum, work = flight.given[-1].tolist()
-                stable = stable_near_start(levitation)
+                stable = words.stable_near_start(levitation)
                 values |= {
                     "lost_at_hz": flight.lost_at_hz,
                     "ended_at_hz": float(flight.rate[-1]) / (2 * math.pi),
@@ -168,12 +169,12 @@ class Result:
         """Lines for a person."""
         levitation, lines = self.levitation, [self.failed] if self.failed else []
         if self.survey is not None and not self.failed:
-            lines += equilibria_words(levitation, self.survey)
-        lines += comparison_words(self.comparison, levitation.scene.plate is not None)
+            lines += words.equilibria_words(levitation, self.survey)
+        lines += words.comparison_words(self.comparison, levitation.scene.plate is not None)
         if self.flight is not None:
-            lines += [flight_words(levitation, self.flight), *drive_words(levitation, self.flight)]
+            lines += [words.flight_words(levitation, self.flight), *words.drive_words(levitation, self.flight)]
         if self.flight is not None or not self.failed:
-            lines += plate_words(levitation)
+            lines += words.plate_words(levitation)
         lines += [PLATE_NEGLECTED] if PLATE_NEGLECTED in self.summary["not_modelled"] else []
         first = next(iter(self.survey.equilibria), None) if self.survey is not None else None
         listed = [f"  {effect}" for effect in self._effects]
@@ -181,7 +182,6 @@ class Result:
 
 
 def equilibrium_summary(equilibrium: Equilibrium) -> dict[str, Any]:
-    """One synchronous equilibrium, for JSON."""
     numbers = {}
     for name, unit, _, _ in QUANTITIES:
         if unit in IN_JSON and name != "moment":
@@ -208,25 +208,12 @@ def _read(equilibrium: Equilibrium, name: str, unit: str) -> Any:
     return getattr(equilibrium, name + {"deg": "_deg", "1/s": "_per_s"}.get(unit, ""))
 
 
-def _left_out(left_out: LeftOut) -> dict[str, Any]:
-    """One solution that is no equilibrium of the scene, or is not known to be one."""
-    known = left_out.known
-    return {
-        "position_mm": known.position / 1e-3,
-        "laboratory_position_mm": known.laboratory_position / 1e-3,
-        "with_plate": known.currents is not None,
-        "why": left_out.why,
-        "followed_to": left_out.part,
-    }
-
-
 def left_out_text(left_out: Sequence[LeftOut]) -> str:
     """Solutions that are no equilibria, for an attribute of a dataset."""
     return "; ".join(f"{one.why}: {millimetres(one.known.position)}" for one in left_out)
 
 
 def _plate(memory: PlateMemory | None) -> dict[str, Any]:
-    """The plate's model and its estimated relative error."""
     if memory is None:
         return {"plate_model": "none"}
     return {"plate_model": memory.model, "plate_error_estimate": memory.error, "plate_states": len(memory.table.rates)}
@@ -260,20 +247,17 @@ def label_of_key(key: str) -> dict[str, str]:
     >>> label_of_key("rotor.magnets.1.center_mm.2")
     {'units': 'mm', 'long_name': 'rotor magnets 1 center 2'}
     """
-    words, _, number = key.rpartition(".") if key.rpartition(".")[2].isdecimal() else (key, "", "")
-    end = next((end for end in ENDS if words.endswith(f"_{end}")), "")
-    name = " ".join([*words.removesuffix(f"_{end}").replace(".", " ").replace("_", " ").split(), number]).strip()
+    stem, _, number = key.rpartition(".") if key.rpartition(".")[2].isdecimal() else (key, "", "")
+    end = next((end for end in ENDS if stem.endswith(f"_{end}")), "")
+    name = " ".join([*stem.removesuffix(f"_{end}").replace(".", " ").replace("_", " ").split(), number]).strip()
     return {"units": ENDS.get(end, "1"), "long_name": name}
 
 
 def columns(table: Columns, found: Mapping[str, Any] | Sequence[Any], **sizes: int) -> dict[str, xr.Variable]:
-    """Variables by name as a table of columns has them.
+    """Variables by name as a `table` of columns has them: dimensions, unit and label of each quantity.
 
-    Parameters
-    ----------
-    table : dimensions, unit and label of each quantity
-    found : the quantities by name, or all of them in the table's order
-    sizes : of the dimensions of what was not found, which is NaN
+    `found` are the quantities by name, or all of them in the table's order; `sizes` are of the dimensions of what was
+    not found, which is NaN.
     """
     known = found if isinstance(found, Mapping) else dict(zip(table, found, strict=True))
     return {
@@ -285,47 +269,34 @@ def columns(table: Columns, found: Mapping[str, Any] | Sequence[Any], **sizes: i
 
 def axis_dataset(tables: Mapping[str, FieldTable], heights: Array) -> xr.Dataset:
     """Field of each model on the axis below the rotor, with its estimated relative error; heights (n,) m < 0."""
-    points = np.stack([np.zeros_like(heights), np.zeros_like(heights), heights], axis=1)
-    fields = np.full((len(tables), len(heights), 3), np.nan)
-    errors = np.full((len(tables), len(heights)), np.nan)
-    for k, table in enumerate(tables.values()):
+    points = np.column_stack([np.zeros((len(heights), 2)), heights])
+    found = np.full((len(tables), len(heights), 4), np.nan)  # field and error
+    for row, table in zip(found, tables.values(), strict=True):
         known = table.in_range(points)
-        fields[k, known] = table.evaluate(points[known])[0]
-        errors[k, known] = table.relative_error(points[known])[0]
-    return xr.Dataset(
-        {
-            "axis_field": variable(("model", "axis_height", "axis"), fields, "T", "flux density on the axis"),
-            "axis_error": variable(("model", "axis_height"), errors, "1", "estimated relative error of the field"),
-        },
-        {
-            "model": list(tables),
-            "axis": list(AXIS),
-            "axis_height": variable(("axis_height",), heights, "m", "height on the axis"),
-        },
-    )
+        row[known] = np.column_stack([table.evaluate(points[known])[0], table.relative_error(points[known])[0]])
+    field = variable(("model", "axis_height", "axis"), found[..., :3], "T", "flux density on the axis")
+    error = variable(("model", "axis_height"), found[..., 3], "1", "estimated relative error of the field")
+    height = variable(("axis_height",), heights, "m", "height on the axis")
+    axes = {"model": list(tables), "axis": list(AXIS), "axis_height": height}
+    return xr.Dataset({"axis_field": field, "axis_error": error}, axes)
 
 
 def curve_dataset(curves: Mapping[str, Sequence[ForceCurve]]) -> xr.Dataset:
     """Axial force along the curves of lateral balance, by model."""
     rows = [(model, number, curve) for model, found in curves.items() for number, curve in enumerate(found)]
-    sizes = [len(curve.magnetic_force) for _, _, curve in rows]
-    point, place = ("curve_point",), ("curve_point", "axis")
-
-    def joined(values: list[Array], *shape: int) -> Array:
-        return np.concatenate([np.zeros((0, *shape)), *values])
-
-    positions, moments = joined([c.position for _, _, c in rows], 3), joined([c.moment for _, _, c in rows], 3)
-    forces = joined([c.magnetic_force for _, _, c in rows])
-    return xr.Dataset(
-        {
-            "curve_model": (point, np.repeat([m for m, _, _ in rows] or [""], sizes or [0])),
-            "curve_number": (point, np.repeat([n for _, n, _ in rows] or [0], sizes or [0])),
-            "curve_position": variable(place, positions, "m", "position, rotor's frame"),
-            "curve_moment": variable(place, moments, "1", "direction of the moment"),
-            "curve_force": variable(point, forces, "N", "axial magnetic force"),
-        },
-        {"axis": list(AXIS)},
+    sizes, point, place = [len(curve.position) for *_, curve in rows], ("curve_point",), ("curve_point", "axis")
+    positions, moments, forces = (
+        np.concatenate([np.zeros((0, *shape)), *(getattr(curve, name) for *_, curve in rows)])
+        for name, shape in (("position", (3,)), ("moment", (3,)), ("magnetic_force", ()))
     )
+    data = {
+        "curve_model": (point, np.repeat([model for model, *_ in rows] or [""], sizes or [0])),
+        "curve_number": (point, np.repeat([number for _, number, _ in rows] or [0], sizes or [0])),
+        "curve_position": variable(place, positions, "m", "position, rotor's frame"),
+        "curve_moment": variable(place, moments, "1", "direction of the moment"),
+        "curve_force": variable(point, forces, "N", "axial magnetic force"),
+    }
+    return xr.Dataset(data, {"axis": list(AXIS)})
 
 
 def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset:
@@ -341,27 +312,26 @@ def equilibria_dataset(found: Mapping[str, Sequence[Equilibrium]]) -> xr.Dataset
 
 def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
     """Equilibria of one scene and one model over `equilibrium`, with their modes over `mode`."""
-    data = {}
+    data, count = {}, len(rows)
     for name, unit, label, dims in QUANTITIES:
         values = np.array([_read(e, name, unit) for e in rows], bool if name == "stable" else float)
-        shape = (len(rows), *(len(SIZES[dim]) for dim in dims))
+        shape = (count, *(len(SIZES[dim]) for dim in dims))
         data[name] = variable(("equilibrium", *dims), values.reshape(shape), unit, label)
-    kinds = np.array([e.stability for e in rows], dtype=str)
-    data["stability"] = xr.Variable(("equilibrium",), kinds, {"long_name": "stable, marginal or unstable"})
-    if any(e.kind for e in rows):
-        data["kind"] = xr.Variable(("equilibrium",), np.array([e.kind for e in rows], dtype=str), {"long_name": "kind"})
+    for name, label in (("stability", "stable, marginal or unstable"), ("kind", "kind")):
+        texts = np.array([getattr(e, name) for e in rows], dtype=str)
+        if name == "stability" or any(texts):
+            data[name] = xr.Variable(("equilibrium",), texts, {"long_name": label})
     growing = np.array([e.efolding_s or np.nan for e in rows], float)
     data["efolding"] = variable(("equilibrium",), growing, "s", "e-folding time of the least stable mode, if it grows")
     modes = [{mode.name: (mode.growth_per_s, mode.frequency_hz) for mode in e.modes} for e in rows]
     names = (*MODES, LIBRATION) if any(LIBRATION in each for each in modes) else MODES
     known = np.array([[each.get(name, (np.nan, np.nan)) for name in names] for each in modes], float)
-    known = known.reshape(len(rows), len(names), 2)
-    dims = ("equilibrium", "mode")
-    data["mode_growth"] = variable(dims, known[:, :, 0], "1/s", "growth rate of a mode")
-    data["mode_frequency"] = variable(dims, known[:, :, 1], "Hz", "its frequency")
-    data["number"] = variable((), len(rows), "1", "number of equilibria")
+    growth, frequency = np.moveaxis(known.reshape(count, len(names), 2), -1, 0)
+    data["mode_growth"] = variable(("equilibrium", "mode"), growth, "1/s", "growth rate of a mode")
+    data["mode_frequency"] = variable(("equilibrium", "mode"), frequency, "Hz", "its frequency")
+    data["number"] = variable((), count, "1", "number of equilibria")
     sizes = {dim: list(labels) for dim, labels in SIZES.items()}
-    return xr.Dataset(data, {"equilibrium": np.arange(len(rows)), **sizes, "mode": list(names)})
+    return xr.Dataset(data, {"equilibrium": np.arange(count), **sizes, "mode": list(names)})
 
 
 def state_columns(state: State, over: str, when: str = "", prefix: str = "") -> dict[str, xr.Variable]:
@@ -379,38 +349,23 @@ def state_columns(state: State, over: str, when: str = "", prefix: str = "") -> 
 def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) -> xr.Dataset:
     """A trajectory in the laboratory frame, with its position in the rotor's frame as well.
 
-    Of the plate's currents, if there are some, the attributes say how well they are known, and whether it ended
-    where that ends.
+    The attributes say how well the plate's currents are known, and whether it ended where that ends.
     """
-    lab, rotor = flight.lab, flight.rotor
-    dims = ("time", "axis")
-    far = np.linalg.norm(rotor.position, axis=1)
-    tilt = np.degrees(polar_angle(lab.moment))
-    found = xr.Dataset(
-        {
-            **state_columns(lab, "time"),
-            "position_rotor_frame": variable(dims, rotor.position, "m", "position, rotor's frame"),
-            "distance": variable(("time",), far, "m", "distance from the rotor's origin"),
-            "polar_angle": variable(("time",), tilt, "deg", "polar angle of the moment"),
-        },
-        {"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)},
-        {
-            "study": "simulate",
-            "ended_by": str(flight.ended_by),
-            "levitated_s": flight.levitated_s,
-            "energy_error": flight.energy_error,
-        },
-    )
+    lab, rotor, dims = flight.lab, flight.rotor, ("time", "axis")
+    far, tilt = np.linalg.norm(rotor.position, axis=1), np.degrees(polar_angle(lab.moment))
+    data = {
+        **state_columns(lab, "time"),
+        "position_rotor_frame": variable(dims, rotor.position, "m", "position, rotor's frame"),
+        "distance": variable(("time",), far, "m", "distance from the rotor's origin"),
+        "polar_angle": variable(("time",), tilt, "deg", "polar angle of the moment"),
+    }
     if flight.pose is not None:
         center, axes = flight.pose
-        found = found.assign(
-            rotor_center=variable(dims, center, "m", "origin of the rotor, laboratory frame"),
-            rotor_axis=variable(dims, axes[:, :, 2], "1", "axis of the rotor, laboratory frame"),
-        )
-    if memory is None:
-        return found
-    return found.assign_attrs(
-        plate_error_estimate=memory.error,
-        beyond_plate_table=flight.beyond_plate_table,
-        left_plate_table=int(flight.left_plate_table),
-    )
+        data["rotor_center"] = variable(dims, center, "m", "origin of the rotor, laboratory frame")
+        data["rotor_axis"] = variable(dims, axes[:, :, 2], "1", "axis of the rotor, laboratory frame")
+    said: dict[str, Any] = {"study": "simulate", "ended_by": str(flight.ended_by)}
+    said |= {"levitated_s": flight.levitated_s, "energy_error": flight.energy_error}
+    if memory is not None:
+        said |= {"plate_error_estimate": memory.error, "beyond_plate_table": flight.beyond_plate_table}
+        said["left_plate_table"] = int(flight.left_plate_table)
+    return xr.Dataset(data, {"time": variable(("time",), flight.time, "s", "time"), "axis": list(AXIS)}, said)

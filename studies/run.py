@@ -74,7 +74,7 @@ def field_job(scene: Scene, points: Array, requested: Models, out: Path) -> Answ
 
 
 def _field(table: FieldTable, points: Array, coils: Array, slopes: Array) -> dict[str, Any]:
-    """B, its gradient and their estimated errors at points (n, 3) m; H and M too if the table does not reach all.
+    """B, its gradient and their errors at points (n, 3) m; H and M too if the table does not reach all.
 
     `coils` and `slopes` are B (n, 3) and its gradient (n, 3, 3) of the scene's coils there.
     """
@@ -119,11 +119,8 @@ LOWEST, HIGHEST = 0.5, 250.0  # frequencies for which a reduced table is made at
 def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: float, out: Path) -> Answer:
     """B = G m at a dipole's own `place` (3,), m, laboratory frame, and `frequency`, Hz; writes plate.json to `out`.
 
-    By a `model` of the `scene`'s plate, to a relative accuracy `rtol`.
-
-    Raises
-    ------
-    InputError : no plate in the scene, a frequency or tolerance out of range, or a place in the plate
+    By a `model` of the `scene`'s plate, to a relative accuracy `rtol`. Raises InputError: no plate in the scene, a
+    frequency or tolerance out of range, or a place in the plate.
     """
     if (plate := scene.plate) is None:
         raise InputError("Input scene must have a [plate]; instead received none.")
@@ -156,17 +153,9 @@ def response(
 ) -> tuple[str, ComplexArray, float, list[str]]:
     """Model, tensor G (3, 3), T/(A m²), laboratory frame, its estimated relative error, and tables from the cache.
 
-    Parameters
-    ----------
-    plate : whose response it is
-    place : (3,) of the dipole, m, laboratory frame
-    frequency : Hz
-    model : "slab", "fem", "reduced" or "auto": the slab where its edges change no more than `rtol`, else "fem"
-    rtol : relative accuracy asked of G
-
-    Raises
-    ------
-    InputError : the place is not over one of the plate's two largest faces, with the slab
+    For a dipole at a `place` (3,) m of the laboratory at a `frequency` (Hz), by a `model`: "slab", "fem", "reduced" or
+    "auto", which is the slab where its edges change no more than `rtol`. Raises InputError where the place is not over
+    one of the two largest faces of the `plate`, with the slab.
     """
     body, size, turn = plate.box.to_body(place), plate.box.size, plate.box.rotation
     normal = int(np.argmin(size))
@@ -267,12 +256,9 @@ def main_job(
 ) -> Answer:
     """Compute everything of a `scene` by `requested` models for a body `spin` and a trajectory of `duration` (s).
 
-    With the derivatives of its equilibria if a `gradient` is asked for.
-
-    Writes result.nc, summary.json and the figures to `out`.
-
-    What is finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force
-    curves, a trajectory that the user stops its beginning; then the error goes on to the caller.
+    Writes result.nc, summary.json and the figures to `out`, with the derivatives if a `gradient` is asked for. What is
+    finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force curves, a
+    trajectory that the user stops its beginning; then the error goes on to the caller.
     """
     check_drive(scene, duration)
     check_coils(scene)
@@ -364,11 +350,7 @@ def _static_dataset(levitation: Levitation, survey: Survey, alone: Mapping[str, 
 
 
 def _write(
-    levitation: Levitation,
-    result: xr.Dataset,
-    values: dict[str, Any],
-    flight: Trajectory | None,
-    out: Path,
+    levitation: Levitation, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
 ) -> None:
     """The result and its summary first, then what is drawn of them."""
     note("Files and figures ...")

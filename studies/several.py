@@ -31,9 +31,7 @@ def several(
 ) -> tuple[Together, Levitation]:
     """Trajectories of a scene's floaters for `duration` (s), and the models of the first.
 
-    Raises
-    ------
-    InputError : an effect or a model that is not computed for several floaters, or what `JointFlight` raises
+    Raises InputError for an effect or a model that is not computed for several floaters, or what `JointFlight` raises.
     """
     positive("duration", duration)
     check_drive(scene, duration)
@@ -113,19 +111,10 @@ def several_summary(found: Together, levitation: Levitation) -> dict[str, Any]:
 
 
 def several_job(scene: Scene, requested: Models, duration: float, out: Path, checkpoint: Checkpoint) -> Answer:
-    """`simulate` of a scene with several floaters; writes trajectory.nc and a figure of each floater.
+    """`simulate` of a `scene` with several floaters for `duration` (s); writes trajectory.nc and figures to `out`.
 
-    Parameters
-    ----------
-    scene, requested : the problem and its models
-    duration : s
-    out : folder of the files
-    checkpoint : where the trajectories are kept while they last
-
-    Raises
-    ------
-    InputError : as of `several`
-    FlightStopped : the user stopped it; what is finished is written
+    The trajectories are kept in `checkpoint` while they last. Raises FlightStopped where the user stopped it, after
+    what is finished was written, and what `several` raises.
     """
     found, levitation = several(scene, requested, duration, checkpoint)
     path, data = out / "trajectory.nc", several_dataset(found, levitation)

@@ -27,12 +27,8 @@ SPREADS = {"offset_mm": 1e-3, "velocity_mm_s": 1e-3, "moment_deg": np.pi / 180, 
 def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[State, Array | None]:
     """States (n, 3) at t = 0 from the keys of a scene's `[start]`, each three numbers a trajectory, or three for all.
 
-    With their offsets (n, 3) m from the equilibrium where these are given.
-
-    Raises
-    ------
-    InputError : a key, a shape or a number that is not allowed, with the way out
-    EquilibriumError : offsets are given, and there is no equilibrium
+    With their offsets (n, 3) m from the equilibrium where these are given. Raises InputError for a key, a shape or a
+    number that is not allowed, with the way out; EquilibriumError where offsets are given, and there is no equilibrium.
     """
     columns = {str(key): _rows("starts", str(key), values, UNITS) for key, values in starts.items()}
     if ("offset_mm" in columns) == ("position_mm" in columns):
@@ -97,7 +93,6 @@ def _least_turns(before: Array, after: Array) -> Array:
 
 
 def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array:
-    """Numbers (n, 3), SI units."""
     if key not in units:
         raise InputError(f"Input {name} must have keys among {', '.join(units)}; instead received {key!r}.")
     try:

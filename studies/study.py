@@ -41,11 +41,7 @@ def recorded(
 ) -> xr.Dataset:
     """A point's result from numbers, with those of `LABELS` that it has, ready to be joined along `case`.
 
-    Parameters
-    ----------
-    point : that it is of
-    table, found, sizes : see `columns`
-    axes : coordinates
+    `table`, `found` and `sizes` are as of `columns`; `axes` are coordinates.
     """
     labels = {name: xr.Variable((), point[name], attrs) for name, attrs in LABELS.items() if name in point}
     return xr.Dataset(columns(table, found, **sizes), axes).assign(labels).expand_dims("case")
@@ -53,10 +49,8 @@ def recorded(
 
 def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
     """The cases of a joined result with the given labels."""
-    found = np.ones(result.sizes["case"], bool)
-    for name, wanted in labels.items():
-        found &= result[name].values == wanted
-    return result.isel(case=np.flatnonzero(found))
+    chosen = np.all([result[name].values == wanted for name, wanted in labels.items()], axis=0)
+    return result.isel(case=np.flatnonzero(chosen))
 
 
 def case_with(result: xr.Dataset, **labels: object) -> xr.Dataset:

@@ -19,7 +19,7 @@ from ..dynamics.equilibria.equilibrium import (
     Survey,
 )
 from ..dynamics.flights.trajectory import DRIFTING, GROWING, STABLE, Trajectory, flight_kind
-from .cli.console import detail
+from .cli.console import aligned, detail
 from .figures.style import NAMES
 from .levitation import Levitation
 
@@ -101,7 +101,6 @@ def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out
 
 
 def _place(equilibrium: Equilibrium) -> str:
-    """Where the floater is in the laboratory, and how its moment points."""
     distance, error = _distance(equilibrium).lstrip("-"), equilibrium.position_error / MILLI
     angle = f"polar angle {_polar_angle(equilibrium, 1, '°')}"
     offset, mean = equilibrium.lateral_offset / MILLI, math.hypot(*equilibrium.laboratory_position[:2]) / MILLI
@@ -158,11 +157,9 @@ def equilibria_rows(levitation: Levitation, equilibria: Sequence[Equilibrium]) -
 def equilibria_words(levitation: Levitation, survey: Survey) -> list[str]:
     """The headline, the equilibria as a table, and what was left out."""
     found, left_out = survey.equilibria, survey.left_out
-    rows = equilibria_rows(levitation, found)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    table = ["  ".join(["", *map(str.rjust, row[:-1], widths), row[-1]]).rstrip() for row in rows]
+    table = aligned(equilibria_rows(levitation, found), ">" * (len(COLUMNS) - 1) + "<")
     said = left_out_words(levitation, left_out)
-    return [headline(levitation, found, left_out), *table, *said]
+    return [headline(levitation, found, left_out), *(f"  {line}" for line in table), *said]
 
 
 def left_out_words(levitation: Levitation, left_out: Sequence[LeftOut]) -> list[str]:

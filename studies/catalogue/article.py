@@ -106,14 +106,9 @@ def rotor_scene(
     permeability: float = PERMEABILITY,
     floater: Floater = FLOATER,
 ) -> Scene:
-    """A rotor of the article above its floater, without a plate.
+    """A rotor of the article above its floater, without a plate, with Stokes' `drag` or in vacuum.
 
-    Parameters
-    ----------
-    configuration, value : of the rotor; displacement in mm or tilt in degrees
-    frequency : Hz
-    drag : whether there is air (Stokes)
-    edge, remanence, permeability : of the cubes, m, T and 1
+    Displacement `value` in mm or tilt in degrees, `frequency` in Hz, the cubes' `edge` in m, `remanence` in T.
     """
     kind = CONFIGURATIONS[configuration]
     magnets = kind.make(kind.scale * value, edge, remanence, permeability)
@@ -142,9 +137,7 @@ def levitation_of(
 def stable_frequencies(scene: Scene, rates: Rates) -> StableRange:
     """Frequencies of stable levitation of a rotor, whose motion has these `rates`; the scene's own is any.
 
-    Raises
-    ------
-    EquilibriumError : it levitates stably at no frequency
+    Raises EquilibriumError where it levitates stably at no frequency.
     """
     return stable_range(scene, rates, *reference_state(scene))
 
@@ -163,14 +156,9 @@ def equilibrium_at(levitation: Levitation, distance: float) -> Equilibrium | Non
 def over_plate(
     alone: Levitation, start: Equilibrium, plate: Plate, model: PlateModel, rtol: float
 ) -> tuple[Levitation, Equilibrium, float] | None:
-    """A scene with a plate, the equilibrium that its currents make of one without, and its table's relative error.
+    """A scene with a `plate`, the equilibrium that its currents make of the `start` without, and its table's error.
 
-    None where there is none any more.
-
-    Parameters
-    ----------
-    alone, start : the scene without a plate, and its equilibrium
-    plate, model, rtol : the plate, the model of its currents and the accuracy asked of them
+    The error is relative; `model` and `rtol` are of the plate's currents. None where there is no equilibrium any more.
     """
     there = alone.elsewhere(replace(alone.models, plate_model=model, plate_rtol=rtol), plate=plate)
     there.adopt(Survey((start,), ()))
@@ -191,17 +179,13 @@ class AxialForce:
 
     @property
     def total(self) -> Array:
-        """Both parts, N."""
         return self.attracting + self.repelling
 
 
 def field(configuration: str, value: float, distance: Array) -> tuple[Array, Array]:
-    """|B⊥| and B_z (T) on the axis, by the formulas of the polar angle without a side mode.
+    """|B⊥| and B_z (T) on the axis at distances (n,) m, by the formulas of the polar angle without a side mode.
 
-    Parameters
-    ----------
-    configuration, value : of the rotor, as of `force`
-    distance : (n,) m
+    Rotor as of `force`.
     """
     across, along, _, _ = PARTS[configuration](CONFIGURATIONS[configuration].scale * value, distance, 0 * distance)
     unit = INTERACTION / FLOATER.moment
@@ -215,15 +199,10 @@ def side_radius(distance: ArrayLike, frequency: ArrayLike) -> Array:
 
 
 def force(configuration: str, value: float, distance: ArrayLike, frequency: float, simple: bool = False) -> AxialForce:
-    """Force on the floater: the semi-analytic form, or the simple one for small angles.
+    """Force on the floater by a rotor ("horizontal", "vertical" or "tilt"; mm or degrees) at distances (n,) m.
 
-    Parameters
-    ----------
-    configuration : "horizontal", "vertical" or "tilt"
-    value : displacement, mm, or tilt, degrees
-    distance : (n,) m
-    frequency : Hz
-    simple : whether θ = m_f B⊥/(I ω²), and no side mode in the tilted case; not for the vertical one
+    At a frequency in Hz, by the semi-analytic form, or by the `simple` one for small angles, which is not for the
+    vertical rotor: θ = m_f B⊥/(I ω²), and no side mode in the tilted case.
     """
     d, parameter = np.asarray(distance, float), CONFIGURATIONS[configuration].scale * value
     scale, a = 3 * INTERACTION / d**4, side_radius(d, frequency)
@@ -268,14 +247,10 @@ PARTS = {"horizontal": _horizontal, "vertical": _vertical, "tilt": _tilt}
 
 
 def balanced(configuration: str, value: float, frequency: float, load: float) -> tuple[float, float]:
-    """Distances (m) of the stable and of the unstable point at which the semi-analytic force is a load, else NaN.
+    """Distances (m) of the stable and of the unstable point at which the semi-analytic force is a load (N), else NaN.
 
-    Unstable is the farthest place at which attraction falls below the load, stable the next nearer one.
-
-    Parameters
-    ----------
-    configuration, value, frequency : as of `force`
-    load : N
+    Unstable is the farthest place at which attraction falls below the load, stable the next nearer one. Rotor and
+    frequency are as of `force`.
     """
     grid = np.geomspace(CONTACT, FARTHEST, 600)
 
@@ -293,10 +268,7 @@ def balanced(configuration: str, value: float, frequency: float, load: float) ->
 def analytic_distance(configuration: str, value: float, frequency: ArrayLike) -> Array:
     """Distance without gravity and for small angles, m: equations 17 and 36 of the supplement; NaN for vertical.
 
-    Parameters
-    ----------
-    configuration, value : as of `force`
-    frequency : (n,) Hz
+    Rotor as of `force`; frequency (n,) Hz.
     """
     rate = 2 * np.pi * np.asarray(frequency, float)
     parameter = CONFIGURATIONS[configuration].scale * value

@@ -34,7 +34,7 @@ FIELD_COLUMNS: Columns = {
 
 
 def field_points(quick: bool) -> list[Point]:
-    """Every rotor of the article; `quick` takes the first, the middle and the last of each configuration."""
+
     return [
         {"configuration": name, "value": value, "model": model}
         for name, kind in article.CONFIGURATIONS.items()
@@ -65,10 +65,7 @@ def deviations(part: xr.Dataset) -> dict[str, Any]:
     """|B - B_fem| / |B_fem| (case, distance) of each simpler model, and last the finite elements' own error."""
     true = _of(part, "fem")
     size = np.hypot(true["off_axis"], true["on_axis"])
-    found: dict[str, Any] = {}
-    for model in FIELD_MODELS[:-1]:
-        other = _of(part, model)
-        found[model] = np.hypot(other["off_axis"] - true["off_axis"], other["on_axis"] - true["on_axis"]) / size
+    found = {m: np.hypot(*(_of(part, m)[name] - true[name] for name in COMPONENTS)) / size for m in FIELD_MODELS[:-1]}
     return {**found, "fem": true["field_error"] / size}
 
 
@@ -119,7 +116,6 @@ def _explain(axes: Axes, result: xr.Dataset, models: dict[str, str]) -> None:
 
 
 def _components_lines(result: xr.Dataset) -> list[str]:
-    """The components by finite elements at both ends of each distance, and how far others deviate, as text."""
     rows = []
     for configuration, part in showing.by_configuration(result):
         true, off = _of(part, "fem"), deviations(part)
@@ -145,7 +141,7 @@ FIELD_COMPONENTS = Study(
 
 # Force along the axis against distance, with its repelling and its attracting part: the article's second figure.
 ROTOR = {"configuration": "horizontal", "value": 1.0}  # Of the article's figure; its text does not give the frequency
-FREQUENCIES = (165.0, 170.0, 185.0, 200.0)
+FREQUENCIES = [165.0, 170.0, 185.0, 200.0]
 FORCE_MODELS = ("semi-analytic", "small angles", "dipole", "fem")
 REPORTED_ANGLE, REPORTED_DISTANCE = 9.0, 0.04
 """θ at the tipping point nearest to the rotor, °, in the article's text, and where that calls it almost zero, m."""
@@ -161,12 +157,6 @@ FORCE_COLUMNS: Columns = {
     "angle_near": (ONE, "rad", "polar angle at the near tipping point"),
     "angle_equilibrium": (ONE, "rad", "polar angle at the stable point"),
 }
-
-
-def force_points(quick: bool) -> list[Point]:
-    """The rotor of the figure by both formulas and in both fields; `quick` has a coarser grid and one frequency."""
-    frequencies, spacing = (FREQUENCIES[1:2], 5e-4) if quick else (FREQUENCIES, 1e-4)
-    return [{**ROTOR, "frequencies_hz": list(frequencies), "spacing": spacing, "model": m} for m in FORCE_MODELS]
 
 
 def force_curve(point: Point) -> xr.Dataset:
@@ -198,17 +188,14 @@ def _along_curve(levitation: Levitation, grid: Array) -> Array:
 
 
 def _balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[float, float, float, float, float]:
-    """Stable point, far and near tipping points (m), and θ at the near and at the stable one; NaN where there is none.
-
-    At the near one the force has done as much work up to the far one as is needed to come to rest there.
-    """
+    """Stable point, far and near tipping points (m), θ at the near and at the stable one; NaN where there is none."""
     known = np.isfinite(magnetic)
     rest = PchipInterpolator(distance[known], magnetic[known] - article.WEIGHT)
     roots = rest.roots(extrapolate=False)
-    roots = roots[np.isfinite(roots)]
-    if len(roots) < 2:
+    if np.isfinite(roots).sum() < 2:
         return (np.nan,) * 5
-    stable, far = roots[-2:].tolist()
+    stable, far = roots[np.isfinite(roots)][-2:].tolist()
+    # released at the near one, the floater comes to rest at the far one
     work, low, near = rest.antiderivative(), distance[known][0], np.nan
     if work(far) < work(low):
         near = brentq(lambda d: work(far) - work(d), low, stable)
@@ -278,7 +265,6 @@ def _net(found: xr.Dataset) -> xr.DataArray:
 
 
 def _plot(axes: Axes, found: xr.Dataset, values: ArrayLike, style: str, **more: Any) -> None:
-    """Thousandfold values against the distance in mm."""
     axes.plot(1e3 * found["distance"], 1e3 * np.asarray(values), style, **more)
     axes.set(xlabel="distance along the axis (mm)", xlim=(11, 45))
 
@@ -289,7 +275,6 @@ def _mark(axes: Axes, found: xr.Dataset, color: str) -> None:
 
 
 def _force_lines(result: xr.Dataset) -> list[str]:
-    """Equilibria and polar angles of each model at every frequency, as text."""
     rows = []
     for k, frequency in enumerate(result["frequency"].values):
         for model, (_, text) in STYLES.items():
@@ -306,7 +291,15 @@ FORCE_CURVE = Study(
     name="force-curve",
     summary="force along the axis with its parts, stable and tipping points; the article's formulas and full fields",
     quick="all but one of four frequencies; distances 0.5 mm apart instead of 0.1 mm",
-    points=force_points,
+    points=lambda quick: [
+        {
+            **ROTOR,
+            "frequencies_hz": FREQUENCIES[1:2] if quick else FREQUENCIES,
+            "spacing": 5e-4 if quick else 1e-4,
+            "model": m,
+        }
+        for m in FORCE_MODELS
+    ],
     compute=force_curve,
     figures={"force-curve-parts": parts_figure, "force-curve-net": net_figure},
     report=_force_lines,
@@ -332,7 +325,7 @@ SIDE_COLUMNS: Columns = {
 
 
 def side_points(quick: bool) -> list[Point]:
-    """Every rotor that levitated in the article's experiment in both fields; `quick` takes three of them."""
+
     return [
         {"configuration": name, "value": value, "model": model, "step_hz": 10.0 if quick else 2.5}
         for name, kind in article.CONFIGURATIONS.items()
@@ -365,7 +358,6 @@ def side_mode(point: Point) -> xr.Dataset:
 
 
 def _predicted(simulated: xr.Dataset) -> float:
-    """The article's radius at the mean distance of the trajectory, mm."""
     return 1e3 * float(side_radius(-float(simulated["flight_z"].mean()), SIMULATED_HZ))
 
 

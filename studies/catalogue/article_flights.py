@@ -50,7 +50,7 @@ DISTANCE_COLUMNS: Columns = {
 
 
 def distance_points(quick: bool) -> list[Point]:
-    """Every rotor by every formula and field; `quick` takes three rotors, a coarser grid and a rigid floater."""
+
     step, flights, interaction = (10.0, 1, "rigid") if quick else (2.5, 3, "auto")
     more = {"step_hz": step, "flights": flights, "interaction": interaction}
     return [
@@ -99,12 +99,7 @@ def _in_field(point: Point, grid: Array) -> dict[str, Any]:
 
 
 def mean_height(scene: Scene, field: FieldTable, point: BranchPoint) -> tuple[float, float]:
-    """Mean distance along the axis (m) of a trajectory that a kick began, and by how much its halves differ.
-
-    Parameters
-    ----------
-    scene, field : of which the frequency is that of `point`
-    point : the equilibrium in which it begins
+    """Mean distance along the axis (m) of a trajectory that a kick began at `point`, and by how much its halves differ.
 
     Means are weighted by sin², which takes out the axial mode; NaN where the trajectory did not last.
     """
@@ -159,7 +154,6 @@ def formulas_figure(result: xr.Dataset) -> Figure:
 
 
 def _levitated(rotor: xr.Dataset) -> bool:
-    """Whether the article's experiment levitated with a rotor."""
     return float(rotor["value"][0]) in article.CONFIGURATIONS[str(rotor["configuration"].values[0])].levitated
 
 
@@ -254,12 +248,6 @@ FLIGHT_COLUMNS: Columns = {
 }
 
 
-def flight_points(quick: bool) -> list[Point]:
-    """The displacements, simulated for 60 s in the field of finite elements, `quick` in the dipole's."""
-    requested = {"configuration": "horizontal", "model": "dipole" if quick else "fem", "duration_s": 60.0}
-    return [{**requested, "complete": not quick, "value": value} for value in DISPLACEMENTS]
-
-
 def trajectories(point: Point) -> xr.Dataset:
     """The trajectories of one rotor, simulated and averaged, see `FLIGHT_COLUMNS`; and what became of each."""
     complete = point.get("complete", False)
@@ -349,7 +337,16 @@ TRAJECTORIES = Study(
     name="trajectories",
     summary="linear fall, stable and unstable trajectory: the distance against time, simulated and averaged",
     quick="finite elements (point dipoles instead), eddy currents in the rotor, real air, mutual magnetisation",
-    points=flight_points,
+    points=lambda quick: [
+        {
+            "configuration": "horizontal",
+            "model": "dipole" if quick else "fem",
+            "duration_s": 60.0,
+            "complete": not quick,
+            "value": value,
+        }
+        for value in DISPLACEMENTS
+    ],
     compute=trajectories,
     figures={"trajectories": flight_figure},
     report=_flight_lines,

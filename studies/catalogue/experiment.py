@@ -71,13 +71,9 @@ COLUMNS: Columns = {
 
 
 def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, seed: int) -> dict[str, Any]:
-    """Draws of the posterior and the evidence, by names of `COLUMNS`; the same seed gives the same draws.
+    """Draws of the posterior of the `models` by the `facts`, and the evidence, by names of `COLUMNS`.
 
-    Parameters
-    ----------
-    models, facts : whose likelihood is asked for
-    live, walks : points of nested sampling, and steps of the walk by which each new one is found
-    seed : of all random numbers
+    Nested sampling with so many `live` points, each new one found by so many `walks`; the `seed` decides all of it.
     """
     from dynesty import NestedSampler
 
@@ -104,13 +100,9 @@ def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, 
 
 
 def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) -> dict[str, Any]:
-    """Evidences by draws of the prior (Sobol's sequence), by names of `COLUMNS`.
+    """Evidences of the `models` by the `facts`: from `draws` of the prior (a power of two), by names of `COLUMNS`.
 
-    Parameters
-    ----------
-    models, facts : whose likelihood is asked for
-    draws : how many, a power of two
-    seed : of the sequence
+    The draws are Sobol's sequence of this `seed`.
     """
     shares = np.clip(qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws), 1e-12, 1 - 1e-12)
     pieces = np.array_split(shares, max(1, draws // TOGETHER))
@@ -194,7 +186,6 @@ def experiment_points(quick: bool) -> list[Point]:
 
 
 def _designs(settings: Point, mutual: bool) -> dict[tuple[str, str], list[Point]]:
-    """Rotors of each kind by each model."""
     counts = {("single", "cuboid"): "single", ("stack", "cuboid"): "stack", ("single", "fem"): "better"}
     counts |= {("single", "mutual"): "better"} if mutual else {}
     nodes = {"heights": settings["heights"], "spins": settings["spins"]}
@@ -209,12 +200,7 @@ def _designs(settings: Point, mutual: bool) -> dict[tuple[str, str], list[Point]
 
 
 def experiment(point: Point) -> xr.Dataset:
-    """A rotor of a design, or the posterior of a variant.
-
-    Returns
-    -------
-    Of a variant a dataset over `draw`, `unknown`, `fact`, and `rotor_kind` and `fitted` of the surrogates
-    """
+    """A rotor of a design; or of a variant the posterior over `draw`, `unknown`, `fact`, and its surrogates' errors."""
     if "rotor" in point:
         return xr.Dataset({"hanging": design_row(point)["hanging"]}).expand_dims("design")
     name, settings, effects = point["variant"], SETTINGS[point["quick"]], VARIANTS[point["variant"]]
@@ -297,10 +283,9 @@ def prior_quantiles(result: xr.Dataset) -> Array:
 
 
 def facts_weighed(one: xr.Dataset) -> tuple[xr.Dataset, Array]:
-    """Of the facts that a variant is fitted to: probabilities, and the logarithm of the gain (fact, fact) of each two.
+    """Of the facts that a variant is fitted to: probabilities beforehand, given all others and in the fit, and gains.
 
-    Probabilities are beforehand, given all others and in the fit; a gain is the evidence of two facts together over
-    that of each by itself.
+    A gain (fact, fact) is the logarithm of the evidence of two facts together over that of each by itself.
     """
     known = np.flatnonzero(np.isfinite(one["log_evidence_single"].values))
     some = one.isel(fact=known, other_fact=known)
@@ -316,7 +301,6 @@ def facts_weighed(one: xr.Dataset) -> tuple[xr.Dataset, Array]:
 
 
 def _labels(result: xr.Dataset) -> dict[str, str]:
-    """Symbol and unit of each unknown."""
     symbols = {unknown.name: unknown.symbol for unknown in UNKNOWNS}
     units = {"1": "", "S/m": " (MS/m)", "deg": " (°)", "um": " (µm)", "kg/m3": " (kg/m³)"}
     pairs = zip(result["unknown"].values.tolist(), result["unit"].values.tolist(), strict=True)

@@ -62,10 +62,7 @@ KINDS = {
 
 
 def scene_of(inputs: Mapping[str, float], permeability: float = 1.0) -> Scene:
-    """The scene of a rotor, in vacuum and without metal; its frequency is any.
-
-    A cube is displaced along +x and tilted about y, and there is a second one if there is a stack.
-    """
+    """A rotor's scene in vacuum, without metal, its frequency any; a cube is displaced along +x and tilted about y."""
     angle = np.radians(inputs["on_axis"] - PER_MILLIMETRE * inputs["displacement"])
     cube = tilt(angle, EDGE, REMANENCE, permeability)[0]
     shift = np.array([1e-3 * inputs["displacement"], 0.0, 0.0])
@@ -104,7 +101,7 @@ class Levitating:
     @cached_property
     def rates(self) -> Rates:
         """With the floater's currents and real air among the compiled equations, where their strength is zero."""
-        return Rates(with_effects(_lossy(self.scene), self.table))
+        return Rates(with_effects(replace(self.scene, **losses(self.scene, rotor=False)), self.table))
 
     def nodes(self, heights: Array, spins: Array) -> Array:
         """Quantities (height, spin, quantity) at distances (n,) m along the axis and body spins; NaN where none is."""
@@ -154,46 +151,33 @@ class Levitating:
 
     def _quantities(self, family: Family, unknowns: Array) -> Array:
         frequency = float(unknowns[6]) * UNIT
-        scene = replace(_lossy(self.scene), frequency=frequency)
+        scene = replace(self.scene, frequency=frequency, **losses(self.scene, rotor=False))
         scales, whole = Scales.of(scene), parameters(scene, Scales.of(scene))
         still, eddy, air = (_without(whole, off) for off in (OFF, AIR, EDDY))
-        state = family.balance(frequency).states(unknowns[None, :3], unknowns[None, 3:6])
-        drift = [SlowTorque(self.rates, values, scene.floater.radius, False)(state[0]) for values in (eddy, air)]
-        bare = self.rates(state, still)[1][0]
-        slopes = [
-            self.rates(state, _without(v, [Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]))[1][0] - bare for v in (eddy, air)
-        ]
-        there = scales.unpack(state[0])
+        (state,) = family.balance(frequency).states(unknowns[None, :3], unknowns[None, 3:6])
+        drift = [SlowTorque(self.rates, values, scene.floater.radius, False)(state) for values in (eddy, air)]
+        bare = self.rates(state[None], still)[1][0]
+        by_eddy, by_air = (
+            self.rates(state[None], _without(values, [Parameter.SPIN_DRAG, Parameter.SPIN_EDDY]))[1][0] - bare
+            for values in (eddy, air)
+        )
+        there = scales.unpack(state)
         brakes = [np.zeros((12, 12)) if loss is None else brake_slope(loss, scene, there) for loss in self.metal]
-        small = modes(state[0], bare)
+        small = modes(state, bare)
         named = {mode.name: mode.frequency_hz for mode in named_modes(small, scales.time)}
-        effects = [slopes[0], *brakes, slopes[1]]
+        # The two modes that the first two effects make grow most; the side motion is the one that moves the place more.
+        tangents, projections = (part[0] for part in tangent_spaces(state[None]))
+        values, right = np.linalg.eig(projections @ bare @ tangents)
+        left, effects = np.linalg.inv(right), (by_eddy, *brakes, by_air)
+        each = np.array([np.einsum("kj,ji,ik->k", left, projections @ e @ tangents, right).real for e in effects])
+        two = np.argsort(np.where(values.imag > 1e-6, each[:2].sum(axis=0), -np.inf))[-2:]
+        shapes = np.abs(tangents @ right[:, two])
+        moving = np.hypot(*shapes[:2]) / np.linalg.norm(shapes[6:9], axis=0)
         units = np.array([1 / (2 * np.pi), *[1.0] * len(effects)]) / scales.time
-        grown = [units * motion for motion in _first_order(state[0], bare, effects)]
-        circle = scales.length * np.hypot(*state[0, :2])
+        grown = [units * np.array([values[k].imag, *each[:, k]]) for k in two[np.argsort(moving)]]
+        circle = scales.length * np.hypot(*state[:2])
         own = (frequency, *drift, circle, named.get("bounce", np.nan), small.growth / scales.time)
         return np.concatenate([own, *grown])
-
-
-def _first_order(state: Array, slope: Array, added: Sequence[Array]) -> tuple[Array, Array]:
-    """(Scaled, angular) frequency of two normal modes, and what each of the effects (12, 12) adds to their growth.
-
-    They are the two that the first two effects make grow most; the side motion is the one that moves the place more.
-    """
-    tangents, projections = (part[0] for part in tangent_spaces(state[None]))
-    values, right = np.linalg.eig(projections @ slope @ tangents)
-    left = np.linalg.inv(right)
-    each = np.array([np.einsum("kj,ji,ik->k", left, projections @ part @ tangents, right).real for part in added])
-    two = np.argsort(np.where(values.imag > 1e-6, each[:2].sum(axis=0), -np.inf))[-2:]
-    shapes = np.abs(tangents @ right[:, two])
-    moving = np.hypot(*shapes[:2]) / np.linalg.norm(shapes[6:9], axis=0)
-    precession, side = two[np.argsort(moving)]
-    return tuple(np.array([values[k].imag, *each[:, k]]) for k in (precession, side))  # type: ignore[return-value]
-
-
-def _lossy(scene: Scene) -> Scene:
-    """The scene in real air, its floater conducting."""
-    return replace(scene, **losses(scene, rotor=False))
 
 
 def _without(values: Array, off: Sequence[int]) -> Array:
@@ -242,12 +226,10 @@ def design_inputs(kind: str, number: int) -> dict[str, float]:
 
 
 def design_row(point: Point, cached: bool = True) -> xr.Dataset:
-    """One rotor of a design; whoever fits a surrogate finds the rotors that others computed in the cache.
+    """One rotor of a design, which whoever fits a surrogate finds in the cache.
 
-    Returns
-    -------
-    Dataset over `height` and `body_spin`: its nodes (NaN where nothing levitates), how far the attraction alone carries
-    the weight, and its inputs
+    Over `height` and `body_spin` its nodes (NaN where nothing levitates), with `hanging`, the distance at which the
+    attraction alone carries the weight, and its inputs.
     """
     kind = KINDS[point["rotor"]]
     inputs = design_inputs(point["rotor"], point["number"])
@@ -276,7 +258,6 @@ def losses_of(scene: Scene, steel: bool) -> tuple[Dissipation, Dissipation | Non
 
 @cache
 def _canonical_losses(permeability: float, steel: bool) -> tuple[RotorLosses, RotorLosses | None]:
-    """Those of a cube about the origin, and of the block above it."""
     cube = replace(horizontal(0.0, EDGE, REMANENCE, permeability)[0], conductivity=MAGNET_CONDUCTIVITY)
     alone = Scene(100.0, (cube,), FLOATER, Drag(0.0, 0.0))
     magnet = cached_rotor_losses(alone, lambda _: None)[0]

@@ -42,7 +42,7 @@ APART = 0.03, 0.004
 def strength(name: str, inputs: Array) -> Array:
     """How strong the field on the axis is (n,), as the tilt (°) of a lone cube that levitates at the same frequency.
 
-    Inputs (n, input) are those of the kind of rotor of this name.  The field of a second cube falls off as its distance
+    `inputs` (n, input) are those of the kind of rotor of this `name`. A second cube's field falls off as its distance
     grows; fitted to 10, 14 and 20 mm, good to 5 %.
     """
     known = dict(zip(KINDS[name].box, inputs.T, strict=True))
@@ -209,8 +209,7 @@ def simulated(
 
     Parameters
     ----------
-    surrogate : of their kind
-    inputs : (n, input) of the rotors
+    surrogate, inputs : of their kind, and (n, input) of the rotors
     frequency, spin : (n,) Hz, and of the body at release
     strengths : (n, 4) of the floater's currents, the magnets', the steel's and air, over the surrogate's
     longest : (n,) how long they are followed, s
@@ -324,13 +323,9 @@ class Models:
 
 
 def ends(models: Models, flight: Flight, course: Course, values: Values) -> dict[str, Array]:
-    """Probabilities (n,) of how trajectories end: "nothing" (no equilibrium), "falls", "stays", "oscillates".
+    """Probabilities (n,) of how a `flight` with this `course` ends, for unknowns `values` (n,), by the `models`.
 
-    Parameters
-    ----------
-    models : surrogates
-    flight, course : kind of rotor and longest time; what becomes of the trajectories
-    values : the unknowns (n,)
+    "nothing" (no equilibrium), "falls", "stays", "oscillates".
     """
     kind, _, _, longest = flight
     there = ndtr(course["margin"] / np.hypot(models.error(kind, "frequency"), SOFT))
@@ -528,8 +523,7 @@ UNKNOWNS = (
     ),
     Unknown("spin", "1", "spin at release", NORMAL, 0.02, 0.05, "at release: 0 to 0.05 in settling over the plate"),
     Unknown(
-        *("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5),
-        "of the stack of 10 mm, displacement and tilt together",
+        *("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5), "of the stack of 10 mm, displacement and tilt together"
     ),
     Unknown("tilt_18", "deg", "tilt at 18 mm", NORMAL, 0.0, 2.5, "of that of 18 mm"),
     Unknown("tilt_20", "deg", "tilt at 20 mm", NORMAL, 0.0, 2.5, "of that of 20 mm"),

@@ -55,7 +55,6 @@ def dipole_validity(quick: bool, rotors: Mapping[str, tuple[Magnet, ...]] = ROTO
     points = np.stack([r * np.cos(phi), r * np.sin(phi), -d], axis=-1).reshape(-1, 3)
 
     def worst(values: Array) -> Array:
-        """The largest over the azimuth (distance, offset)."""
         return np.asarray(values.reshape(d.shape).max(axis=2))
 
     errors, gradients, own = [], [], []
@@ -250,14 +249,7 @@ COLUMNS: Columns = {
 
 
 def field_hard_cases(quick: bool, cases: Mapping[str, HardCase] = CASES, places: int = PLACES) -> xr.Dataset:
-    """Errors of B by case and distance from the faces; a quick run has few cases and coarse references.
-
-    Parameters
-    ----------
-    quick : whether it is one
-    cases : by name
-    places : distances, from the case's own nearest one on
-    """
+    """Errors of B of `cases` by name at `places` distances from the faces; `quick` has few, and coarse references."""
     if quick:
         cases = {name: replace(case, order=min(case.order, 4)) for name, case in cases.items() if case.quick}
     rows = []
@@ -347,7 +339,6 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
 
 
 def hard_case_lines(result: xr.Dataset) -> list[str]:
-    """The report of `field-hard-cases`, a line a case."""
     keys, rows = tuple(LINES)[1::-1] + tuple(LINES)[2:], []
     for name in result["case"].values:
         row = result.sel(case=name)

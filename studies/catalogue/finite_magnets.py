@@ -53,12 +53,6 @@ RTOL, COARSE = 1e-5, 1e-4
 ROUND_OFF = 1e-10  # Relative error of what needs no finite elements
 
 
-def dipole_points(quick: bool) -> list[Point]:
-    """The rotors that levitated; quick: one frequency, and finite elements whose error is still below 1 µm."""
-    more = {"steps": 1, "rtols": [10 * RTOL, 10 * COARSE]} if quick else {"steps": 4, "rtols": [RTOL, COARSE]}
-    return [{**rotor, **more} for rotor in levitated_rotors(quick)]
-
-
 def dipole_vs_fem(point: Point) -> xr.Dataset:
     """Distance, polar angle, modes and limits of stability of one rotor, by every model and with errors."""
     scene = rotor_scene(point["configuration"], point["measure"], drag=False)
@@ -94,7 +88,6 @@ def dipole_vs_fem(point: Point) -> xr.Dataset:
 
 
 def _levitation(scene: Scene, rates: Rates, stable: StableRange, grid: Array) -> dict[str, Array]:
-    """What one model gives at the frequencies of a grid, and between which it levitates."""
     found = [at_frequency(scene, rates, stable.near(float(f)), float(f)) for f in grid]
     modes = [[mode.frequency_hz for mode in named_modes(point.motion, point.time_unit)] for point in found]
     angles = np.degrees(polar_angle(np.array([point.state[6:9] for point in found])))
@@ -115,14 +108,7 @@ ENDS = {"contact": ("v", "contact with the rotor"), "border": ("^", "beyond this
 
 
 def change(result: xr.Dataset, name: str, models: tuple[str, str]) -> tuple[xr.DataArray, xr.DataArray]:
-    """By how much a quantity is larger in the second model than in the first, and the estimated error.
-
-    Parameters
-    ----------
-    result : of the study
-    name : of the quantity
-    models : the first and the second
-    """
+    """By how much the quantity `name` is larger in the second of two `models`, and the estimated error."""
     first, second = models
     value = result[name].sel(model=second) - result[name].sel(model=first)
     return value, result[f"{name}_error"].sel(model=second) + result[f"{name}_error"].sel(model=first)
@@ -186,12 +172,13 @@ def ranges_figure(result: xr.Dataset) -> Figure:
 
 
 def _dipole_lines(result: xr.Dataset) -> list[str]:
-    causes = [*CAUSES.items(), ("all together", TOTAL)]
-    rows = [
-        (f"{configuration}: {cause}", *_changes(part, models))
-        for configuration, part in showing.by_configuration(result)
-        for cause, models in causes
-    ]
+    rows, scales = [], {"distance": 1e3, "polar_angle": 1.0, "lowest": 1.0, "highest": 1.0}
+    for configuration, part in showing.by_configuration(result):
+        for cause, models in [*CAUSES.items(), ("all together", TOTAL)]:
+            relative = 100 / part["mode_frequency"].sel(model=models[0])
+            axial = ((each * relative).sel(mode="bounce") for each in change(part, "mode_frequency", models))
+            cells = [showing.range_text(*change(part, name, models), scale) for name, scale in scales.items()]
+            rows.append((f"{configuration}: {cause}", *cells, showing.range_text(*axial)))
     head = ("change by", "distance (mm)", "polar angle (°)", "lowest (Hz)", "highest (Hz)", "axial mode (%)")
     limits = []
     for rotor, part in showing.by_rotor(result):
@@ -202,15 +189,6 @@ def _dipole_lines(result: xr.Dataset) -> list[str]:
             limits.append(cells)
     ends = showing.text_table(("stable frequencies", "lowest (Hz)", "", "highest (Hz)", ""), limits)
     return [*showing.text_table(head, rows), *ends, sentence(result)]
-
-
-def _changes(part: xr.Dataset, models: tuple[str, str]) -> list[str]:
-    """What lies between two models: range and largest error of distance, angle, ends of stability and axial mode."""
-    scales = {"distance": 1e3, "polar_angle": 1.0, "lowest": 1.0, "highest": 1.0}
-    cells = [showing.range_text(*change(part, name, models), scale) for name, scale in scales.items()]
-    relative, bounce = 100 / part["mode_frequency"].sel(model=models[0]), {"mode": "bounce"}
-    value, error = ((each * relative).sel(bounce) for each in change(part, "mode_frequency", models))
-    return [*cells, showing.range_text(value, error)]
 
 
 def sentence(result: xr.Dataset) -> str:
@@ -231,7 +209,10 @@ DIPOLE_VS_FEM = Study(
     name="dipole-vs-fem",
     summary="what finite magnets change in distance, angle, modes, limits: shape, permeability, mutual magnetisation",
     quick="nine of twelve rotors, three of four frequencies; finite elements to 1e-4 instead of 1e-5",
-    points=dipole_points,
+    points=lambda quick: [
+        {**rotor, "steps": 1 if quick else 4, "rtols": [10 * RTOL, 10 * COARSE] if quick else [RTOL, COARSE]}
+        for rotor in levitated_rotors(quick)
+    ],
     compute=dipole_vs_fem,
     figures={
         "dipole-vs-fem-distance": distances_figure,
@@ -251,17 +232,12 @@ FORCE_PARTS = ("rigid", "floater_answer", "rotor_answer", "total")
 def floater_permeability(scene: Scene, distances: Sequence[float] | None = None, quick: bool = False) -> xr.Dataset:
     """Rigid dipole against mutual magnetisation, on the axis below the rotor and at the stable equilibrium.
 
-    Parameters
-    ----------
-    distances : of the floater's centre below the rotor's origin, m; by default from contact to 50 mm
-    quick : fewer nodes and distances
+    At `distances` below the rotor's origin (m; by default from contact to 50 mm; `quick` has fewer, and fewer nodes).
+    The moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from
+    the stable equilibrium (along -x if there is none), fixed where no balance is near.
 
-    Returns
-    -------
-    Dataset over `distance`: force and torque by part with error, relative difference of the rigid dipole; over `level`
-    and `quantity`: the distance from which on the rigid dipole is good to that level; and the levitation shift. The
-    moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from the
-    stable equilibrium (along -x if there is none), fixed where no balance is near.
+    Over `distance` force and torque by part with error, and the relative error of the rigid dipole; over `level` and
+    `quantity` the distance from which on that is good to the level; and the shift of the equilibrium.
     """
     rotors = [ChargeResponse(scene.rotor, nodes) for nodes in ((10, 14) if quick else (16, 24))]
     alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))
@@ -286,13 +262,9 @@ def _on_axis(depths: Array) -> Array:
 
 
 def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:
-    """Force and torque by part, with the error of the total.
+    """Force and torque by part at `places` (n, 3) m with moments along `directions` (n, 3); the total's error.
 
-    Parameters
-    ----------
-    rotors : the rotor's response by growing numbers of nodes
-    floater : the sphere
-    places, directions : (n, 3) m, and of its moment (n, 3)
+    `rotors` are the rotor's response by growing numbers of nodes, the `floater` is a sphere.
     """
     found = [two_body_ladder(rotors, floater, r, m) for r, m in zip(places, directions, strict=True)]
     distance = variable(("distance",), -places[:, 2], "m", "distance below the rotor")
@@ -334,12 +306,9 @@ SHIFTED: Columns = {
 
 
 def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, stable: Equilibrium) -> xr.Dataset:
-    """What the rigid dipole misses at its stable equilibrium, and where the equilibrium really is.
+    """What the rigid dipole misses at its `stable` equilibrium by the equations `balance`, and where it really is.
 
-    Parameters
-    ----------
-    rotors : the rotor's response by growing numbers of nodes, two at least
-    scene, balance, stable : the scene, its equations for the rigid dipole, and their equilibrium
+    `rotors` are the rotor's response by growing numbers of nodes, two at least.
     """
     place, moment = stable.position, stable.state.moment
 
@@ -355,11 +324,6 @@ def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, sta
     extra, doubt = both.total - both.rigid, np.abs(fine - coarse) + stable.position_error
     found = (place, extra.force, error.force, extra.torque, linear, fine - place, doubt)
     return xr.Dataset(columns(SHIFTED, found), {"axis": list(AXIS)})
-
-
-def in_the_horizontal_scene(quick: bool) -> xr.Dataset:
-    """`floater_permeability` in the scene `horizontal`."""
-    return floater_permeability(load_scene(shipped_scene("horizontal")), quick=quick)
 
 
 LABELS = {
@@ -396,7 +360,6 @@ def floater_figure(result: xr.Dataset) -> Figure:
 
 
 def floater_lines(result: xr.Dataset) -> list[str]:
-    """The report of `floater-permeability`."""
     reach = 1e3 * result["sufficient_from"]
     rows = [(f"{100 * float(k):g} %", *reach.sel(level=k, quantity=["force", "torque"]).values) for k in reach["level"]]
     lines = showing.text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)
@@ -415,7 +378,7 @@ FLOATER_PERMEABILITY = study_of_one(
     name="floater-permeability",
     summary="what the rigid dipole misses once rotor and floater magnetise each other, in the scene horizontal",
     quick="two thirds of the distances; fewer charges; field to 1e-4 instead of 1e-6",
-    compute=in_the_horizontal_scene,
+    compute=lambda quick: floater_permeability(load_scene(shipped_scene("horizontal")), quick=quick),
     figures={"floater-permeability": floater_figure},
     report=floater_lines,
 )

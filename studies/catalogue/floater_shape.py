@@ -5,6 +5,7 @@ the mean over turns about the moment, which of discs and rods is the body itself
 without losses. Closed form of μr = 1 for the rotor, force and torque on dipoles all over the floater.
 """
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from ...geometry.scene.floater import Floater
 from ...geometry.shapes import Box, Cylinder
 from ..figures.style import PALETTE
 from ..result import Columns
-from ..study import Point, Study, each_case, recorded
+from ..study import Point, Study, recorded
 from . import article, showing
 
 ASPECTS = (1 / 4, 1 / 3, 1 / 2, 2 / 3, 3**0.5 / 2, 1.0, 1.5, 2.0, 3.0, 4.0)  # height over diameter
@@ -35,8 +36,12 @@ COLUMNS: Columns = {
 }
 
 
+NUMBERS = {"configuration": "configuration", "value": "measure", "shape": "shape", "aspect": "aspect"}
+NUMBERS |= {"low_hz": "low", "high_hz": "high"}
+
+
 def shape_points(quick: bool) -> list[Point]:
-    """Cylinders of all aspects, the cube and the sphere, for one rotor of each configuration; `quick` one rotor."""
+
     rotors = article.levitated_rotors(True)[: 1 if quick else None]
     aspects = [("cylinder", float(aspect)) for aspect in (QUICK if quick else ASPECTS)]
     shapes = [*aspects, (CUBE, 1.0), (SPHERE, 1.0)]
@@ -63,16 +68,13 @@ def limits(point: Point) -> xr.Dataset:
     floater = floater_of(*of)
     scene = article.rotor_scene(point["configuration"], point["measure"], permeability=1.0, drag=False, floater=floater)
     levitation = article.levitation_of(scene, "cuboid")
-    try:
-        found = levitating_ranges(scene, levitation.table, levitation.rates)
-    except EquilibriumError:
-        found = []
-    if not found:
-        return recorded(point, COLUMNS, (np.nan, np.nan, "none", "none", np.nan, np.nan, *of), {})
-    widest = max(found, key=lambda run: run.high.parameter - run.low.parameter)
-    ends = widest.low, widest.high
-    numbers = [end.parameter for end in ends], [end.kind for end in ends], [-end.position[2] for end in ends]
-    return recorded(point, COLUMNS, (*(value for pair in numbers for value in pair), *of), {})
+    row: tuple[Any, ...] = np.nan, np.nan, "none", "none", np.nan, np.nan
+    with suppress(EquilibriumError):
+        if found := levitating_ranges(scene, levitation.table, levitation.rates):
+            widest = max(found, key=lambda run: run.high.parameter - run.low.parameter)
+            low, high = widest.low, widest.high
+            row = low.parameter, high.parameter, low.kind, high.kind, -low.position[2], -high.position[2]
+    return recorded(point, COLUMNS, (*row, *of), {})
 
 
 @showing.drawn
@@ -101,21 +103,13 @@ def shape_figure(result: xr.Dataset) -> Figure:
 
 def _shape_lines(result: xr.Dataset) -> list[str]:
     rows = []
-    for label, rotor in showing.by_rotor(result):
-        for one in each_case(rotor):
-            low, high, near, far = (float(one[name]) for name in ("low", "high", "nearest", "distance"))
-            shape, aspect = one["shape"].item(), float(one["aspect"])
-            name = shape if shape != "cylinder" else f"cylinder {aspect:.2f} : 1"
-            stable = "none" if np.isnan(low) else f"{low:.1f} to {high:.1f}"
-            between = "" if np.isnan(low) else f"{1e3 * far:.1f} to {1e3 * near:.1f}"
-            rows.append((label, name, stable, between, f"{one['low_kind'].item()}, {one['high_kind'].item()}"))
+    for label, one in showing.rotor_cases(result):
+        low, high, near, far = (float(one[name]) for name in ("low", "high", "nearest", "distance"))
+        shape, aspect = one["shape"].item(), float(one["aspect"])
+        name = shape if shape != "cylinder" else f"cylinder {aspect:.2f} : 1"
+        ranges = ("none", "") if np.isnan(low) else (f"{low:.1f} to {high:.1f}", f"{1e3 * far:.1f} to {1e3 * near:.1f}")
+        rows.append((label, name, *ranges, f"{one['low_kind'].item()}, {one['high_kind'].item()}"))
     return showing.text_table(("rotor", "floater", "stable (Hz)", "distance (mm)", "ends"), rows)
-
-
-def shape_numbers(result: xr.Dataset) -> dict[str, Any]:
-    """The limits by rotor and shape as numbers: `limits`."""
-    names = {"configuration": "configuration", "value": "measure", "shape": "shape", "aspect": "aspect"}
-    return {"limits": showing.records(result, names | {"low_hz": "low", "high_hz": "high"})}
 
 
 STUDY = Study(
@@ -126,5 +120,5 @@ STUDY = Study(
     compute=limits,
     figures={"floater-shape": shape_figure},
     report=_shape_lines,
-    numbers=shape_numbers,
+    numbers=lambda result: {"limits": showing.records(result, NUMBERS)},
 )

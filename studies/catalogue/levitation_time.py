@@ -122,8 +122,7 @@ def time_points(quick: bool) -> list[Point]:
 def levitation_times(point: Point) -> xr.Dataset:
     """Levitation time, start and end of one rotor's averaged trajectories with one variant, over `step` of frequency.
 
-    Recoil permeability is 1.05 in the floater and, but in the variants that say so, left out in the rotor. They are at
-    those frequencies that the branch of equilibria reaches, from that of point dipoles both ways.
+    They are at those frequencies that the branch of equilibria reaches, from that of point dipoles both ways.
     """
     case, variant, model = CASES[point["case"]], VARIANTS[point["variant"]], point["model"]
     grid, scene = np.linspace(case.lowest, case.highest, point["steps"]), scene_of(case, variant)
@@ -254,13 +253,11 @@ def flights_figure(result: xr.Dataset) -> Figure:
 
 
 def _rotors(result: xr.Dataset) -> dict[str, xr.Dataset]:
-    """The part of each rotor, in the order of displacement or tilt, by the title of its panel."""
     cases = sorted(result["case"].values.tolist(), key=lambda name: CASES[name][:2])
     return {rotor_label(*CASES[case][:2]): result.sel(case=case) for case in cases}
 
 
 def time_lines(result: xr.Dataset) -> list[str]:
-    """The report of `levitation-time`."""
     rows = []
     for case in result["case"].values.tolist():
         for variant in ("nominal", "permeable", "complete"):

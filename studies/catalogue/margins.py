@@ -11,13 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 from scipy.special import ndtri
 
-from ...dynamics.continuation.frequencies import (
-    BORDER,
-    LONG_STEPS,
-    StableRange,
-    at_frequency,
-    levitating_ranges,
-)
+from ...dynamics.continuation.frequencies import BORDER, LONG_STEPS, StableRange, at_frequency, levitating_ranges
 from ...dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError
 from ...dynamics.equilibria.orbits import ForcedMotion
 from ...geometry.common import Array, ComputationError
@@ -129,14 +123,11 @@ def _keyed(configuration: str) -> dict[str, tuple[str, float]]:
 
 
 def _written(configuration: str, values: Mapping[str, float], frequency: float) -> Scene:
-    """The scene of the rotor as it should be, of keys that derivatives are by."""
     cube = {"edge_mm": 1e3 * values["edge"], "remanence_T": values["rotor_remanence"]}
     measure = _keyed(configuration)["measure"][0].removeprefix("rotor.")
     rotor = {"configuration": configuration, measure: values["measure"], "recoil_permeability": 1.0, **cube}
     ball = sphere(
-        diameter_mm=1e3 * values["diameter"],
-        remanence_T=values["floater_remanence"],
-        density_kg_m3=values["density"],
+        diameter_mm=1e3 * values["diameter"], remanence_T=values["floater_remanence"], density_kg_m3=values["density"]
     )
     still = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}
     down = [0.0, 0.0, -values["gravity"]]
@@ -204,12 +195,6 @@ class Slopes:
                 (forced.distance, forced.growth_per_s) if isinstance(forced, Equilibrium) else (np.nan, np.nan)
             )
         return np.array(found).T
-
-
-def sensitivity_points(quick: bool) -> list[Point]:
-    """The rotors that levitated, and how many samples of the tolerances are drawn."""
-    more = {"field": "cuboid", "samples": 4 if quick else 32}
-    return [{**rotor, **more} for rotor in article.levitated_rotors(quick)]
 
 
 def sensitivity(point: Point) -> xr.Dataset:
@@ -307,7 +292,9 @@ SENSITIVITY = Study(
     name="sensitivity",
     summary="which parameter matters: derivatives of distance and limits, and bands of realistic tolerances",
     quick="nine of twelve rotors, 28 of 32 draws within tolerances",
-    points=sensitivity_points,
+    points=lambda quick: [
+        {**rotor, "field": "cuboid", "samples": 4 if quick else 32} for rotor in article.levitated_rotors(quick)
+    ],
     compute=sensitivity,
     figures={
         "sensitivity-distance": partial(_contributions_figure, quantity=MIDDLE, words=f"change (mm){ONE}"),
@@ -384,15 +371,6 @@ def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
     return xr.concat(parts, "case")
 
 
-def wishes(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
-    """The goals, and what the configurations reach."""
-    pairs = zip(result["wanted_distance"].values, result["wanted_frequency"].values, strict=True)
-    return [
-        (f"{1e3 * d:g} mm at {f:g} Hz", cases_with(result, wanted_distance=d, wanted_frequency=f))
-        for d, f in sorted(set(pairs))
-    ]
-
-
 @showing.drawn
 def margin_figure(result: xr.Dataset) -> Figure:
     """Largest margin, and the edge that has it, against the wanted distance for every configuration and frequency."""
@@ -412,22 +390,22 @@ def margin_figure(result: xr.Dataset) -> Figure:
 
 
 def _design_lines(result: xr.Dataset) -> list[str]:
-    rows = []
-    for wish, answers in wishes(result):
-        for one in each_case(answers):
-            name, at = one["configuration"].item(), {key: float(one[key]) for key in NAMES}
-            head, kind = f"{wish}, {name}", article.CONFIGURATIONS[name]
-            if not at["margin"] > 0:
-                rows.append((head, "none is stable", *[""] * 6))
-                continue
-            found = [f"{kind.symbol} = {at[key]:.3f} {kind.unit}" for key in ("measure", "true_measure")]
-            ends = f"{at['lowest']:.1f} to {at['highest']:.1f}"
-            cells = [f"{1e3 * at['edge']:.2f} mm", found[0], f"{100 * at['margin']:.1f} %", ends]
-            if np.isfinite(at["true_distance"]):
-                met = showing.uncertain(1e3 * at["true_distance"], 1e3 * at["true_distance_error"])
-                growth = at["true_growth"]
-                cells += [found[1], met, "stable" if growth <= MARGINAL else f"grows at {growth:.2g} 1/s"]
-            rows.append((head, *cells, *["not met"] * (7 - len(cells))))
+    rows, wishes = [], ("wanted_distance", "wanted_frequency")
+    for one in sorted(each_case(result), key=lambda one: [float(one[wish]) for wish in wishes]):
+        name, at = one["configuration"].item(), {key: float(one[key]) for key in NAMES}
+        kind = article.CONFIGURATIONS[name]
+        head = f"{1e3 * at['wanted_distance']:g} mm at {at['wanted_frequency']:g} Hz, {name}"
+        if not at["margin"] > 0:
+            rows.append((head, "none is stable", *[""] * 6))
+            continue
+        found = [f"{kind.symbol} = {at[key]:.3f} {kind.unit}" for key in ("measure", "true_measure")]
+        ends = f"{at['lowest']:.1f} to {at['highest']:.1f}"
+        cells = [f"{1e3 * at['edge']:.2f} mm", found[0], f"{100 * at['margin']:.1f} %", ends]
+        if np.isfinite(at["true_distance"]):
+            met, growth = (at["true_distance"], at["true_distance_error"]), at["true_growth"]
+            ending = "stable" if growth <= MARGINAL else f"grows at {growth:.2g} 1/s"
+            cells += [found[1], showing.uncertain(*(1e3 * number for number in met)), ending]
+        rows.append((head, *cells, *["not met"] * (7 - len(cells))))
     heads = ("wanted, by", "edge", "closed form", "margin", "stable (Hz)", "finite magnets", "distance (mm)", "")
     return showing.text_table(heads, rows)
 

@@ -20,14 +20,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
-from ...dynamics.flights.conductor import (
-    ConductorMotion,
-    Supply,
-    conductor_motion,
-    heights_over,
-    levitation_height,
-    sources_of,
-)
+from ...dynamics.flights import conductor
 from ...fem.closed_forms.eddy_bodies import polarizability, sphere_reaction, tube_drag, tube_reaction
 from ...fem.closed_forms.potentials import Dipole, HomogeneousField
 from ...fem.plate.eddy import plate_reaction, solve_eddy
@@ -90,8 +83,8 @@ def measured_heights() -> tuple[Array, Array]:
 def resting_height(scene: Scene, modes: FloatingModes) -> float:
     """Height (m) of the lower face at which the mean forces balance."""
     weight = -scene.floater.mass * float(scene.gravity[2])
-    supply = Supply(scene.coils, sources_of(scene.coils))
-    return levitation_height(modes, supply, weight) - float(scene.floater.bodies[0].half_edges[2])
+    supply = conductor.Supply(scene.coils, conductor.sources_of(scene.coils))
+    return conductor.levitation_height(modes, supply, weight) - float(scene.floater.bodies[0].half_edges[2])
 
 
 def in_phase(scene: Scene, phase: float) -> Scene:
@@ -102,15 +95,13 @@ def in_phase(scene: Scene, phase: float) -> Scene:
 def _modes(scene: Scene, order: int, heights: tuple[float, float] | None = None) -> FloatingModes:
     """Modes of a scene's disc over its coils by finite elements of an order, and of one order less for the error."""
     (disc,), coils = scene.floater.bodies, scene.coils
-    shares, region = Supply(coils, sources_of(coils)).shares, heights or heights_over(scene)
+    shares = conductor.Supply(coils, conductor.sources_of(coils)).shares
+    region = heights or conductor.heights_over(scene)
     return floating_modes(disc, ALUMINIUM, coils, shares, region, coils[0].frequency, order=order)
 
 
 def _sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple[str, float]]:
-    """What changes of one thing do to the height at rest, m; those that need other modes if not `quick`.
-
-    The modes of a conductor have other rates at another conductivity, and the same fluxes.
-    """
+    """What changes of one thing do to the height at rest, m; those that need other modes if not `quick`."""
     floater, base = scene.floater, resting_height(scene, modes)
     low, high = modes.heights
     raised = low + 1e-4, high + 1e-4
@@ -182,7 +173,7 @@ def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     time, measured = measured_heights()
     rest, computed = float(measured[time > SETTLED].mean()), resting_height(scene, modes)
     phases = np.linspace(0.0, np.pi, 2 if quick else PHASES, endpoint=False)
-    motions = [conductor_motion(in_phase(scene, float(phase)), modes, DURATION) for phase in phases]
+    motions = [conductor.conductor_motion(in_phase(scene, float(phase)), modes, DURATION) for phase in phases]
     below = [np.interp(time, motion.time, motion.height) - half for motion in motions]  # heights of the lower face
     errors = [float(np.sqrt(np.mean((heights - measured) ** 2))) for heights in below]
     best = int(np.argmin(errors))
@@ -256,11 +247,8 @@ current_A = 1.0
 """
 
 
-def falling_magnet() -> tuple[Row, ConductorMotion]:
-    """The terminal speed of a spherical magnet that falls in a copper tube, and its fall.
-
-    The tube moves in the frame of the magnet, which has the mass and is a dipole: a source with a steady current.
-    """
+def falling_magnet() -> tuple[Row, conductor.ConductorMotion]:
+    """The terminal speed of a spherical magnet that falls in a copper tube, and its fall."""
     scene, inner, outer, travel = parse_scene(FALL), 0.01, 0.0125, 0.015
     scene = replace(scene, coils=(replace(scene.coils[0], current=scene.floater.moment),))
     tube, way = ring(outer, inner, 12 * inner), np.linspace(-travel, travel, 4)
@@ -269,7 +257,7 @@ def falling_magnet() -> tuple[Row, ConductorMotion]:
     speeds = []
     for order in (2, 3):
         modes = modes_along(mesh, moving, (-1.05 * travel, 1.05 * travel), 20.0, 1e-6, order)
-        motion = conductor_motion(scene, modes, 10.0)
+        motion = conductor.conductor_motion(scene, modes, 10.0)
         middle = np.abs(motion.height) < inner / 2
         speeds.append(float(np.ptp(motion.height[middle]) / np.ptp(motion.time[middle])))
     weight, moment = scene.floater.mass * GRAVITY, scene.floater.moment
@@ -396,7 +384,6 @@ TEAM28_NAME = "TEAM problem 28"
 
 
 def compute(point: Point) -> xr.Dataset:
-    """The rows of one experiment."""
     if point["experiment"] == TEAM28_NAME:
         rows, data = team28_rows(point["quick"])
         axes = {"time": variable(("time",), data["time"], "s", "time"),
@@ -417,7 +404,6 @@ def gather(parts: Sequence[xr.Dataset]) -> xr.Dataset:
 
 
 def measured_numbers(result: xr.Dataset) -> dict[str, Any]:
-    """For JSON."""
     keys = "name", "kind", "unit", "measured", "measured_error", "measured_error_from", "computed", "error"
     rows = zip(*(result[key].values.tolist() for key in keys), strict=True)
     found: dict[str, Any] = {"experiments": [dict(zip(keys, row, strict=True)) for row in rows]}

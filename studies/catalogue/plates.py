@@ -93,7 +93,7 @@ def _in_air(configuration: str, measure: float, complete: bool) -> tuple[Levitat
 def without_plate(
     configuration: str, measure: float, part: float | None, complete: bool
 ) -> tuple[Levitation, Equilibrium]:
-    """A rotor's scene without plate, and its equilibrium that is stable but for the currents in rotor and floater.
+    """A scene without plate, and its equilibrium that is stable but for the currents in rotor and floater.
 
     Parameters are those of a `PlateCase`. Raises EquilibriumError where nothing levitates.
     """
@@ -123,16 +123,10 @@ COLUMNS: Columns = {
 
 
 def plate_damping(point: Point) -> xr.Dataset:
-    """Levitation of a rotor of the article beside or above one plate.
+    """Levitation of a rotor of the article beside or above one plate, an infinite slab but for those called real.
 
-    Returns
-    -------
-    Dataset over `case`: growth and frequency of each mode, displacement, mean force, torque and loss; NaN where the
-    plate destabilises the equilibrium.  Plates are infinite slabs but for those called real.
-
-    Raises
-    ------
-    EquilibriumError : nothing levitates even without the plate
+    Over `case` growth and frequency of each mode, displacement, mean force, torque and loss; NaN where the plate
+    destabilises the equilibrium. Raises EquilibriumError where nothing levitates even without the plate.
     """
     case = PlateCase(**point)
     alone, start = without_plate(case.configuration, case.measure, case.part, case.complete)
@@ -332,13 +326,10 @@ REACH = 1500.0  # Distance from the plate to the outer boundary, mm
 
 
 def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, growth: float = 2.0) -> ConductorMesh:
-    """Structured mesh, finer at the plate's faces.
+    """Structured mesh, finer at the plate's faces by the skin depth of a `frequency` (Hz).
 
-    Parameters
-    ----------
-    frequency : Hz, of which the skin depth is
-    cell : largest in the plate, mm
-    skin_share, growth : size of cells at a face over the skin depth, and what is added to it a mm away
+    The largest `cell` in the plate is in mm; cells at a face have `skin_share` of the skin depth, and `growth` more a
+    mm away.
     """
     skin = skin_share * 1e3 * skin_depth(CONDUCTIVITY, frequency)
 
@@ -361,13 +352,9 @@ def measured_line() -> tuple[Array, Array]:
 
 
 def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3) -> Array:
-    """B_z (n, 2), T, at ωt = 0 and 90° on the line y = 72, z = 34 mm; the reaction by reciprocity.
+    """B_z (n, 2), T, at ωt = 0 and 90° at `x` (n,) m on the line y = 72, z = 34 mm, at a `frequency` in Hz.
 
-    Parameters
-    ----------
-    frequency : Hz
-    x : (n,) m
-    mesh, order : of the elements
+    By finite elements of an `order` on a `mesh`; the reaction by reciprocity.
     """
     points = np.column_stack([x, np.full_like(x, 0.072), np.full_like(x, 0.034)])
     response = solve_eddy(mesh, order, frequency, [COIL])
@@ -395,12 +382,9 @@ LINE: Columns = {
 
 
 def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
-    """Both by `CURVES`, and their deviation in units of the largest measured |B| of that frequency.
+    """B_z `measured` and `computed` (17, 4) T at `x` (17,) m, and their deviation.
 
-    Parameters
-    ----------
-    x : (17,) m
-    measured, computed : B_z (17, 4) T
+    That is in units of the largest measured |B| of the same frequency.
     """
     amplitude = np.hypot(measured[:, 0::2], measured[:, 1::2]).max(axis=0)
     data = columns(LINE, (measured, computed, (computed - measured) / np.repeat(amplitude, 2)))
@@ -408,7 +392,6 @@ def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
 
 
 def team7_lines(result: xr.Dataset) -> list[str]:
-    """The report of `team7`."""
     lines = ["TEAM workshop problem 7, B_z on y = 72, z = 34 mm: deviation in per cent of the line's peak"]
     size = 100 * abs(result["deviation"])
     every = {str(curve): size.sel(curve=curve) for curve in size["curve"].values}

@@ -31,11 +31,6 @@ COLUMNS: Columns = {
 }
 
 
-def ramp_points(quick: bool) -> list[Point]:
-    """The twelve rotors that levitated; `quick` by point dipoles without losses, else with every effect."""
-    return [{**rotor, "model": "dipole" if quick else "fem"} for rotor in article.levitated_rotors(False)]
-
-
 def ramps(point: Point) -> xr.Dataset:
     """Frequencies at which the floater of one rotor is lost, over the `way` and the `rate` of the ramp (Hz/s)."""
     bare = article.rotor_scene(point["configuration"], point["measure"], drag=False)
@@ -74,16 +69,11 @@ def ramps_figure(result: xr.Dataset) -> Figure:
 
 
 def _ramps_lines(result: xr.Dataset) -> list[str]:
-    """A table, and how far beyond the steady limits floaters are lost."""
     rates, rows = result["rate"].values, []
-    for label, rotor in showing.by_rotor(result):
-        for one in each_case(rotor):
-            steady = f"{float(one['lowest']):.1f} to {float(one['highest']):.1f} ({ENDS[one['high_kind'].item()]})"
-            lost = [
-                "–" if np.isnan(at) else f"{at:.1f} ({end})"
-                for at, end in zip(one["lost_at"].values.ravel(), one["ended_by"].values.ravel(), strict=True)
-            ]
-            rows.append((label, steady, *lost))
+    for label, one in showing.rotor_cases(result):
+        steady = f"{float(one['lowest']):.1f} to {float(one['highest']):.1f} ({ENDS[one['high_kind'].item()]})"
+        ends = zip(one["lost_at"].values.ravel(), one["ended_by"].values.ravel(), strict=True)
+        rows.append((label, steady, *("–" if np.isnan(at) else f"{at:.1f} ({end})" for at, end in ends)))
     head = [f"lost {way}, {rate:g} Hz/s" for way in WAYS for rate in rates]
     late = (result["lowest"] - result["lost_at"].sel(way="down"), result["lost_at"].sel(way="up") - result["highest"])
     spans = [[showing.span(beyond.sel(rate=rate).values, ".2g") for rate in rates] for beyond in late]
@@ -113,7 +103,7 @@ STUDY = Study(
     name="ramps",
     summary="how far a rotor can be turned down and up until its floater is lost",
     quick="finite elements (point dipoles instead), all losses, mutual magnetisation",
-    points=ramp_points,
+    points=lambda quick: [{**one, "model": "dipole" if quick else "fem"} for one in article.levitated_rotors(False)],
     compute=ramps,
     figures={"ramps": ramps_figure},
     report=_ramps_lines,

@@ -1,7 +1,6 @@
 """Where floaters levitate: regions in frequency and displacement, and the frequency until which trajectories last."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -44,11 +43,7 @@ INTERVAL: Columns = {
     "highest": (("interval",), "Hz", "upper end of an interval of stability"),
     "distance_lowest": (("interval",), "m", "distance at the lower end"),
     "distance_highest": (("interval",), "m", "distance at the upper end"),
-    "leading_highest": (
-        ("interval",),
-        "Hz",
-        "frequency of the mode that is the first unstable one above",
-    ),
+    "leading_highest": (("interval",), "Hz", "frequency of the mode that is the first unstable one above"),
     "low_kind": (("interval",), "", "what is at the lower end"),
     "high_kind": (("interval",), "", "what is at the upper end"),
     "plate_frequency": (("tried",), "Hz", "frequency at which a plate below is tried"),
@@ -65,10 +60,7 @@ LASTING: Columns = {
 
 
 def map_points(quick: bool) -> list[Point]:
-    """All rotors with both models; with the plate, and trajectories, the rotors that levitated in the article.
 
-    `quick` leaves out the mutual magnetisation and the trajectories.
-    """
     rotors = {name: (value,) for name, value in article.QUICK_ROTORS} if quick else MEASURES
     return [
         {
@@ -189,22 +181,19 @@ def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
 
 def _map_lines(result: xr.Dataset) -> list[str]:
     rows = []
-    for label, rotor in showing.by_rotor(result):
-        for one in each_case(rotor):
-            ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
-            stable = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
-            pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
-            plate = [
-                f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)
-            ]
-            names = ("metal", *LASTING) if "high" in one else ()
-            lasting = [
-                f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})"
-                for metal, low, high, _, end in zip(*(one[name].values for name in names), strict=True)
-                if end
-            ]
-            cells = (" and ".join(stable) or "never", ", ".join(plate), " and ".join(lasting))
-            rows.append((f"{label}, {one['model'].item()}", *cells))
+    for label, one in showing.rotor_cases(result):
+        ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
+        stable = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
+        pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
+        plate = [
+            f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)
+        ]
+        known = zip(*(one[name].values for name in ("metal", *LASTING)), strict=True) if "high" in one else ()
+        lasting = [
+            f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})" for metal, low, high, _, end in known if end
+        ]
+        cells = (" and ".join(stable) or "never", ", ".join(plate), " and ".join(lasting))
+        rows.append((f"{label}, {one['model'].item()}", *cells))
     head = ("rotor, model", "stable", "growth with the plate (s⁻¹)", f"trajectories last {article.FLIGHT:g} s")
     return showing.text_table(head, rows)
 
@@ -243,10 +232,12 @@ COLUMNS: Columns = {
     "variant": ((), "", "what conducts"),
 }
 ENDS = tuple(COLUMNS)[:4]
+NUMBERS = {"configuration": "configuration", "value": "measure", "variant": "variant"}
+NUMBERS |= {f"{name}_hz": name for name in ENDS}
 
 
 def limit_points(quick: bool) -> list[Point]:
-    """Every rotor that levitated, without and with its metal; `quick` only δx = 2 mm."""
+
     rotors = article.levitated_rotors(False) if not quick else [{"configuration": "horizontal", "measure": 2.0}]
     return [
         {**rotor, "variant": variant}
@@ -332,12 +323,6 @@ def _limit_lines(result: xr.Dataset) -> list[str]:
     return [*showing.text_table(head, rows), *lines]
 
 
-def limit_numbers(result: xr.Dataset) -> dict[str, Any]:
-    """Ends of lasting trajectories by rotor and variant as numbers: `limits`."""
-    names = {"configuration": "configuration", "value": "measure", "variant": "variant"}
-    return {"limits": showing.records(result, names | {f"{name}_hz": name for name in ENDS})}
-
-
 UPPER_LIMIT = Study(
     name="upper-limit",
     summary="until which frequency trajectories last, below rotors that do and do not conduct",
@@ -346,5 +331,5 @@ UPPER_LIMIT = Study(
     compute=upper_limit,
     figures={"upper-limit": limit_figure},
     report=_limit_lines,
-    numbers=limit_numbers,
+    numbers=lambda result: {"limits": showing.records(result, NUMBERS)},
 )

@@ -70,9 +70,7 @@ SCENE = "Rotor, floater, plate and field, in the frame that turns with the rotor
 def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
     """Write report.html about every result in `folder`; returns it and the names of the results.
 
-    Raises
-    ------
-    InputError : the folder is missing, has no result, or one that cannot be read
+    Raises InputError where the folder is missing, has no result, or one that cannot be read.
     """
     import jinja2
 
@@ -100,7 +98,6 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
 
 
 def _part(path: Path) -> dict[str, Any]:
-    """What the page says of one result."""
     result = read_result(path)
     kind = str(result.attrs["study"])
     study = CATALOGUE.get(kind)
@@ -135,7 +132,6 @@ def _part(path: Path) -> dict[str, Any]:
 
 
 def _view(result: xr.Dataset) -> dict[str, str]:
-    """The end of a trajectory as the viewer takes it, or why there is none; nothing for a result without one."""
     if "scene" not in result.attrs or "position_rotor_frame" not in result:
         return {}
     scene, motion = flight_of(result, "scene")
@@ -162,7 +158,6 @@ def _fit(parts: list[dict[str, Any]]) -> None:
 
 
 def _summary(path: Path) -> dict[str, Any]:
-    """What `run` said, from the summary beside its result."""
     summary = path.parent / "summary.json"
     if not summary.exists():
         return {}

@@ -25,19 +25,9 @@ from ..coils import coils_figure
 from ..compare import compare_figure
 from ..design import design_figure
 from ..exchange import field_map_figure
+from ..figures import run as drawing
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
-from ..figures.run import (
-    drawable,
-    drive_figure,
-    field_figure,
-    force_figure,
-    modes_figure,
-    question_figure,
-    question_lines,
-    trajectory_figure,
-    working_point_figure,
-)
 from ..figures.style import save_figures
 from ..figures.view import SEEN, Currents, current_places, near_plate
 from ..fit import fit_figure
@@ -55,23 +45,18 @@ DRAWN = {
     "estimate": ("fit", fit_figure),
     "branch_distance": ("compare", compare_figure),
     "outside": ("field-map", field_map_figure),
-    "easy_axis": ("working-point", working_point_figure),
-    "axis_field": ("field", field_figure),
+    "easy_axis": ("working-point", drawing.working_point_figure),
+    "axis_field": ("field", drawing.field_figure),
     "heat": ("trajectory", coils_figure),
-    "curve_force": ("force", force_figure),
-    "position_rotor_frame": ("trajectory", trajectory_figure),
-    "motor_torque": ("drive", drive_figure),
-    "mode_growth": ("modes", modes_figure),
+    "curve_force": ("force", drawing.force_figure),
+    "position_rotor_frame": ("trajectory", drawing.trajectory_figure),
+    "motor_torque": ("drive", drawing.drive_figure),
+    "mode_growth": ("modes", drawing.modes_figure),
 }  # By variable of a result that is no study: name of the figure and who draws it
 
 
 def draw_result(path: Path, out: Path) -> list[str]:
-    """Draw a result file anew; returns the files written.
-
-    Raises
-    ------
-    InputError : the file cannot be read, or is no result of this program
-    """
+    """Draw a result file anew; returns the files. Raises InputError where it is no result of this program."""
     return save_figures(figures_of(read_result(path)), out)
 
 
@@ -93,7 +78,7 @@ def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
     if kind in CATALOGUE:
         return {name: draw(result) for name, draw in CATALOGUE[kind].figures.items()}
     if kind == QUESTION:
-        return {QUESTION: question_figure(result)} if drawable(result) else {}
+        return {QUESTION: drawing.question_figure(result)} if drawing.drawable(result) else {}
     found = {name: draw(result) for key, (name, draw) in DRAWN.items() if key in result}
     if not found:
         raise InputError(f"Input study must be one that this version knows; instead the result is of '{kind}'.")
@@ -111,12 +96,7 @@ def study_job(name: str, quick: bool, engine: Workers, out: Path) -> Answer:
 
 
 def question_job(question: Question, values: dict[str, list[Any]], engine: Workers, out: Path) -> Answer:
-    """Compute a question of one's own over a grid; writes question.nc and its figure.
-
-    Raises
-    ------
-    SceneError : the scene does not take the first of the values
-    """
+    """Compute a question over a grid; writes question.nc and its figure. Raises SceneError for the first value."""
     models = {question.models.model, *values.get("model", ())}
     if question.models.rtol < FOR_A_FIGURE and models & {"auto", "fem", "surface"}:
         note(f"Field to {question.models.rtol:g}; for a figure --rtol {FOR_A_FIGURE:g} is enough, and takes less time.")
@@ -135,8 +115,8 @@ def question_study(question: Question, values: Mapping[str, Sequence[Any]]) -> S
         f"{question.ask} over {', '.join(values)}",
         lambda quick: points,
         question,
-        {QUESTION: question_figure},
-        question_lines,
+        {QUESTION: drawing.question_figure},
+        drawing.question_lines,
         partial(question.gather, values=values),
         prepared=question.prepared,
         batches=question.batches,
@@ -183,10 +163,8 @@ def failure_lines(result: xr.Dataset) -> list[str]:
 def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     """Write NAME-scene.png, NAME-flight.gif and, if `html`, NAME-view.html of a trajectory; returns the files.
 
-    Raises
-    ------
-    InputError : the file is no result of this program, or of a study, in which there is no single scene to be seen
-    RenderError : no picture can be drawn, or not all; those that could be are written
+    Raises InputError where the file holds no single scene's trajectory, and RenderError where pictures cannot be drawn;
+    those that could be are written.
     """
     result = read_result(path)
     if "scene" not in result.attrs or "position_rotor_frame" not in result:

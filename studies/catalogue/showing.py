@@ -14,8 +14,9 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
+from ..cli.console import aligned
 from ..figures.style import PALETTE, legend_below, panels, styled, titled
-from ..study import cases_with
+from ..study import cases_with, each_case
 from .article import CONFIGURATIONS, label_of, rotor_label
 
 TITLES = {"horizontal": "displaced cube", "vertical": "two cubes", "tilt": "tilted cube"}
@@ -41,15 +42,10 @@ Shown = TypeVar("Shown")
 def small_multiples(
     parts: Mapping[str, Shown], height: float, columns: int = 3, xlabel: str = "", ylabel: str = "", **shared: Any
 ) -> tuple[Figure, list[tuple[Axes, Shown]]]:
-    """A panel for each part, beside it.
+    """A panel for each of `parts` (by title, behind its letter), beside what it shows.
 
-    Parameters
-    ----------
-    parts : what the panels show, by their titles, which stand behind their letters
-    height : of a row, inches
-    columns : panels in a row, at most
-    xlabel, ylabel : of the lowest panel of each column, and of the first of each row
-    shared : as of `Figure.subplots`
+    Rows have `columns` panels at most and a `height` in inches; the lowest panel of a column has `xlabel`, the first of
+    a row `ylabel`; `shared` are options of `Figure.subplots`.
     """
     count = len(parts)
     figure, ((*axes,),) = panels(1, count, height + 0.3, min(columns, count), **shared)
@@ -78,6 +74,11 @@ def by_rotor(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
             yield rotor_label(configuration, float(value)), cases_with(part, **{_measure(part): value})
 
 
+def rotor_cases(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
+    """Each case of a joined result with its rotor's label, rotor by rotor."""
+    return ((label, one) for label, rotor in by_rotor(result) for one in each_case(rotor))
+
+
 def _measure(part: xr.Dataset) -> str:
     """What a study calls displacement or tilt."""
     return "measure" if "measure" in part else "value"
@@ -95,10 +96,9 @@ def configuration_panels(
 def rotor_panels(
     result: xr.Dataset, height: float, xlabel: str, ylabel: str, **shared: Any
 ) -> tuple[Figure, list[tuple[Axes, xr.Dataset, Any]]]:
-    """A panel for each configuration, and for each rotor its panel, its cases and its colour.
+    """A panel for each configuration, as of `small_multiples`, and for each rotor its panel, its cases and its colour.
 
     Colours go from dark to bright along viridis with displacement or tilt; a bar below the panel gives them.
-    Parameters are those of `small_multiples`.
     """
     figure, rows = configuration_panels(result, height, xlabel, ylabel, **shared)
     found: list[tuple[Axes, xr.Dataset, Any]] = []
@@ -126,13 +126,9 @@ def rotor_places(axes: Axes, configuration: str, part: xr.Dataset) -> Array:
 
 
 def explain(axes: Axes, formats: Mapping[str, str], **style: Any) -> None:
-    """Entries of a legend that no curve has by itself.
+    """Entries in the legend of `axes` that no curve has by itself: `formats` of `Axes.plot` by meaning.
 
-    Parameters
-    ----------
-    axes : that has them
-    formats : of `Axes.plot`, by meaning; grey where neither it nor `style` has a colour
-    style : of all
+    All have the `style`; they are grey where neither it nor the format has a colour.
     """
     for words, shape in formats.items():
         grey = {} if "C" in shape or "k" in shape else {"color": "0.3"}
@@ -152,20 +148,11 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[st
             return value
         return f"{float(value):.4g}" if np.isfinite(float(value)) else "–"
 
-    cells = [tuple(head), *(tuple(map(cell, row)) for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    sides = ["<"] + [">"] * (len(widths) - 1)
-    return ["  ".join(f"{c:{s}{w}}" for c, s, w in zip(row, sides, widths, strict=True)).rstrip() for row in cells]
+    return aligned([tuple(head), *(tuple(map(cell, row)) for row in rows)], "<>")
 
 
 def records(dataset: xr.Dataset, keys: Mapping[str, str]) -> list[dict[str, Any]]:
-    """What each place along the dimension of some variables has, for JSON: their values by key, None for NaN.
-
-    Parameters
-    ----------
-    dataset : with the variables
-    keys : the variable of each key, all over the same single dimension
-    """
+    """For JSON: what variables over one and the same dimension hold at each place, by `keys`; None for NaN."""
     found = zip(*(dataset[name].values.tolist() for name in keys.values()), strict=True)
     return [{key: None if each != each else each for key, each in zip(keys, row, strict=True)} for row in found]
 
@@ -189,13 +176,7 @@ def uncertain(value: SupportsFloat, error: SupportsFloat) -> str:
 
 
 def range_text(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> str:
-    """A range of values with signs, and the largest error.
-
-    Parameters
-    ----------
-    value, error : over the same dimensions
-    scale : from their unit to the one that is written
-    """
+    """A range of values with signs, times `scale`, and the largest of their errors, which have the same dimensions."""
     known: Array = scale * value.values[np.isfinite(value.values)]
     if not known.size:
         return "–"
@@ -206,12 +187,9 @@ def range_text(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> 
 
 
 def last_crossing(distance: Array, values: Array, level: float) -> float:
-    """The distance from which on values stay below a level, NaN if beyond the last.
+    """The distance (n,), ascending, from which on values (n,) stay below a `level`; NaN if beyond the last.
 
-    Parameters
-    ----------
-    distance, values : (n,), by growing distance; between them logarithms are interpolated
-    level : positive
+    Between them logarithms are interpolated.
     """
     above = np.flatnonzero(values > level)
     if not len(above):

@@ -176,13 +176,7 @@ def sphere_points() -> Array:
 
 
 def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measured:
-    """Run one method; meant for a fresh process.
-
-    Parameters
-    ----------
-    name, quick : of the catalogue `methods`
-    timed_points : at how many points its table is timed
-    """
+    """Run one method of the catalogue `methods`, its table timed at `timed_points`; meant for a fresh process."""
     method = methods(quick)[name]
     magnets = cube(method.problem)
     compiled(hy.cfunc, [hy.expression("x")], [hy.expression("x")])  # the compiler's own start is nobody's cost
@@ -208,7 +202,6 @@ def _at_points(table: FieldTable) -> tuple[Array, Array, Array]:
 
 
 def _peak_memory() -> float:
-    """Peak memory of the process, bytes (Linux)."""
     return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
@@ -249,11 +242,7 @@ ROUND_OFF = 1e-13  # What is stated of a model that has no error but that
 def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float | None = None) -> xr.Dataset:
     """Errors of B and of its gradient by method and distance, beside time, unknowns and memory.
 
-    Parameters
-    ----------
-    quick : fewer methods, and a reference that takes less time
-    names : of the methods; None for all
-    truth : tolerance of the reference; None for the one of the study
+    Of the methods `names` (None: all), against a reference of tolerance `truth` (None: the study's own).
     """
     catalogue = {name: method for name, method in methods(quick).items() if names is None or name in names}
     requested = truth or (QUICK_TRUTH if quick else TRUTH_TOLERANCE)

@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO
@@ -92,9 +92,8 @@ def missing_extra(error: BaseException) -> str | None:
 def lend_quadmath() -> Path | None:
     """Give NGSolve's Fortran library the libquadmath that numpy's or scipy's wheel brings, where the system has none.
 
-    NGSolve's wheel brings a libgfortran that needs libquadmath and looks for it beside itself, but does not bring it.
-    Returns the link that was made; None where it is not needed or no wheel has one. Raises OSError where the folder
-    cannot be written.
+    NGSolve's wheel brings a libgfortran that looks for it beside itself, but does not bring it. Returns the link that
+    was made; None where it is not needed or no wheel has one. Raises OSError where the folder cannot be written.
     """
     home = _folder("ngsolve_openblas")
     if home is None or not list(home.glob("libgfortran.so*")) or _loads(QUADMATH):
@@ -127,14 +126,9 @@ PAUSE = 2.5  # silence after which a line is said, s, once; after long steps a 6
 
 
 class Heartbeat(threading.Thread):
-    """Says how far a step of the work has come, or how long it has taken, after a while in which nothing else was said.
+    """Says how far a step has come, or how long it has taken, after a `pause` (s) in which nothing else was said.
 
-    The thread begins with the first step.
-
-    Parameters
-    ----------
-    say : prints a line
-    pause : the silence, s
+    The thread begins with the first step; `say` prints a line.
     """
 
     def __init__(self, say: Callable[[str], None], pause: float = PAUSE) -> None:
@@ -218,11 +212,6 @@ class _Printed(logging.Handler):
         super().close()
 
 
-def read_by_a_person() -> bool:
-    """Whether standard error is a terminal, or the program runs in a notebook."""
-    return sys.stderr.isatty() or ERRORS.is_jupyter
-
-
 @contextmanager
 def printing(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
     """Messages and progress on standard error inside the block, if they are wanted; details too where `verbose`."""
@@ -289,6 +278,14 @@ def answers_only() -> Iterator[TextIO]:
         sys.stdout.flush()
         os.dup2(kept, 1)
         os.close(kept)
+
+
+def aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
+    """Lines of cells in columns, each to the left "<" or right ">" as `sides` say, of which the last is the rest's."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    sides = sides.ljust(len(widths), sides[-1])
+    forms = [f"{{:{side}{width}}}" for side, width in zip(sides, widths, strict=False)]
+    return ["  ".join(map(str.format, forms, row)).rstrip() for row in rows]
 
 
 def to_json(answer: Mapping[str, Any], encoding: str | None = "utf-8") -> str:

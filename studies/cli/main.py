@@ -78,13 +78,11 @@ def _status(arguments: list[str], out: Any, stop: threading.Event | None = None)
 
 
 def _message(error: Exception) -> str:
-    """An error as a message, what was received in it cut where it is longer than anybody reads."""
     lines = f"spinlev: {error}".split("\n")
     return "\n".join(line if len(line) <= LONGEST else f"{line[:LONGEST]} ..." for line in lines)
 
 
 def _unforeseen(error: Exception) -> str:
-    """Message about what failed and where; of a library that the system lacks, what to do."""
     if is_missing_library(error):
         mend = f"{sys.executable} -m {__package__}.installation"
         return f"a library cannot be loaded: {error}. It may be enough to run {mend}. {way_out(FORTRAN)}"

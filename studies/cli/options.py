@@ -6,6 +6,7 @@ import inspect
 import io
 import math
 import re
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
@@ -21,7 +22,7 @@ from cyclopts import Parameter
 from ...geometry.common import Array, InputError, no_argument, shown
 from ...geometry.files import file_content
 from ..figures.style import FigureWidth
-from .console import printing, read_by_a_person
+from .console import ERRORS, printing
 
 Answer = tuple[Mapping[str, Any], list[str]]  # of a command: numbers for a program, lines for a person
 COLUMNS = ("x_mm", "y_mm", "z_mm")
@@ -111,7 +112,7 @@ def check_spin(name: str, spin: float) -> None:
 def read_points(path: Path) -> Array:
     """Points (n, 3) in m from a CSV file with a header that has the columns x_mm, y_mm, z_mm.
 
-    Raises `InputError` where the file is missing, no file, too large, empty, lacks a column or has an entry that is no
+    Raises InputError where the file is missing, no file, too large, empty, lacks a column or has an entry that is no
     finite number or too large a one.
     """
     content = file_content(path, MOST, "points", f"a CSV file with {', '.join(COLUMNS)}")
@@ -202,12 +203,7 @@ class Models:
     interaction: InteractionModel = "auto"
 
     def checked(self) -> Self:
-        """Itself.
-
-        Raises
-        ------
-        InputError : a model that does not exist, or a tolerance out of range
-        """
+        """Itself. Raises InputError for a model that does not exist, or a tolerance out of range."""
         for name, known in NAMES.items():
             value = getattr(self, name)
             if not isinstance(value, str) or value not in known:
@@ -266,12 +262,7 @@ class Workers:
     scheduler: str | None = None
 
     def checked(self) -> Self:
-        """Itself.
-
-        Raises
-        ------
-        InputError : no number of workers, or both a number and a scheduler
-        """
+        """Itself. Raises InputError for no number of workers, or both a number and a scheduler."""
         if self.workers is not None and not 1 <= self.workers <= 1024:
             raise InputError(f"Input --workers must be between 1 and 1024; instead received {self.workers}.")
         if self.workers is not None and self.scheduler is not None:
@@ -307,7 +298,6 @@ T = TypeVar("T")
 
 
 def _entries(text: str) -> dict[str, str]:
-    """What a docstring says of each argument."""
     return {entry[1]: entry[0] for entry in re.finditer(r"(?m)^(\w+) : .*(?:\n    .*)*", text)}
 
 
@@ -327,7 +317,8 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
         for name in kwargs.keys() - known:
             raise TypeError(no_argument(function.__name__, name, known))
         wanted = signature.bind(*args, **kwargs).arguments.get("progress")
-        with printing(read_by_a_person() if wanted is None else bool(wanted)):
+        by_a_person = sys.stderr.isatty() or ERRORS.is_jupyter  # who reads it
+        with printing(by_a_person if wanted is None else bool(wanted)):
             return function(*args, **kwargs)
 
     own = [parameter for parameter in signature.parameters.values() if parameter.kind != parameter.VAR_KEYWORD]
@@ -365,9 +356,7 @@ MOST_VALUES = 100_000  # points of a sweep, at most
 def parse_vary(requested: Sequence[str]) -> dict[str, list[Any]]:
     """Values by key, in the order given.
 
-    Raises
-    ------
-    InputError : not of this form, no number, no value, a key given twice, or too many points
+    Raises InputError: not of this form, no number, no value, a key given twice, or too many points.
     """
     found: dict[str, list[Any]] = {}
     for text in requested:
@@ -386,9 +375,7 @@ def parse_vary(requested: Sequence[str]) -> dict[str, list[Any]]:
 def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") -> dict[str, list[Any]]:
     """Values by key as lists of floats and, for those of `NAMES`, of texts; `name` is what messages call them.
 
-    Raises
-    ------
-    InputError : no key, no value, one that is no finite number, one that is given twice, or too many points
+    Raises InputError: no key, no value, one that is no finite number, one that is given twice, or too many points.
     """
     if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
         raise InputError(f"Input {name} must be lists of values by key; instead received {shown(values)}.")
@@ -464,12 +451,7 @@ KINDS: Mapping[str, str] = {
 
 
 def new_scene(name: str, path: Path) -> Path:
-    """Write a scene file; returns its path.
-
-    Raises
-    ------
-    InputError : an unknown kind of rotor, or a file that is there already
-    """
+    """Write a scene file; returns its path. Raises InputError for an unknown kind of rotor, or a file that is there."""
     if name not in KINDS:
         raise InputError(f"Input NAME must be one of {', '.join(KINDS)}; instead received {name}.")
     if path.exists():

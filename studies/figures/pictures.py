@@ -23,13 +23,7 @@ ANGLES = 8  # Of the rotor, from which the part of its field at the rotor's freq
 
 
 def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> View:
-    """The end of a trajectory with its path and the field.
-
-    Parameters
-    ----------
-    scene, time, motion : as of `seen_from`
-    table : the rotor's field
-    """
+    """The end of a trajectory as of `seen_from`, and the field by the rotor's `table`."""
     view, field = seen_from(scene, time, motion), drawn_field(scene, table)
     depth = max(abs(1e3 * float(view.position[2])), 10.0)
     width = max(1.6 * depth, 30.0)
@@ -40,16 +34,10 @@ def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> Vi
 
 
 def seen_from(scene: Scene, time: Array, motion: State) -> View:
-    """The end of a trajectory with its path.
+    """The end of a trajectory of a `scene` with its path: `motion` along the rotor's axes at `time` (n,) s.
 
     A floater that gravity across the axis keeps on one side of it does not turn with the rotor: its path is that in the
     laboratory, and it stands where it is at an instant near the end at which the rotor's axes are the laboratory's.
-
-    Parameters
-    ----------
-    scene : that was simulated
-    time : (n,) s
-    motion : its vectors (n, 3) along the rotor's axes
     """
     frame, last = "rotor's frame", len(time) - 1
     if np.any(scene.gravity[:2]):
@@ -63,7 +51,7 @@ def seen_from(scene: Scene, time: Array, motion: State) -> View:
 
 
 def drawn_field(scene: Scene, table: FieldTable) -> Callable[[Array], Array]:
-    """B (n, 3) T at points (n, 3) m as the table has it and, nearer to the magnets than its range, by the closed form.
+    """B (n, 3) T at points (n, 3) m by the table and, nearer to the magnets than its range, by the closed form.
 
     NaN inside the magnets.
     """
@@ -80,12 +68,7 @@ def drawn_field(scene: Scene, table: FieldTable) -> Callable[[Array], Array]:
 
 
 def flight_frames(scene: Scene, time: Array, motion: State) -> Frames:
-    """The frames of an animation of a trajectory, laboratory frame.
-
-    Parameters
-    ----------
-    scene, time, motion : as of `seen_from`
-    """
+    """Frames of an animation, laboratory frame; `scene`, `time` and `motion` are as of `seen_from`."""
     instants = frame_times(scene, float(time[-1]))
     position, moment = (
         np.stack([np.interp(instants, time, component) for component in vectors.T], axis=-1)
@@ -99,17 +82,11 @@ def flight_frames(scene: Scene, time: Array, motion: State) -> Frames:
 
 
 def plate_currents(scene: Scene, plate: Plate, table: RotorTable, floater: State, points: Array) -> Array:
-    """Current density (n, 3), A/m², laboratory frame, in a plate on which rotor and floater have long been turning.
+    """Current density (n, 3), A/m², in a `plate` of a `scene` whose rotor and floater have long been turning.
 
-    The part at the rotor's frequency only; harmonics are left out.
-
-    Parameters
-    ----------
-    scene : its floater and frequency
-    plate : its plate
-    table : the rotor's field
-    floater : along the rotor's axes, at the instant at which these are the laboratory's; its place is taken as fixed
-    points : (n, 3) m inside the plate, laboratory frame
+    At `points` (n, 3) m inside the plate, laboratory frame, by the rotor's field `table` and the `floater` along the
+    rotor's axes, at an instant at which these are the laboratory's; its place is taken as fixed. It is the part at the
+    rotor's frequency.
     """
     turning = np.array([[1, 1j, 0], [-1j, 1, 0], [0, 0, 0]]) @ floater.moment
     place = plate.box.to_body(floater.position[None])

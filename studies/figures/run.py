@@ -329,7 +329,6 @@ def _axes(result: xr.Dataset) -> tuple[str, list[str]]:
 
 
 def _shown(result: xr.Dataset) -> list[str]:
-    """Names of what is drawn of a result; one of an older version has less."""
     return [name for name in QUANTITIES[str(result.attrs["ask"])] if name in result]
 
 
@@ -406,7 +405,6 @@ def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
 
 
 def _label(values: xr.DataArray, value: str = "") -> str:
-    """Name and unit as of an axis, or with a value between them."""
     unit = UNITS.get(units := str(values.attrs.get("units", "1")), units)
     return f"{values.attrs.get('long_name', values.name)}{value} {unit if value or not unit else f'({unit})'}".rstrip()
 

@@ -93,13 +93,7 @@ def turnable_scene(view: View) -> bytes:
 
     PyVista's own `export_html` gives the same file, but starts a web server to make it.
     """
-    from trame_vtk.modules.vtk.serializers import (
-        SynchronizationContext,
-        extract_array_hash,
-        initialize_serializers,
-        reference_id,
-        serialize,
-    )
+    from trame_vtk.modules.vtk import serializers
 
     plotter = new_plotter((900, 700))
     _add_bodies(plotter, view)
@@ -107,18 +101,18 @@ def turnable_scene(view: View) -> bytes:
         plotter.add_mesh(_polylines(view.lines), color="#2E3440", line_width=1)
     _look(plotter, view.scene)
     plotter.render()
-    initialize_serializers()
-    context, window = SynchronizationContext(), plotter.render_window
+    serializers.initialize_serializers()
+    context, window = serializers.SynchronizationContext(), plotter.render_window
     camera = plotter.renderer.GetActiveCamera()
-    state = serialize(None, window, reference_id(window), context, 1)
+    state = serializers.serialize(None, window, serializers.reference_id(window), context, 1)
     state["extra"] = {
-        "vtkRefId": reference_id(window),
+        "vtkRefId": serializers.reference_id(window),
         "centerOfRotation": camera.GetFocalPoint(),
-        "camera": reference_id(camera),
+        "camera": serializers.reference_id(camera),
     }
     arrays = {
         entry["hash"]: {**entry, "content": context.get_cached_data_array(entry["hash"], False)}
-        for entry in extract_array_hash(state)
+        for entry in serializers.extract_array_hash(state)
     }
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -143,15 +137,10 @@ def _add_frame(plotter: pv.Plotter, frames: Frames, k: int) -> list[pv.Actor]:
 def add_floater(
     plotter: pv.Plotter, scene: Scene, position: Array, moment: Array, axes: Array | None = None
 ) -> list[pv.Actor]:
-    """Draw the floater's body and its moment.
+    """Draw the floater of a `scene` at a `position` (3,) m and its `moment` (3,), which may be zero.
 
-    Parameters
-    ----------
-    plotter : of PyVista, lengths in mm
-    scene : whose floater it is
-    position : (3,) m
-    moment : (3,) its direction, or zero
-    axes : (3, 3) whose columns are the body's axes; None: those that the moment gives
+    On a `plotter`, lengths in mm. The columns of `axes` (3, 3) are the body's; None: those that the moment gives.
+    Returns the actors.
     """
     floater = scene.floater
     direction = moment / (np.linalg.norm(moment) or 1.0)
@@ -164,14 +153,7 @@ def add_floater(
 
 
 def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = None) -> None:
-    """Draw the part of the plate near the rotor, if there is one, with its currents: the longest arrow is 12 mm.
-
-    Parameters
-    ----------
-    plotter : of PyVista, lengths in mm
-    scene : whose plate it is
-    currents : in the plate, where they are to be seen
-    """
+    """Draw the part of the plate near the rotor, if there is one, with its `currents`: the longest arrow is 12 mm."""
     if scene.plate is None:
         return
     _add_body(plotter, near_plate(scene.plate.body, SEEN), METAL, opacity=0.2)
@@ -206,7 +188,6 @@ def _add_bodies(plotter: pv.Plotter, view: View) -> bool:
 
 
 def _add_rotor(plotter: pv.Plotter, scene: Scene) -> list[pv.Actor]:
-    """Draw the magnets with their polarisation; returns the actors, which turn together."""
     actors = []
     for magnet in scene.rotor:
         actors += _add_body(plotter, magnet.body, DARK)
@@ -255,7 +236,6 @@ def _add_field(plotter: pv.Plotter, view: View) -> None:
 
 
 def _polylines(lines: Any) -> pv.PolyData:
-    """Lines (n, 3) m each."""
     numbers, count = [], 0
     for line in lines:
         numbers += [len(line), *range(count, count + len(line))]
@@ -293,7 +273,6 @@ def _look(plotter: pv.Plotter, scene: Scene) -> None:
 
 
 def _add_body(plotter: pv.Plotter, body: Solids, color: str, **look: Any) -> list[pv.Actor]:
-    """Draw a body, with its edges where it is a box."""
     corners, faces = triangles(body)
     mesh = pv.PolyData.from_regular_faces(1e3 * corners, faces)
     if isinstance(body, Box):
@@ -303,7 +282,6 @@ def _add_body(plotter: pv.Plotter, body: Solids, color: str, **look: Any) -> lis
 
 
 def _add_arrow(plotter: pv.Plotter, center: Array, direction: Array, radius: float) -> list[pv.Actor]:
-    """An arrow of three radii through `center`; none where there is no direction."""
     if not (length := float(np.linalg.norm(direction))):
         return []
     corners, faces = arrow(center, direction / length, 1.5 * radius)

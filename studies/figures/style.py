@@ -110,17 +110,11 @@ def figures_across(width: FigureWidth) -> Iterator[None]:
 def panels(
     rows: int, columns: int, height: float, beside: int | None = None, stays: bool = False, **shared: Any
 ) -> tuple[Figure, Any]:
-    """A figure without a window and its axes (rows, columns), lettered (a), (b) where there are several.
+    """A figure without a window and its axes (`rows`, `columns`), lettered (a), (b) where there are several.
 
-    In a column panels stand one below the other where they are up to four, else in pairs; their text keeps its size.
-
-    Parameters
-    ----------
-    rows, columns : of the panels
-    height : of a row of panels, inches across the page
-    beside : panels next to each other across the page; by default a row
-    stays : whether the figure is across the page always, because its panels belong together
-    shared : as of `Figure.subplots`
+    A row has a `height` in inches and across the page so many panels `beside` each other, by default all; `shared` are
+    options of `Figure.subplots`. In a column panels stand one below the other where they are up to four, else in pairs,
+    and their text keeps its size, unless the figure `stays` across the page because its panels belong together.
     """
     from matplotlib.figure import Figure
 
@@ -166,12 +160,9 @@ def plain_log(axis: Any, ticks: Sequence[float] = ()) -> None:
 
 
 def legend_below(figure: Figure, *labelled: Any) -> None:
-    """One legend below all panels in as many columns as fit, up to six; the figure becomes higher by its height.
+    """One legend below all panels for the axes `labelled`, or all, in as many columns as fit, up to six.
 
-    Parameters
-    ----------
-    figure : with its panels
-    labelled : the axes whose names it explains; all where none are given
+    The figure becomes higher by its height.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

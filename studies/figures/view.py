@@ -25,7 +25,7 @@ SQUARES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 
 
 @dataclass(frozen=True, eq=False)
 class FieldPlane:
-    """B (n, 3) T at the points of a grid in the plane y = 0 around the rotor, x running fastest; NaN in the magnets.
+    """B (n, 3) T in the plane y = 0 around the rotor, x running fastest; NaN in the magnets.
 
     It reaches from -width to width, mm, and from 1.6 depth below the rotor's origin to 0.8 depth above it.
     """
@@ -172,15 +172,10 @@ def near_plate(plate: Solids, reach: float) -> Solids:
 
 
 def field_lines(scene: Scene, field: Callable[[Array], Array], low: Array, high: Array) -> list[Array]:
-    """Lines (n, 3) m of a field outside the magnets; between neighbours is equal flux.
+    """Lines (n, 3) m of a `field`, B (n, 3) at points (n, 3) m, outside the magnets; between neighbours is equal flux.
 
-    Runge and Kutta's fourth order in steps of equal length: a line is off by less than it is thick.
-
-    Parameters
-    ----------
-    scene : whose magnets the lines begin and end at
-    field : B (n, 3) at points (n, 3) m
-    low, high : (3,) corners m of the box in which they are followed
+    They are followed in the box between `low` and `high` (3,) m by Runge and Kutta's fourth order in steps of equal
+    length: a line is off by less than it is thick.
     """
     corners = np.concatenate([magnet.box.corners for magnet in scene.rotor])
     middle = corners.mean(axis=0) * (1, 0, 1)

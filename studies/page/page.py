@@ -36,13 +36,7 @@ SEEN = 0.03  # How far along its edges a plate is drawn, m
 
 
 class Page:
-    """A page and its processes.
-
-    Parameters
-    ----------
-    tell : sends the page what it shall show, each by its name in page.js
-    state : where it begins
-    """
+    """A page that begins with a `state`, and its processes; `tell` sends it what to show, by its name in page.js."""
 
     def __init__(self, tell: Callable[..., None], state: PageState) -> None:
         self.tell, self.state = tell, state
@@ -90,7 +84,6 @@ class Page:
             worker.stop()
 
     def _begin(self) -> None:
-        """Show the controls of a new scene."""
         self.begun, state = True, self.state
         names = ["dipole", "cuboid", "surface", "fem", *(["map"] if state.scene.field_map else [])]
         names += [state.model] if state.model not in names else []
@@ -138,7 +131,6 @@ class Page:
         self.resting = asyncio.get_running_loop().call_later(REST, self._rest)
 
     def _opened(self, name: str, text: str) -> None:
-        """A scene file of the reader's."""
         try:
             data = base64.b64decode(text)
         except binascii.Error:
@@ -146,7 +138,6 @@ class Page:
         self._become("opened", data, str(name) or "scene")
 
     def _go(self, *point: float) -> None:
-        """To a point of the map, as far as the sliders reach."""
         for slider, place in zip(controls(self.state)[:2], point, strict=True):
             value = slider.start + round((place - slider.start) / slider.step) * slider.step
             value = round(min(max(value, slider.start), slider.end), 9)
@@ -154,7 +145,6 @@ class Page:
             self._become("changed", slider.name, value)
 
     def _answered(self, complete: bool, found: Shown) -> None:
-        """Numbers at once, and later by the models asked for."""
         self.shown, self.number = found, self.number + 1
         shown = {key: value for key, value in vars(found).items() if key not in ("lines", "strength")}
         shown["models"] = [vars(one) for one in found.models]
@@ -215,7 +205,6 @@ class Page:
         self.tell(regions=vars(found), map_says=says)
 
     def _download(self, kind: str) -> None:
-        """Send a file that goes home."""
         name, form = work.FILES[kind]
         self.tell(message="")
 
@@ -227,14 +216,12 @@ class Page:
     # The trajectory, which page.js asks for piece by piece
 
     def _land(self) -> None:
-        """Forget the trajectory."""
         self.flyer.stop()
         self.flying = self.ended = False
         self.tell(says="")
         self._show_rest()
 
     def _show_rest(self) -> None:
-        """The floater where it would levitate, and the other equilibria."""
         places = self.shown.places if self.shown else []
         self.tell(equilibria=[[position[0], position[2]] for position, _ in places])
         if places:

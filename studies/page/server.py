@@ -62,11 +62,7 @@ FULL = f"{MOST_PAGES} pages are open, and more are not served at a time. Close o
 class LivePage:
     """Pages that are served by `run`, or in the background from `begin` on, until `stop`; a notebook shows one.
 
-    Parameters
-    ----------
-    address : of the page, with its token
-    local : whether no other machine can see them
-    opened : the pages that are open
+    The `address` has the token; `local`: no other machine can see them; `opened`: the pages that are open.
     """
 
     def __init__(self, address: str, local: bool, gate: "_Gate", listening: socket.socket) -> None:
@@ -125,20 +121,11 @@ class LivePage:
 
 
 def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int = 0, framed: bool = False) -> LivePage:
-    """Listen for browsers that ask for pages about a scene, which `run` serves.
+    """Listen for browsers that ask for pages about a `scene`, which `run` serves; no files but its own are ever opened.
 
-    Parameters
-    ----------
-    scene : where each page begins; no other files than its own are ever opened
-    source : its name in messages
-    host : address of this machine on which to listen
-    port : 0 for any that is free
-    framed : whether a notebook may show the pages
-
-    Raises
-    ------
-    InputError : a host or a port that cannot be, or a scene of which trajectories alone are computed
-    ComputationError : the port is taken, or the address is not this machine's
+    `source` is its name in messages, `host` an address of this machine, `port` 0 for any that is free; `framed` pages
+    may be in a notebook. Raises InputError: a host or a port that cannot be, or a scene of which trajectories alone are
+    computed; ComputationError: the port is taken, or the address is not this machine's.
     """
     check_coils(levitating_scene(scene))
     if not 0 <= port <= 65535:
@@ -313,7 +300,6 @@ class _OneLine(logging.Filter):
             logger.addFilter(self)
 
     def remove(self) -> None:
-        """Leave the libraries as they were."""
         for logger in self._loggers:
             logger.removeFilter(self)
 

@@ -111,14 +111,7 @@ class Shown:
 def become(
     state: PageState, method: str, arguments: tuple[Any, ...], near: Sequence[Any]
 ) -> tuple[PageState, Shown | str]:
-    """Another state and its preview, or why there is none.
-
-    Parameters
-    ----------
-    state : the one before
-    method, arguments : of `PageState`, which gives the other
-    near : places, as of `preview`
-    """
+    """Another state by a `method` of the `state` with `arguments`; its preview from `near`, or why there is none."""
     made: PageState = getattr(state, method)(*arguments)
     made.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
     try:
@@ -133,16 +126,10 @@ def compared(state: PageState) -> list[FieldModel]:
 
 
 def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -> Shown:
-    """Equilibria without the plate's currents, while a slider moves.
+    """Equilibria of a `state` without the plate's currents, while a slider moves.
 
-    They are those that Newton's method finds from places nearby, else from the point dipole's, else all that a search
-    finds.
-
-    Parameters
-    ----------
-    state : what the page shows
-    near : places to begin at, as of `Shown.places`
-    patient : whether finite elements are computed where they are not in the cache; else they are left out
+    They are those that Newton's method finds from places `near`, as of `Shown.places`, else from the point dipole's,
+    else all that a search finds. Who is `patient` gets finite elements where they are not in the cache, too.
     """
     known: dict[str, Levitation] = {}
     fresh: Sequence[Any] = ()  # places by the point dipole, the first of all
@@ -163,7 +150,6 @@ def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -
 
 
 def _survey_near(levitation: Levitation, near: Sequence[Any]) -> Survey | None:
-    """What becomes of equilibria at places, as of `Shown`, of a scene nearby; None where one of them is lost."""
     places, moments = (np.array([pair[k] for pair in near]) for k in (0, 1))
     return survey_near(levitation, 1e-3 * places, moments) if len(near) else None
 
@@ -196,7 +182,6 @@ def complete(state: PageState) -> Shown:
 
 
 def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
-    """What a page shows of the models that are `known`."""
     first = known.get(state.model) or next(iter(known.values()))
     found, left_out = first.equilibria, first.survey.left_out
     useful = worth_a_row(found)
@@ -291,15 +276,10 @@ def article_points(state: PageState) -> dict[str, Any]:
 def regions(
     state: PageState, spans: tuple[tuple[float, float], tuple[float, float]], model: str, points: int
 ) -> Regions:
-    """Where something levitates stably, without plate.
+    """Where something levitates stably without plate over `spans` of frequency (Hz) and measure (mm or °).
 
-    Parameters
-    ----------
-    state : gives all but frequency and measure of the rotor
-    spans : of the frequency, Hz, and of the measure, mm or degrees
-    model, points : of the field, and along each axis; magnets that move against each other have the closed form
-
-    Raises ComputationError: the scene has no such map.
+    For a `state`, by a `model` of the field at so many `points` along each axis; magnets that move against each other
+    have the closed form. Raises ComputationError: the scene has no such map.
     """
     configuration = state.keys["rotor"]["configuration"]
     axes = [np.linspace(*span, points) for span in spans]
@@ -430,12 +410,7 @@ def _frame(piece: Piece | None = None) -> Frame:
 
 
 def content(kind: str, state: PageState) -> bytes:
-    """The content of a file of `FILES`, which the command line computes alike.
-
-    Raises
-    ------
-    SpinlevError : the scene has no answer
-    """
+    """The content of a file of `FILES`, which the command line computes alike. Raises what the scene's answer does."""
     if kind == "toml":
         return scene_text(state.scene).encode()
     levitation = Levitation(state.scene, state.models, state.spin)

@@ -45,11 +45,8 @@ def _prepared(known: Callable[[str], dict[str, Any]], name: str) -> dict[str, An
 class Worker:
     """A process that answers one question after the other, in the asyncio loop of who asks.
 
-    Parameters
-    ----------
-    words, seconds : what the work is, and after how long it is cut off; what takes longer is for the command line
-    failed : called with a sentence that says why there is no answer
-    patience : by how much others go first; such a process ends, with its memory, when no question waits
+    `words` say what the work is, which is cut off after so many `seconds`; `failed` is called with a sentence that says
+    why there is no answer. By `patience` others go first; such a process ends, with its memory, when no question waits.
     """
 
     def __init__(self, words: str, seconds: float, failed: Callable[[str], None], patience: int = 0) -> None:
@@ -65,13 +62,9 @@ class Worker:
         return self._task is not None and not self._task.done()
 
     def ask(self, key: Hashable, call: Call, receive: Callable[[Any], None]) -> None:
-        """Compute something when its turn comes.
+        """Compute when its turn comes: `call` gives the function and its arguments, `receive` gets the answer.
 
-        Parameters
-        ----------
-        key : an older question with this key that still waits is left out
-        call : gives the function and its arguments when the turn has come
-        receive : gets the answer
+        An older question with this `key` that still waits is left out.
         """
         self._waiting.pop(key, None)
         self._waiting[key] = call, receive
