@@ -38,9 +38,8 @@ def modes_of(scene: Scene, rtol: float = 1e-3) -> tuple[FloatingModes | FreeMode
     region = heights if conductor.on_axis(scene) else conductor.room_over(scene)
     frequency = max(conductor.LOWEST, *(coil.frequency for coil in scene.coils))
     assert scene.floater.conductivity is not None
-    return cached_floating_modes(
-        scene.floater.bodies[0], scene.floater.conductivity, scene.coils, supply.shares, region, frequency, rtol, note
-    )
+    floater = scene.floater.bodies[0], scene.floater.conductivity
+    return cached_floating_modes(*floater, scene.coils, supply.shares, region, frequency, rtol, note)
 
 
 def coils_summary(scene: Scene, duration: float, modes: FloatingModes | FreeModes) -> tuple[xr.Dataset, dict[str, Any]]:

@@ -35,6 +35,7 @@ BESIDE = 0.1  # of the frequency: how far beyond the ranges of stability the bra
 PART_RTOL = 1e-4  # a hundredth of what models differ by
 GRID = 41  # frequencies at which they are, where none are asked for
 END = ("low", "high")
+OF_EQUILIBRIUM = "distance_mm", "polar_angle_deg", "growth_per_s", "stability", "frequencies_hz"
 COLUMNS = (
     "model", "distance (mm)", "polar angle (°)", "growth rate (s⁻¹)", "modes (Hz)", "stable from, to (Hz)", ""
 )  # fmt: skip
@@ -54,9 +55,7 @@ class Compared:
         """For JSON."""
         row: dict[str, Any] = {"name": self.name, "stable_range_hz": self.stable}
         if (e := self.found) is None:
-            return row | dict.fromkeys(
-                ("distance_mm", "polar_angle_deg", "growth_per_s", "stability", "frequencies_hz")
-            )
+            return row | dict.fromkeys(OF_EQUILIBRIUM)
         return row | {
             "distance_mm": -1e3 * float(e.position[2]),
             "distance_error_mm": 1e3 * e.position_error,
@@ -168,14 +167,11 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
         low, high = min(*ends, scene.frequency), max(*ends, scene.frequency)
         low, high = low * (1 - BESIDE), high * (1 + BESIDE)
         frequencies = low + (high - low) * np.linspace(0.0, 1.0, GRID) ** 2  # dense at the fold, where branches turn
-    points = [
-        on_branch(replace(row.levitation.scene, plate=None), row.levitation.rates, row.branch, frequencies)
-        for row in rows
-    ]
+    scenes = [(replace(row.levitation.scene, plate=None), row.levitation.rates, row.branch) for row in rows]
+    points = [on_branch(*scene, frequencies) for scene in scenes]
     nothing = math.nan, math.nan, False
-    branch = np.array(
-        [[(-p.position[2], p.growth_per_s, levitates(p)) if p else nothing for p in row] for row in points]
-    )
+    at = [[(-p.position[2], p.growth_per_s, levitates(p)) if p else nothing for p in row] for row in points]
+    branch = np.array(at)
     found = [row.found for row in rows]
     modes = [e.frequencies_hz if e else () for e in found]
     spectrum = np.array([*zip_longest(*modes, fillvalue=math.nan)], float).reshape(-1, len(rows)).T
@@ -202,17 +198,10 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
             "branch_growth": variable(over, branch[..., 1], "1/s", "growth rate, without the plate"),
             "branch_stable": (over, branch[..., 2] == 1),
         },
-        {
-            "model": [row.name for row in rows],
-            "end": list(END),
-            "frequency": variable(("frequency",), frequencies, "Hz", "rotor frequency"),
-        },
-        {
-            "study": "compare",
-            "frequency_hz": scene.frequency,
-            "plate_model": plate.model if plate else "none",
-            "scene": scene_text(scene),
-        },
+        {"model": [row.name for row in rows], "end": list(END),
+         "frequency": variable(("frequency",), frequencies, "Hz", "rotor frequency")},
+        {"study": "compare", "frequency_hz": scene.frequency, "scene": scene_text(scene)}
+        | {"plate_model": plate.model if plate else "none"},
     )  # fmt: skip
 
 

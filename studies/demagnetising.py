@@ -18,7 +18,7 @@ from .cli.options import Answer
 from .figures.run import working_point_figure
 from .figures.style import save_figures
 from .levitation import Levitation
-from .result import AXIS, Columns, columns, write_dataset
+from .result import AXIS, Columns, columns, variable, write_dataset
 
 STEPS, LEVELS = 101, 201  # points across a section; levels of the field that are kept of a magnet
 OF_A_POINT: Columns = {
@@ -66,13 +66,13 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
             floating = most_like_levitation(levitation.without_plate.equilibria)
     note("Field in the magnets ...")
     start = None if floating is None else floating.start
-    field = EasyField(
-        scene.rotor, None if start is None else scene.floater.magnets_at(start.position, start.orientation)[0]
-    )
+    at = None if start is None else scene.floater.magnets_at(start.position, start.orientation)[0]
+    field = EasyField(scene.rotor, at)
     known = working_points(field)
     found = [(k, point) for k in numbers if (point := known[k]) is not None]
     sections = [field.section(k, point.place, STEPS) for k, point in found]
     shares = np.linspace(0, 1, LEVELS)
+    share = variable(("level",), shares, "1", "share of the volume")
     values = {
         # As an array of numbers, in which None is NaN.
         **{name: np.array([getattr(point, name) for _, point in found], float) for name in OF_A_POINT},
@@ -84,11 +84,7 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
     }
     return xr.Dataset(
         columns(COLUMNS, values),
-        {
-            "magnet": ("magnet", np.array(numbers) + 1),
-            "axis": list(AXIS),
-            "share": ("level", shares, {"units": "1", "long_name": "share of the volume"}),
-        },
+        {"magnet": ("magnet", np.array(numbers) + 1), "axis": list(AXIS), "share": share},
         {"study": "working-point", "title": "Field along the easy axes of the rotor's magnets, rotor's frame"},
     )
 

@@ -125,9 +125,8 @@ class _Problem:
         return {"margin": 2, "decay_per_s": len(self.search.start.known.modes)}.get(name, 1)
 
     def numbers(self, z: Array) -> Array:
-        return np.asarray(
-            np.clip(self.search.low + z[: len(self.width)] * self.width, self.search.low, self.search.high)
-        )
+        low, high = self.search.low, self.search.high
+        return np.asarray(np.clip(low + z[: len(self.width)] * self.width, low, high))
 
     def values(self, z: Array, name: str, sign: int = 1) -> Array | None:
         """What a measure is the least of, by its size; None where there is no such scene."""
@@ -511,9 +510,8 @@ def design_figure(result: xr.Dataset) -> Figure:
     left.hlines(places, 0, 1, color="0.85", lw=4)
     left.plot(first, places, "o", mfc="none", color=PALETTE[1], label="given")
     left.plot(after, places, "o", color=PALETTE[0], label="found")
-    left.set_yticks(
-        places, [f"{key} ({unit})" for key, unit in zip(result["key"].values, result["unit"].values, strict=True)]
-    )
+    keys = zip(result["key"].values, result["unit"].values, strict=True)
+    left.set_yticks(places, [f"{key} ({unit})" for key, unit in keys])
     left.set_xticks([0, 1], ["least", "most"])
     left.set_ylim(-0.7, len(places) - 0.3)
     for curve, color in ((0, PALETTE[1]), (1, PALETTE[0])):

@@ -24,7 +24,7 @@ from .figures.pictures import plate_currents
 from .figures.style import NAMES, colour_bar, panels, save_figures, styled, titled
 from .levitation import Levitation
 from .plan import sources
-from .result import write_dataset
+from .result import variable, write_dataset
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -242,34 +242,21 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
     b, h = b + coils, h + coils
     error, magnet = np.full(len(places), np.nan), np.full(len(places), -1)
     error[clear], magnet[clear] = elements.error, elements.magnet
-    size_b = np.linalg.norm(b, axis=2)
-    shape = (len(v), len(u))
-    dims = (plane[1], plane[0])
-    vectors, attrs = ("model", *dims, "component"), {"units": "T"}
-    difference = np.linalg.norm(b - b[2], axis=2) / size_b[2]
-    return xr.Dataset(
-        {
-            "B": (vectors, b.reshape(3, *shape, 3), attrs | {"long_name": "flux density"}),
-            "H": (vectors, h.reshape(3, *shape, 3) / MU_0, {"units": "A/m", "long_name": "magnetic field"}),
-            "M": (vectors, (b - h).reshape(3, *shape, 3) / MU_0, {"units": "A/m", "long_name": "magnetisation"}),
-            "difference": (("model", *dims), difference.reshape(3, *shape), {"units": "1", "long_name": "|ΔB|/|B|"}),
-            "error": (dims, error.reshape(shape), attrs | {"long_name": "estimated error of the finite elements"}),
-            "outside": (dims, outside.reshape(shape), {"units": "m", "long_name": "distance to the next magnet"}),
-            "magnet": (dims, magnet.reshape(shape) + 1, {"units": "1", "long_name": "number of the magnet, 0 in air"}),
-        },
-        {
-            "model": list(MODELS),
-            "component": list("xyz"),
-            plane[0]: (plane[0], u, {"units": "m"}),
-            plane[1]: (plane[1], v, {"units": "m"}),
-        },
-        {
-            "study": "field-map",
-            "plane": plane,
-            "offset_m": offset,
-            "title": f"Field of the rotor{' and the coils' if scene.coils else ''} on a plane, in its frame at t = 0",
-        },
-    )
+    difference = np.linalg.norm(b - b[2], axis=2) / np.linalg.norm(b[2], axis=1)
+    dims, shape, vectors = (plane[1], plane[0]), (len(v), len(u)), ("model", plane[1], plane[0], "component")
+    data = {
+        "B": variable(vectors, b.reshape(3, *shape, 3), "T", "flux density"),
+        "H": variable(vectors, h.reshape(3, *shape, 3) / MU_0, "A/m", "magnetic field"),
+        "M": variable(vectors, (b - h).reshape(3, *shape, 3) / MU_0, "A/m", "magnetisation"),
+        "difference": variable(("model", *dims), difference.reshape(3, *shape), "1", "|ΔB|/|B|"),
+        "error": variable(dims, error.reshape(shape), "T", "estimated error of the finite elements"),
+        "outside": variable(dims, outside.reshape(shape), "m", "distance to the next magnet"),
+        "magnet": variable(dims, magnet.reshape(shape) + 1, "1", "number of the magnet, 0 in air"),
+    }
+    axes = {name: (name, line, {"units": "m"}) for name, line in zip(plane, (u, v), strict=True)}
+    title = f"Field of the rotor{' and the coils' if scene.coils else ''} on a plane, in its frame at t = 0"
+    said = {"study": "field-map", "plane": plane, "offset_m": offset, "title": title}
+    return xr.Dataset(data, {"model": list(MODELS), "component": list("xyz"), **axes}, said)
 
 
 def _dipoles(scene: Scene, places: Array) -> Array:

@@ -155,14 +155,12 @@ class _Rows:
                 f"Input data must have more values than there are free numbers; instead {self.there.sum()} values are "
                 f"to give {len(free)} numbers."
             )
-        self.set = (
-            np.stack([table[name] for name in self.keys], axis=1) if self.keys else np.zeros((len(self.there), 0))
-        )
+        none = np.zeros((len(self.there), 0))
+        self.set = np.stack([table[name] for name in self.keys], axis=1) if self.keys else none
         self.searches = []
         for row in self.set:
-            there = Levitation(
-                changed(scene, dict(zip(self.keys, row.tolist(), strict=True))), levitation.models, levitation.spin
-            )
+            one = changed(scene, dict(zip(self.keys, row.tolist(), strict=True)))
+            there = Levitation(one, levitation.models, levitation.spin)
             there.share(levitation)
             self.searches.append(Search(there, free))
 

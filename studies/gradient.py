@@ -92,9 +92,8 @@ class Gradient:
         """
         base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), known.currents is not None)
         if known.kind == LOCKED:
-            self.reasons[LOCKED] = (
-                "derivatives of frequency-locked equilibria of a body that is not round are not known"
-            )
+            why = "derivatives of frequency-locked equilibria of a body that is not round are not known"
+            self.reasons[LOCKED] = why
             return {}, None, base
         implicit = Implicit(known, base.setting)
         if implicit.at_fold:
@@ -244,9 +243,8 @@ class Gradient:
         every = [e for e in self.levitation.without_plate.equilibria if e.kind == known.kind != LOCKED]
         beyond = [e for e in every if e.distance > here.distance and axial_stiffness(e) < 0]
         if not beyond or known.stability == "unstable":
-            self.reasons["escape"] = (
-                "an energy of escape is of what levitates, with an unstable equilibrium farther off"
-            )
+            why = "an energy of escape is of what levitates, with an unstable equilibrium farther off"
+            self.reasons["escape"] = why
             return np.nan, lost, lost
         there = min(beyond, key=lambda e: e.distance)
         base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), False)
@@ -271,11 +269,8 @@ def range_ends(gradient: Gradient, keys: Sequence[str]) -> tuple[Array, Array, A
     contact so that the bodies touch. Raises EquilibriumError: the scene's equilibrium is in no such range.
     """
     levitation = gradient.levitation
-    runs = [
-        run
-        for run in stable_ranges(levitation.branch)
-        if run.low.parameter <= gradient.scene.frequency <= run.high.parameter
-    ]
+    frequency, every = gradient.scene.frequency, stable_ranges(levitation.branch)
+    runs = [run for run in every if run.low.parameter <= frequency <= run.high.parameter]
     if not runs:
         raise EquilibriumError(
             "The equilibrium is in no range of stable frequencies, whose ends would have derivatives."

@@ -395,19 +395,17 @@ def ensemble(
     together = min(TOGETHER, -(-len(begun.position) // number))
     requested = levitation.scene, levitation.interaction, begun, duration_s
     found = simulated(*requested, map if number == 1 else mapped(number), together, offset)
+    over = ("flight", "axis")
     last = found.last.to_lab(levitation.scene.angle(found.levitated_s))
     data = {
         "levitated": variable(("flight",), found.levitated_s, "s", "levitation time"),
         "ended_by": (("flight",), found.ended_by),
-        "position_rotor_frame": variable(
-            ("flight", "axis"), found.last.position, "m", "position, rotor's frame, at the end"
-        ),
+        "position_rotor_frame": variable(over, found.last.position, "m", "position, rotor's frame, at the end"),
         **state_columns(last, "flight", ", at the end"),
         **state_columns(begun, "flight", ", at t = 0", "start_"),  # where the rotor's axes are the laboratory's
     }
-    return xr.Dataset(data, {"axis": list(AXIS)}).assign_attrs(
-        study="ensemble", scene=scene_text(levitation.scene), duration_s=duration_s, **levitation.labels, **drawn
-    )
+    said = {"study": "ensemble", "scene": scene_text(levitation.scene), "duration_s": duration_s}
+    return xr.Dataset(data, {"axis": list(AXIS)}, {**said, **levitation.labels, **drawn})
 
 
 @documented

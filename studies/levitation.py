@@ -469,9 +469,8 @@ class Levitation:
             table, plate, known = self._with_effects(self.flight_table), self.flight_plate, self._known_for_flight
             note("Motion ...")
             with progress("Motion") as bar:
-                simulated = simulate(
-                    self.scene, table, duration, known, progress=bar, memory=plate, checkpoint=checkpoint
-                )
+                how: dict[str, Any] = {"progress": bar, "memory": plate, "checkpoint": checkpoint}
+                simulated = simulate(self.scene, table, duration, known, **how)
             if simulated.left_plate_table:
                 again = self._followed(simulated.lab.position[-1], simulated.levitated_s)
             else:
@@ -503,10 +502,8 @@ class Levitation:
         body = memory.plate.box.to_body(place + plate_depth(memory.plate, np.array([time])) * up)
         try:
             region = wider_region(memory.plate, memory.table.region, self.scene.floater.radius, body)
-            note(
-                f"After {time:.4g} s the floater leaves the range of the plate's table: again from the start, with a "
-                "larger one."
-            )
+            where = "leaves the range of the plate's table: again from the start, with a larger one."
+            note(f"After {time:.4g} s the floater {where}")
             self._widen(region)
         except SpinlevError as error:
             self.no_wider = str(error)

@@ -104,9 +104,8 @@ class NearbyScenes:
 
     @cached_property
     def setting(self) -> Setting:
-        return self._setting(
-            self.scene, self.levitation.interaction, self.levitation.plate if self.with_plate else None
-        )
+        plate = self.levitation.plate if self.with_plate else None
+        return self._setting(self.scene, self.levitation.interaction, plate)
 
     def _setting(self, scene: Scene, interaction: Interaction, plate: PlateMemory | None) -> Setting:
         if self.averaged:

@@ -293,8 +293,5 @@ def _field(question: Question, levitation: Levitation) -> xr.Dataset:
     )
 
 
-ANSWERS: Mapping[Quantity, Callable[[Question, Levitation], xr.Dataset]] = {
-    "equilibria": _equilibria,
-    "flight": _flight,
-    "field": _field,
-}
+Answers = Mapping[Quantity, Callable[[Question, Levitation], xr.Dataset]]
+ANSWERS: Answers = {"equilibria": _equilibria, "flight": _flight, "field": _field}

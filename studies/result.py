@@ -161,9 +161,8 @@ class Result:
     def _effects(self) -> list[ListedEffect]:
         # A trajectory that begins where the scene says needs no equilibrium, and searches for none.
         alone = self.flight is not None and self.levitation.absolute
-        return listed_effects(
-            self.levitation, () if alone else (self.survey or self.levitation.quiet.survey).equilibria
-        )
+        found = () if alone else (self.survey or self.levitation.quiet.survey).equilibria
+        return listed_effects(self.levitation, found)
 
     def text(self) -> list[str]:
         """Lines for a person."""
@@ -336,10 +335,9 @@ def found_dataset(rows: Sequence[Equilibrium]) -> xr.Dataset:
 
 def state_columns(state: State, over: str, when: str = "", prefix: str = "") -> dict[str, xr.Variable]:
     """A `state` (n, 3) along the laboratory's axes `over` a dimension; `when` ends labels, `prefix` begins names."""
-    found = {
-        f"{prefix}{name}": variable((over, "axis"), values, unit, f"{label}, laboratory frame{when}")
-        for (name, unit, label), values in zip(OF_A_STATE, state.vectors, strict=True)
-    }
+    found, said = {}, f", laboratory frame{when}"
+    for (name, unit, label), values in zip(OF_A_STATE, state.vectors, strict=True):
+        found[f"{prefix}{name}"] = variable((over, "axis"), values, unit, label + said)
     if state.axes is not None:
         label = f"axes of the body as columns, laboratory frame{when}"
         found[f"{prefix}body_axes"] = variable((over, "axis", "body_axis"), state.axes, "1", label)

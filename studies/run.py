@@ -312,9 +312,8 @@ def main_job(
     if failure:
         values["failed"] = str(failure)
         lines += [] if str(failure) in lines else [str(failure)]
-    dataset = _static_dataset(levitation, survey, alone, best).assign_attrs(
-        levitation.labels, body_spin=spin, left_out=left_out_text(survey.left_out)
-    )
+    said = {**levitation.labels, "body_spin": spin, "left_out": left_out_text(survey.left_out)}
+    dataset = _static_dataset(levitation, survey, alone, best).assign_attrs(said)
     if flight:
         simulated = Result(levitation, flight=flight).dataset().assign_attrs(study="run")
         dataset = xr.merge([dataset, simulated], combine_attrs="no_conflicts")
@@ -333,13 +332,10 @@ def _static_dataset(levitation: Levitation, survey: Survey, alone: Mapping[str, 
     lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
     heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
     surveys = {**alone, chosen: survey}
-    equilibria = {
-        model: [
-            *(e for e in surveys[model].equilibria if e.currents is not None),
-            *free_of_bodies(scene, found).equilibria,
-        ]
-        for model, found in alone.items()
-    }
+    equilibria = {}
+    for model, found in alone.items():
+        over_plate = (e for e in surveys[model].equilibria if e.currents is not None)
+        equilibria[model] = [*over_plate, *free_of_bodies(scene, found).equilibria]
     parts = [
         axis_dataset({name: levitation.field(name) for name in MODELS}, heights),
         curve_dataset({name: found.curves for name, found in surveys.items()}),

@@ -91,9 +91,8 @@ class Study:
 
 def study_of_one(compute: Callable[[bool], xr.Dataset], **more: Any) -> Study:
     """A study that is computed as a whole: its only point says whether it is quick; `more` as of a `Study`."""
-    return Study(
-        points=lambda quick: [{"quick": quick}], compute=partial(_whole, compute), gather=itemgetter(0), **more
-    )
+    how: Any = {"compute": partial(_whole, compute), "gather": itemgetter(0), **more}
+    return Study(points=lambda quick: [{"quick": quick}], **how)
 
 
 def _whole(compute: Callable[[bool], xr.Dataset], point: Point) -> xr.Dataset:

@@ -104,9 +104,8 @@ def _place(equilibrium: Equilibrium) -> str:
     distance, error = _distance(equilibrium).lstrip("-"), equilibrium.position_error / MILLI
     angle = f"polar angle {_polar_angle(equilibrium, 1, '°')}"
     offset, mean = equilibrium.lateral_offset / MILLI, math.hypot(*equilibrium.laboratory_position[:2]) / MILLI
-    if offset > abs(equilibrium.position[2]) / MILLI or mean > max(
-        offset / 2, FINEST
-    ):  # beside the rotor, or on one side
+    one_side = mean > max(offset / 2, FINEST)
+    if one_side or offset > abs(equilibrium.position[2]) / MILLI:  # on one side, or beside the rotor
         lateral = bracketed(offset, max(error, FINEST))
         return f"{distance} mm along the axis from the rotor's centre, lateral offset {lateral} mm, {angle}"
     return f"{distance} mm {'below' if equilibrium.position[2] < 0 else 'above'} the rotor's centre, {angle}"

@@ -292,13 +292,9 @@ FORCE_CURVE = Study(
     summary="force along the axis with its parts, stable and tipping points; the article's formulas and full fields",
     quick="all but one of four frequencies; distances 0.5 mm apart instead of 0.1 mm",
     points=lambda quick: [
-        {
-            **ROTOR,
-            "frequencies_hz": FREQUENCIES[1:2] if quick else FREQUENCIES,
-            "spacing": 5e-4 if quick else 1e-4,
-            "model": m,
-        }
-        for m in FORCE_MODELS
+        {**ROTOR, "frequencies_hz": FREQUENCIES[1:2] if quick else FREQUENCIES, "spacing": 5e-4 if quick else 1e-4}
+        | {"model": model}
+        for model in FORCE_MODELS
     ],
     compute=force_curve,
     figures={"force-curve-parts": parts_figure, "force-curve-net": net_figure},

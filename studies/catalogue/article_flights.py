@@ -327,10 +327,8 @@ def _flight_lines(result: xr.Dataset) -> list[str]:
             name = f"{article.rotor_label('horizontal', float(rotor['value']))}, {frequency:g} Hz"
             rows.append((name, *cells, REPORTED.get(float(frequency), "")))
     head = ("rotor", "simulated", "for (s)", "mean distance (mm)", "averaged", "for (s)", "growth (s⁻¹)", "energy")
-    return [
-        *text_table((*head, "article"), rows),
-        "Energy: violation of its balance. Article: what it reports for δx = 1 mm.",
-    ]
+    last = "Energy: violation of its balance. Article: what it reports for δx = 1 mm."
+    return [*text_table((*head, "article"), rows), last]
 
 
 TRAJECTORIES = Study(

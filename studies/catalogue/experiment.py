@@ -230,11 +230,8 @@ def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, Surrogat
         name: xr.concat(map(design_row, points), "rotor", data_vars="all", coords="minimal", compat="override")
         for name, points in _designs(settings, "mutual" in effects).items()
     }
-    found = {
-        kind: fitted(kind, design, settings[f"{kind}_degree"])
-        for (kind, model), design in designs.items()
-        if model == "cuboid"
-    }
+    closed = {kind: design for (kind, model), design in designs.items() if model == "cuboid"}
+    found = {kind: fitted(kind, design, settings[f"{kind}_degree"]) for kind, design in closed.items()}
     before = designs["single", "cuboid"]
     for model in ("fem", "mutual"):
         if ("single", model) in designs:
@@ -250,9 +247,8 @@ def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     rotors = variable((), np.array(len(parts) - len(variants)), "1", "rotors of the designs")
     if not variants:
         return xr.Dataset({"design_rotors": rotors})
-    says = {
-        name: text for part in variants for name, text in zip(part["fact"].values, part["says"].values[0], strict=True)
-    }
+    pairs = [pair for part in variants for pair in zip(part["fact"].values, part["says"].values[0], strict=True)]
+    says = dict(pairs)
     joined = xr.concat([part.drop_vars("says") for part in variants], "variant", data_vars="all", join="outer")
     return joined.assign(
         design_rotors=rotors,

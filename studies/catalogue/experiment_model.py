@@ -123,9 +123,8 @@ class Surrogate:
     def along(self, inputs: Array, part: Array) -> Array:
         """Coefficients (spin power, n, k, fitted) of the polynomials in spin alone: inputs (n, input), parts (k,)."""
         count = self._spread.shape[1]
-        reduced = _products(coordinates(self.name, inputs), self.terms[:, :-2]) @ self._spread.reshape(
-            len(self.terms), -1
-        )
+        spread = self._spread.reshape(len(self.terms), -1)
+        reduced = _products(coordinates(self.name, inputs), self.terms[:, :-2]) @ spread
         along = legvander(_scaled(part, KINDS[self.name][1:]), count - 1)
         found = along @ reduced.reshape(len(inputs), count, -1)
         return np.moveaxis(found.reshape(len(inputs), len(part), -1, len(FITTED)), 2, 0)
@@ -419,6 +418,10 @@ def _falls(models: Models, values: Values, known: Known) -> Array:
     return ends(models, LOW, known[LOW], values)["falls"] * long_enough
 
 
+def _lowest(models: Models, values: Values, known: Known) -> Array:
+    return 1 - ends(models, LOWEST, known[LOWEST], values)["nothing"]
+
+
 def _third(models: Models, values: Values, known: Known) -> Array:
     ratio = 115.0 / 50.0 * np.exp(known[LOWEST]["margin"] - known[LOW]["margin"])
     return np.asarray(np.exp(-0.5 * ((ratio - 3.0) / 0.3) ** 2))
@@ -456,11 +459,7 @@ FACTS = {
     "stays at 140 Hz": Fact("δx = 1 mm stays at 140 Hz for 250 s", (MIDDLE,), ended(MIDDLE, "stays")),
     "oscillates at 150 Hz": Fact("δx = 1 mm is lost in oscillations at 150 Hz", (HIGH,), ended(HIGH, "oscillates")),
     "24 h at 60 Hz": Fact("δz = 14 mm levitated for 24 hours at 60 Hz", (ENDLESS,), ended(ENDLESS, "stays")),
-    "below 50 Hz": Fact(
-        "levitation below 50 Hz (δz = 10 mm)",
-        (LOWEST,),
-        lambda models, values, known: 1 - ends(models, LOWEST, known[LOWEST], values)["nothing"],
-    ),
+    "below 50 Hz": Fact("levitation below 50 Hz (δz = 10 mm)", (LOWEST,), _lowest),
     "a third": Fact(
         "the lowest frequency is lowered by a factor of 3 (δz = 10 mm against δx = 1 mm)", (LOW, LOWEST), _third
     ),
@@ -522,9 +521,7 @@ UNKNOWNS = (
         "left of the launch when the plate is down: 1 to 100 µm",
     ),
     Unknown("spin", "1", "spin at release", NORMAL, 0.02, 0.05, "at release: 0 to 0.05 in settling over the plate"),
-    Unknown(
-        *("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5), "of the stack of 10 mm, displacement and tilt together"
-    ),
+    Unknown("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5, "of the stack of 10 mm, with its displacement"),
     Unknown("tilt_18", "deg", "tilt at 18 mm", NORMAL, 0.0, 2.5, "of that of 18 mm"),
     Unknown("tilt_20", "deg", "tilt at 20 mm", NORMAL, 0.0, 2.5, "of that of 20 mm"),
     Unknown("lean", "deg", "tilt of the shaft", NORMAL, 0.0, 3.0, "of the shaft"),

@@ -76,9 +76,8 @@ def dipole_vs_fem(point: Point) -> xr.Dataset:
     doubt = max(float(part[0]) for part in answers.relative_error(middle.position)) if answers else 0.0
     errors = {name: {key: ROUND_OFF * np.abs(value) for key, value in rows[name].items()} for name in MODELS[:3]}
     errors["fem"] = {key: np.abs(value - rows["coarse"][key]) for key, value in rows["fem"].items()}
-    errors["mutual"] = {
-        key: doubt * np.abs(value - rows["fem"][key]) + errors["fem"][key] for key, value in rows["mutual"].items()
-    }
+    by_mutual = {key: doubt * np.abs(value - rows["fem"][key]) for key, value in rows["mutual"].items()}
+    errors["mutual"] = {key: value + errors["fem"][key] for key, value in by_mutual.items()}
     found: dict[str, Any] = {"frequency": grid}
     for name in QUANTITIES:
         found |= {name: [rows[m][name] for m in MODELS], f"{name}_error": [errors[m][name] for m in MODELS]}
@@ -318,9 +317,8 @@ def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, sta
         return extra.force, extra.torque
 
     both, error = two_body_ladder(rotors, scene.floater, place, moment)
-    (_, coarse), (linear, fine) = (
-        shifted_equilibrium(scene, balance, place, moment, partial(added, rotor)) for rotor in rotors[-2:]
-    )
+    solved = (shifted_equilibrium(scene, balance, place, moment, partial(added, rotor)) for rotor in rotors[-2:])
+    (_, coarse), (linear, fine) = solved
     extra, doubt = both.total - both.rigid, np.abs(fine - coarse) + stable.position_error
     found = (place, extra.force, error.force, extra.torque, linear, fine - place, doubt)
     return xr.Dataset(columns(SHIFTED, found), {"axis": list(AXIS)})

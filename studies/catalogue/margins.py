@@ -55,7 +55,8 @@ PARAMETERS = {
 NORMAL = np.array([known.normal for known in PARAMETERS.values()])
 TILT_SPREAD = 0.5
 TILTS = (0.0, 1.0, 2.0)  # Of the axis from the vertical, degrees
-QUANTITIES = ("lowest", "highest", *(f"distance at {f:.0%}" for f in FRACTIONS))
+ENDS = ("lowest", "highest")
+QUANTITIES = (*ENDS, *(f"distance at {f:.0%}" for f in FRACTIONS))
 SEED = 20250706
 COLUMNS: Columns = {
     "nominal": (("quantity",), "Hz or m", "as it should be"),
@@ -126,9 +127,8 @@ def _written(configuration: str, values: Mapping[str, float], frequency: float) 
     cube = {"edge_mm": 1e3 * values["edge"], "remanence_T": values["rotor_remanence"]}
     measure = _keyed(configuration)["measure"][0].removeprefix("rotor.")
     rotor = {"configuration": configuration, measure: values["measure"], "recoil_permeability": 1.0, **cube}
-    ball = sphere(
-        diameter_mm=1e3 * values["diameter"], remanence_T=values["floater_remanence"], density_kg_m3=values["density"]
-    )
+    size, remanence = 1e3 * values["diameter"], values["floater_remanence"]
+    ball = sphere(diameter_mm=size, remanence_T=remanence, density_kg_m3=values["density"])
     still = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}
     down = [0.0, 0.0, -values["gravity"]]
     return written_scene(frequency_hz=frequency, rotor=rotor, floater=ball, gravity_m_s2=down, drag=still)
@@ -165,17 +165,15 @@ class Slopes:
     def off(self, draw: Array) -> Array:
         """Quantities with parameters off by a `draw`: ends to first order, distances of whole equilibria."""
         base, keys = self.base, _keyed(self.base.configuration)
-        row = np.append(
-            [base.stable.low.parameter, base.stable.high.parameter] + draw @ self.derivatives[:, :2], [np.nan] * 3
-        )
+        ends = [base.stable.low.parameter, base.stable.high.parameter] + draw @ self.derivatives[:, :2]
+        row = np.append(ends, [np.nan] * 3)
         values = {name: base.values[name] + by for name, by in zip(PARAMETERS, draw, strict=True)}
         offsets = {key: unit * float(by) for (key, unit), by in zip(keys.values(), draw, strict=True)}
         for k, (frequency, (_, tangents, implicit, nearby)) in enumerate(zip(base.grid, self.ways, strict=True), 2):
             if row[0] < frequency + offsets["frequency_hz"] < row[1]:
                 scene = scene_of(base.configuration, values, float(frequency) + offsets["frequency_hz"])
-                moved = implicit.moved(
-                    nearby.at(scene, offsets), [(by, tangents[key]) for key, by in offsets.items()], False
-                )
+                steps = [(by, tangents[key]) for key, by in offsets.items()]
+                moved = implicit.moved(nearby.at(scene, offsets), steps, False)
                 row[k] = np.nan if moved is None else moved.distance
         return row
 
@@ -191,9 +189,8 @@ class Slopes:
             fixed = implicit.moved(setting, [(by, tangents[key]) for key, by in less.items()])
             motion = ForcedMotion(scene, setting.rates, setting.values, None)
             forced = None if fixed is None else motion.equilibrium(fixed)
-            found.append(
-                (forced.distance, forced.growth_per_s) if isinstance(forced, Equilibrium) else (np.nan, np.nan)
-            )
+            known = isinstance(forced, Equilibrium)
+            found.append((forced.distance, forced.growth_per_s) if known else (np.nan, np.nan))
         return np.array(found).T
 
 
@@ -300,9 +297,7 @@ SENSITIVITY = Study(
         "sensitivity-distance": partial(_contributions_figure, quantity=MIDDLE, words=f"change (mm){ONE}"),
         "sensitivity-frequency": partial(_contributions_figure, quantity="lowest", words=f"change (Hz){ONE}"),
         "sensitivity-distance-band": partial(_bands_figure, quantities=[MIDDLE], words="distance in mid-range (mm)"),
-        "sensitivity-frequency-band": partial(
-            _bands_figure, quantities=["lowest", "highest"], words="stable frequencies (Hz)"
-        ),
+        "sensitivity-frequency-band": partial(_bands_figure, quantities=ENDS, words="stable frequencies (Hz)"),
     },
     report=_sensitivity_lines,
 )
@@ -332,9 +327,8 @@ NAMES: Columns = {
 def design_points(quick: bool) -> list[Point]:
     """Wanted frequencies for each configuration, with all wanted distances (mm)."""
     wanted = {"distances_mm": [20.0] if quick else [20.0, 25.0, 30.0]}
-    return [
-        {"configuration": c, "frequency": f, **wanted} for f in ([120.0] if quick else [80.0, 120.0]) for c in BEGUN
-    ]
+    frequencies = [120.0] if quick else [80.0, 120.0]
+    return [{"configuration": name, "frequency": f, **wanted} for f in frequencies for name in BEGUN]
 
 
 def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
@@ -349,14 +343,12 @@ def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
     for distance in point["distances_mm"]:  # each from where the last one ended
         row, there = np.full(len(NAMES) - 2, np.nan), {"distance_mm": (distance, distance)}
         try:
-            best, numbers = optimised(
-                search, GOALS["largest margin"], ALWAYS | there | {"frequency_hz": (frequency, frequency)}
-            )
+            wish = ALWAYS | there | {"frequency_hz": (frequency, frequency)}
+            best, numbers = optimised(search, GOALS["largest margin"], wish)
             ends = [end.parameter for end in best.ends]
             row[:6] = 1e-3 * numbers[1], numbers[0], best.values("margin").min(), *ends, best.known.polar_angle_deg
-            written = article.levitation_of(
-                changed(best.levitation.scene, {"rotor.recoil_permeability": article.PERMEABILITY}), "fem", rtol
-            )
+            permeable = changed(best.levitation.scene, {"rotor.recoil_permeability": article.PERMEABILITY})
+            written = article.levitation_of(permeable, "fem", rtol)
             if elements is not None:
                 written.share(elements.near.levitation, changed=True)
             near = best.bare

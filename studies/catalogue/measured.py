@@ -447,9 +447,8 @@ def _measured_lines(result: xr.Dataset) -> list[str]:
     )
     lines.append(f"Of its height {own['missing_mm']:.3f} mm are missing. Changes of one thing move it by:")
     for row in own["sensitivities"]:
-        enough = (
-            f"; {own['missing_mm'] / row['shift_mm']:.3g} of them are enough" if abs(row["shift_mm"]) > 1e-2 else ""
-        )
+        times = own["missing_mm"] / row["shift_mm"] if abs(row["shift_mm"]) > 1e-2 else 0.0
+        enough = f"; {times:.3g} of them are enough" if times else ""
         lines.append(f"  {row['change']:40} {row['shift_mm']:+.3f} mm{enough}")
     return lines
 

@@ -142,11 +142,9 @@ def plate_damping(point: Point) -> xr.Dataset:
             **plate_action(beside.scene, beside.plate, there),
             "error": error,
         }
-    return xr.Dataset(
-        columns(COLUMNS, row, mode=len(MODES), axis=len(AXIS)),
-        {"mode": list(MODES), "axis": list(AXIS)},
-        {"weight_N": alone.scene.floater.mass * 9.81, "plate_rtol": RTOL},
-    ).expand_dims("case")
+    data = columns(COLUMNS, row, mode=len(MODES), axis=len(AXIS))
+    said = {"weight_N": alone.scene.floater.mass * 9.81, "plate_rtol": RTOL}
+    return xr.Dataset(data, {"mode": list(MODES), "axis": list(AXIS)}, said).expand_dims("case")
 
 
 SWEEPS = {
@@ -277,11 +275,8 @@ def sentence(result: xr.Dataset) -> str:
     for sweep, place in zip(ROTORS, ("below the floater", "standing beside it"), strict=True):
         part = part_of(result, sweep)
         worst = part["growth"].max("mode")
-        kept, gone, span = (
-            int(article.stable_in_flight(worst).sum()),
-            int(worst.isnull().sum()),
-            showing.range_text(worst, abs(worst) * part["error"]),
-        )
+        kept, gone = int(article.stable_in_flight(worst).sum()), int(worst.isnull().sum())
+        span = showing.range_text(worst, abs(worst) * part["error"])
         lost = f", {gone} without an equilibrium" if gone else ""
         words.append(f"{place} to {span} s⁻¹ ({kept} of {part.sizes['case']} stable{lost})")
     before = part_of(result, ROTORS[0])["growth_without"].max("mode").values
@@ -399,9 +394,8 @@ def team7_lines(result: xr.Dataset) -> list[str]:
         lines.append(f"  {name:22} largest {float(part.max()):5.2f}, mean {float(part.mean()):5.2f}")
     for k, frequency in enumerate(FREQUENCIES):
         # what stays once all phases are turned by one angle
-        measured, computed = (
-            result[name].values[:, 2 * k] - 1j * result[name].values[:, 2 * k + 1] for name in ("measured", "computed")
-        )
+        cosines, sines = (result[["measured", "computed"]].isel(curve=2 * k + n).to_array().values for n in (0, 1))
+        measured, computed = cosines - 1j * sines
         angle = float(np.angle(np.vdot(computed, measured)))
         left = 100 * (computed * np.exp(1j * angle) - measured) / np.abs(measured).max()
         rest = np.abs([left.real, left.imag])

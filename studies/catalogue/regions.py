@@ -185,13 +185,10 @@ def _map_lines(result: xr.Dataset) -> list[str]:
         ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
         stable = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
         pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
-        plate = [
-            f"{f:.0f} Hz {f'{g:+.2g}' if np.isfinite(g) else 'no equilibrium'}" for f, g in pairs if np.isfinite(f)
-        ]
+        told = [(f, f"{g:+.2g}" if np.isfinite(g) else "no equilibrium") for f, g in pairs if np.isfinite(f)]
+        plate = [f"{f:.0f} Hz {growth}" for f, growth in told]
         known = zip(*(one[name].values for name in ("metal", *LASTING)), strict=True) if "high" in one else ()
-        lasting = [
-            f"{low:.1f} to {high:.1f} Hz ({metal} rotor; then {end})" for metal, low, high, _, end in known if end
-        ]
+        lasting = [f"{low:.1f} to {high:.1f} Hz ({of} rotor; then {end})" for of, low, high, _, end in known if end]
         cells = (" and ".join(stable) or "never", ", ".join(plate), " and ".join(lasting))
         rows.append((f"{label}, {one['model'].item()}", *cells))
     head = ("rotor, model", "stable", "growth with the plate (s⁻¹)", f"trajectories last {article.FLIGHT:g} s")
@@ -293,9 +290,8 @@ def limit_figure(result: xr.Dataset) -> Figure:
         for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
             frequency, time = one["rotor_frequency"], one["levitated"]
             panel.semilogy(frequency, time, style, ms=3, color=color, label=one["variant"].item())
-        panel.axhline(
-            article.FLIGHT, color="0.6", lw=0.8, zorder=0, label=f"longest of the experiment, {article.FLIGHT:g} s"
-        )
+        longest = f"longest of the experiment, {article.FLIGHT:g} s"
+        panel.axhline(article.FLIGHT, color="0.6", lw=0.8, zorder=0, label=longest)
         panel.axhline(LONGEST, color="0.6", lw=0.8, ls=":", zorder=0, label=f"followed no longer, {LONGEST:g} s")
     return figure
 

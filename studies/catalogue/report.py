@@ -88,11 +88,8 @@ def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
         page = gzip.compress(turnable_page(PLACE))
         viewer = {name: base64.b64encode(what).decode() for name, what in (("viewer", page), ("place", PLACE))}
     template = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
-    text = (
-        jinja2.Environment(autoescape=True)
-        .from_string(template)
-        .render(folder=folder.resolve().name, parts=parts, **viewer)
-    )
+    whole = jinja2.Environment(autoescape=True).from_string(template)
+    text = whole.render(folder=folder.resolve().name, parts=parts, **viewer)
     write_whole(out / "report.html", text.encode())
     return out / "report.html", [part["name"] for part in parts]
 

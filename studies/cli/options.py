@@ -125,11 +125,8 @@ def read_points(path: Path) -> Array:
                 f"{path}: Input header must have the columns {', '.join(COLUMNS)}; instead received {received}."
             )
         where = [header.index(column) for column in COLUMNS]
-        found = [
-            [_number(path, line, row, i) for i in where]
-            for line, row in enumerate(rows, start=2)
-            if any(cell.strip() for cell in row)
-        ]
+        filled = (each for each in enumerate(rows, start=2) if any(cell.strip() for cell in each[1]))
+        found = [[_number(path, line, row, column) for column in where] for line, row in filled]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: Input points must be a readable CSV text; instead: {error}.") from None
     if not found:
@@ -383,9 +380,8 @@ def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") ->
         raise InputError(f"Input {name} must have at least one key; instead received none.")
     found = {}
     for key, given in values.items():
-        listed = (
-            list(given) if isinstance(given, Iterable) and not isinstance(given, str | bytes | Mapping) else [given]
-        )
+        several = isinstance(given, Iterable) and not isinstance(given, str | bytes | Mapping)
+        listed = list(given) if several else [given]
         fine = all(isinstance(v, str) if key in NAMES else is_number(v) for v in listed)
         if not listed or not fine:
             what = "names" if key in NAMES else "finite numbers"

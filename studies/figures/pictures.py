@@ -93,9 +93,8 @@ def plate_currents(scene: Scene, plate: Plate, table: RotorTable, floater: State
     angles = 2 * np.pi * np.arange(ANGLES) / ANGLES
     parts = rotor_parts(table, plate)
     sources: list[Source] = [*unit_dipoles(place), *(posed_rotor(parts, plate, angle, 0.0) for angle in angles)]
-    amplitudes = np.concatenate(
-        [scene.floater.moment * (plate.box.rotation.T @ turning), 2 / ANGLES * np.exp(-1j * angles)]
-    )
+    own, rotor = scene.floater.moment * (plate.box.rotation.T @ turning), 2 / ANGLES * np.exp(-1j * angles)
+    amplitudes = np.concatenate([own, rotor])
     mesh = plate_mesh(plate.body, plate.metal, place, scene.frequency, MeshRule())
     response = solve_eddy(mesh, ORDER, scene.frequency, sources)
     body = plate.box.to_body(points)

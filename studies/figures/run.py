@@ -302,9 +302,8 @@ def question_figure(result: xr.Dataset) -> Figure:
             _map(panel, shown, name, [*others, along])
         for values, color in zip(members if len(members) <= FAMILY else (), PALETTE, strict=False):
             chosen = dict(zip(others, values, strict=True))
-            label = ", ".join(
-                NAMES[v] if isinstance(v, str) else _label(shown[k], f" = {v:g}") for k, v in chosen.items()
-            ) or NAMES.get(str(result.attrs.get("model", "")), "")
+            each = (NAMES[v] if isinstance(v, str) else _label(shown[k], f" = {v:g}") for k, v in chosen.items())
+            label = ", ".join(each) or NAMES.get(str(result.attrs.get("model", "")), "")
             color = COLORS[chosen["model"]] if others == ["model"] else color
             _curve(panel, shown.sel(chosen), name, along, color, label)
             if name == "depth" and "dipole_distance" in shown and shown[along].dtype.kind in "iuf":
@@ -396,9 +395,8 @@ def _map(axes: Axes, result: xr.Dataset, name: str, keys: list[str]) -> None:
     if "equilibrium" in values.dims:  # the first is stable wherever any is
         values = values.where(result["stable"] == 1).isel(equilibrium=0).assign_attrs(values.attrs)
         titled(axes, "stable equilibrium")
-    drawn = axes.pcolormesh(
-        result[keys[1]].values, result[keys[0]].values, values.transpose(*keys).values, shading="nearest"
-    )
+    x, y = (result[key].values for key in keys[::-1])
+    drawn = axes.pcolormesh(x, y, values.transpose(*keys).values, shading="nearest")
     axes.set(xlabel=_label(result[keys[1]]), ylabel=_label(result[keys[0]]))
     if axes.figure is not None:
         axes.figure.colorbar(drawn, ax=axes, label=_label(values))
@@ -479,9 +477,8 @@ def drive_figure(result: xr.Dataset) -> Figure:
     known = np.array([*equilibria[there], np.quantile(low, 1 - MOST), np.quantile(high, MOST)])
     room = MARGIN * max(float(np.ptp(known)), 1.0)
     if str(result.attrs["ended_by"]) in ("contact", "lost"):
-        along.axvline(
-            frequency[-1], color=PALETTE[3], ls=":", label=f"{result.attrs['ended_by']}, {frequency[-1]:.4g} Hz"
-        )
+        label = f"{result.attrs['ended_by']}, {frequency[-1]:.4g} Hz"
+        along.axvline(frequency[-1], color=PALETTE[3], ls=":", label=label)
     span = max(float(np.ptp(frequency)), 1.0)
     along.set(xlabel="frequency of the rotor (Hz)", ylabel=DISTANCE, ylim=(known.min() - room, known.max() + room))
     along.set_xlim(frequency.min() - 0.1 * span, frequency.max() + 0.1 * span)

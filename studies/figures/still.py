@@ -105,11 +105,8 @@ def turnable_scene(view: View) -> bytes:
     context, window = serializers.SynchronizationContext(), plotter.render_window
     camera = plotter.renderer.GetActiveCamera()
     state = serializers.serialize(None, window, serializers.reference_id(window), context, 1)
-    state["extra"] = {
-        "vtkRefId": serializers.reference_id(window),
-        "centerOfRotation": camera.GetFocalPoint(),
-        "camera": serializers.reference_id(camera),
-    }
+    own, its = serializers.reference_id(window), serializers.reference_id(camera)
+    state["extra"] = {"vtkRefId": own, "centerOfRotation": camera.GetFocalPoint(), "camera": its}
     arrays = {
         entry["hash"]: {**entry, "content": context.get_cached_data_array(entry["hash"], False)}
         for entry in serializers.extract_array_hash(state)

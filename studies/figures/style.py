@@ -153,10 +153,9 @@ def plain_log(axis: Any, ticks: Sequence[float] = ()) -> None:
     from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 
     axis.axes.set(**{f"{axis.axis_name}scale": "log"})
-    locator = (
-        FixedLocator(ticks) if ticks else LogLocator(subs=(1.0, 3.0) if axis.axis_name == "x" else (1.0, 2.0, 5.0))
-    )
-    axis.set(major_locator=locator, major_formatter="{x:g}", minor_locator=NullLocator())
+    locator = LogLocator(subs=(1.0, 3.0) if axis.axis_name == "x" else (1.0, 2.0, 5.0))
+    axis.set(major_locator=FixedLocator(ticks) if ticks else locator, minor_locator=NullLocator())
+    axis.set_major_formatter("{x:g}")
 
 
 def legend_below(figure: Figure, *labelled: Any) -> None:

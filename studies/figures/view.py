@@ -37,9 +37,8 @@ class FieldPlane:
     @staticmethod
     def points(width: float, depth: float) -> Array:
         """The points of the grid, (n, 3) mm."""
-        z, x = np.meshgrid(
-            np.linspace(-1.6 * depth, 0.8 * depth, FINE), np.linspace(-width, width, FINE), indexing="ij"
-        )
+        heights, along = np.linspace(-1.6 * depth, 0.8 * depth, FINE), np.linspace(-width, width, FINE)
+        z, x = np.meshgrid(heights, along, indexing="ij")
         return np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
 
 

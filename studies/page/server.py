@@ -161,9 +161,8 @@ class _Gate(Application):
     """Pages for those with the token, the programs for those who call this machine by its name, and no more."""
 
     def __init__(self, begin: PageState, token: str, host: str, ancestors: str) -> None:
-        super().__init__(
-            [("/ws", _Line), ("/.*", _Program)], websocket_max_message_size=MESSAGE, websocket_ping_interval=GONE
-        )
+        limits: dict[str, Any] = {"websocket_max_message_size": MESSAGE, "websocket_ping_interval": GONE}
+        super().__init__([("/ws", _Line), ("/.*", _Program)], **limits)
         self.begin, self.ancestors = begin, ancestors
         self.opened: set[Page] = set()
         self.preview: Shown | None = None  # of `begin`: a page shows something as soon as it opens

@@ -166,9 +166,7 @@ def controls(state: PageState) -> list[Control]:
         low = max(low, 1e3 * float(scene.rotor[0].body.size[2])) if kind == "vertical" else low  # they touch
         rows.append((f"rotor.{key}", title, rotor[key], low, high, 0.05))
         rows += [(f"rotor.{k}", f"Rotor's {of}", rotor[k], 3.0, 20.0, 0.05) for k, of in SIZES.items() if k in rotor]
-    rows += [
-        (f"floater.{k}", f"Floater's {of}", floater[k], 3.0, 30.0, 0.05) for k, of in SIZES.items() if k in floater
-    ]
+    rows += [(f"floater.{k}", f"Floater's {v}", floater[k], 3.0, 30.0, 0.05) for k, v in SIZES.items() if k in floater]
     for k, size in enumerate(floater.get("size_mm", ())):
         rows.append((f"floater.size_mm.{k}", f"Floater's edge along its {'xyz'[k]} (mm)", size, 3.0, 30.0, 0.05))
     rows.append(("spin", "Body spin S", state.spin, -2.0, 2.0, 0.01))

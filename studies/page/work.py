@@ -167,15 +167,13 @@ def complete(state: PageState) -> Shown:
                 other.survey  # noqa: B018
                 known[model] = other
     found = _shown(state, known)
-    if (rough := known.get("dipole")) and (
-        fine := next((one for name, one in known.items() if name != "dipole"), None)
-    ):
+    rough, fine = known.get("dipole"), next((one for name, one in known.items() if name != "dipole"), None)
+    if rough and fine:
         true = rough.elsewhere(rotor=of_true_moment(state.scene.rotor, sources(fine.table)))
         true.plate = selected.plate
         distances = compared_models(rough.survey, true.survey, fine.survey, fine.table.model)
-        found = replace(
-            found, comparison=comparison_words(distances, state.scene.plate is not None and not selected.plate)
-        )
+        alone = state.scene.plate is not None and not selected.plate
+        found = replace(found, comparison=comparison_words(distances, alone))
     drawn = drawn_field(state.scene, selected.table)
     lines = field_lines(state.scene, lambda points: np.nan_to_num(drawn(points)), *SIGHT)
     return replace(found, lines=[line[::2] for line in lines])
@@ -185,6 +183,7 @@ def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
     first = known.get(state.model) or next(iter(known.values()))
     found, left_out = first.equilibria, first.survey.left_out
     useful = worth_a_row(found)
+    leading = useful[0].modes if useful else ()
     answers = []
     for model in compared(state):
         if one := known.get(model):
@@ -192,31 +191,19 @@ def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
             # Not its first: that may be another branch, and the difference would be no error of a model.
             e = nearest_of(near, useful[0].position) if useful else next(iter(near), None)
             name = MODEL_WORDS[one.table.model]  # of the table, as "auto" and rotors without permeability choose it
-            answers.append(
-                ModelAnswer(
-                    name,
-                    True,
-                    *(_pose(e), -1e3 * e.position[2], e.polar_angle_deg, STABILITIES[e.stability]) if e else (),
-                )
-            )
+            there = (_pose(e), -1e3 * e.position[2], e.polar_angle_deg, STABILITIES[e.stability]) if e else ()
+            answers.append(ModelAnswer(name, True, *there))
         elif not any(MODEL_WORDS.get(model) == answer.name for answer in answers):
             answers.append(ModelAnswer(MODEL_WORDS.get(model, "model chosen by accuracy"), False))
     felt = first.plate.model if first.plate is not None else "none"
     conditions = [PLATE_WORDS[felt]] if state.scene.plate is not None else []
     if any(one.interaction_model == "mutual" for one in known.values()):
         conditions.append("finite elements with mutual magnetisation of rotor and floater")
-    modes = (
-        [(MODE_NAMES.get(m.name, m.name), f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in useful[0].modes]
-        if useful
-        else []
-    )
+    modes = [(MODE_NAMES.get(m.name, m.name), f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in leading]
     z, x = np.meshgrid(*(np.arange(low, high + PIXEL / 2, PIXEL) for low, high in SLICE[::-1]), indexing="ij")
     with np.errstate(divide="ignore"):
-        size = np.log10(
-            np.linalg.norm(
-                drawn_field(state.scene, first.table)(1e-3 * np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)), axis=1
-            )
-        )
+        places = 1e-3 * np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
+        size = np.log10(np.linalg.norm(drawn_field(state.scene, first.table)(places), axis=1))
     # A byte a pixel: a slice is sent with every step of a slider.
     levels = np.clip(np.nan_to_num((size - WEAKEST) / -WEAKEST * 254, neginf=0.0), 0, 254)
     levels = np.where(np.isnan(size), 255, levels)
@@ -334,9 +321,8 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
     first = np.array([which[one] for one, _ in pairs])
     position, moment = found.position[first] / family.scene.floater.radius, found.moment[first]
     axes = found.frequencies, found.measures
-    begin, end = (
-        np.array([[axis[k] for axis, k in zip(axes, pair[side], strict=True)] for pair in pairs]) for side in (0, 1)
-    )
+    places = np.array([[[axis[k] for axis, k in zip(axes, node, strict=True)] for node in pair] for pair in pairs])
+    begin, end = places[:, 0], places[:, 1]
     low, high, spin = np.zeros(len(pairs)), np.ones(len(pairs)), spin * family.scene.floater.spin_ratio
     # All pairs are halved together: a call of compiled code costs more than the pairs in it.
     for _ in range(HALVINGS):
