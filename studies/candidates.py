@@ -77,7 +77,6 @@ class Candidate:
 
     @cached_property
     def ways(self) -> Mapping[str, Any]:
-        """Its way by each key."""
         ways = self.gradient.ways(self.known, self.keys)[0]
         if len(ways) < len(self.keys):
             raise ComputationError(f"Derivatives are not known: {'; '.join(self.gradient.reasons.values())}.")
@@ -240,7 +239,6 @@ class Search:
 
     @property
     def looked_at(self) -> int:
-        """How many scenes were looked at."""
         return len(self._known)
 
     def go_on_from(self, candidate: Candidate, numbers: Array) -> None:

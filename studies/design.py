@@ -69,14 +69,6 @@ SIMPLE, ROUGH = (("dipole", "none"), ("cuboid", "none")), 0.1
 Limits = Mapping[str, tuple[float, float]]
 
 
-def checked_measures(values: object, name: str, known: Mapping[str, Any], what: str) -> Mapping[str, Any]:
-    """Values by name, or InputError unless each name is `known`."""
-    if not isinstance(values, Mapping):
-        raise InputError(f"Input {name} must be ranges by {what}; instead received {shown(values)}.")
-    check_names(values, known, name, what)
-    return values
-
-
 def _range(name: str, value: object) -> tuple[float, float]:
     """A number as a range of itself, or two numbers in order, of which None and infinity leave an end open."""
     ends = list(value) if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else [value] * 2
@@ -336,10 +328,14 @@ def checked_goals(
     wanted = [goals] if isinstance(goals, str) else list(goals) if isinstance(goals, Sequence) else []
     if not 1 <= len(wanted) <= 2 or len(set(map(str, wanted))) < len(wanted):
         raise InputError(f"Input goals must be one or two of {', '.join(GOALS)}; instead received {shown(goals)}.")
-    checked_measures(dict.fromkeys(wanted), "goals", GOALS, "goals")
+    check_names(wanted, GOALS, "goals", "goals")
     if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= 100:
         raise InputError(f"Input points must be a number from 2 to 100; instead received {shown(points)}.")
-    given = checked_measures({} if limits is None else limits, "limits", MEASURES, "what a scene can be asked for")
+    given = {} if limits is None else limits
+    if not isinstance(given, Mapping):
+        said = "what a scene can be asked for"
+        raise InputError(f"Input limits must be ranges by {said}; instead received {shown(limits)}.")
+    check_names(given, MEASURES, "limits", "what a scene can be asked for")
     ends = {name: _range(f"limits.{name}", value) for name, value in given.items()}
     return [str(one) for one in wanted], checked_free(free), ALWAYS | ends
 
@@ -531,8 +527,7 @@ TABLE = ("scene", "goals", "free", "limits", "points")
 def read_goals(path: Path) -> tuple[Scene, tuple[Any, ...]]:
     """Scene and goals, bounds, limits and points of a file of goals. Raises InputError."""
     table = toml_tables(path, "goals")
-    for key in table:
-        checked_measures({key: 0}, "goals", dict.fromkeys(TABLE), f"keys of {path}")
+    check_names(table, TABLE, "goals", f"keys of {path}")
     if not isinstance(table.get("scene"), str):
         raise InputError(
             f"Input scene must be the path of a scene file, in {path}; instead received {shown(table.get('scene'))}."

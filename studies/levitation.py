@@ -142,7 +142,6 @@ class Levitation:
 
     @property
     def labels(self) -> dict[str, str]:
-        """Names of the models, for a result."""
         plate = self.plate.model if self.plate else "none"
         return {"model": self.table.model, "plate_model": plate, "interaction": self.interaction_model}
 
@@ -298,14 +297,12 @@ class Levitation:
 
         None where it does not begin at an equilibrium, or gravity is not along the axis.
         """
-        if self.absolute or self.scene.gravity[:2].any() or self.scene.other_coils:
+        moved = self.absolute or self.scene.gravity[:2].any() or self.scene.other_coils
+        chosen = None if moved else _first(self.without_plate.equilibria)
+        if chosen is None or chosen.kind == LOCKED:  # no branch of these is followed
             return ()
-        if (chosen := _first(self.without_plate.equilibria)) is None:
-            return ()
-        mean = self.mean
-        if chosen.kind == LOCKED:
-            return ()  # no branch of these is followed
-        start, scene = Scales.of(mean.still).pack(chosen.start), mean.still
+        mean, scene = self.mean, self.mean.still
+        start = Scales.of(scene).pack(chosen.start)
         try:
             return tuple(branch_through(scene, mean.rates, start, scene.frequency, self.spin))
         except EquilibriumError as error:
@@ -402,7 +399,6 @@ class Levitation:
 
     @property
     def absolute(self) -> bool:
-        """Whether a trajectory begins where the scene says, and needs no equilibrium."""
         return isinstance(self.scene.start, AbsoluteStart)
 
     def _place(self, known: Sequence[Equilibrium]) -> Array | None:
@@ -426,10 +422,8 @@ class Levitation:
     def flight_table(self) -> RotorField:
         """The rotor's field for the motion: beside a plate, whose own table reaches no farther, with fewer terms."""
         table = self.table
-        if self.wider or self.plate is None or not isinstance(table, RotorTable):
-            return table
-        place, scene = self._flight_place, self.scene
-        if place is None:
+        scene, place = self.scene, None if self.wider or self.plate is None else self._flight_place
+        if place is None or not isinstance(table, RotorTable):
             return table
         return rotor_nearby(table, scene.rotor, tuple(place.tolist()), scene.floater.radius, self.models.rtol)
 
@@ -471,11 +465,9 @@ class Levitation:
             with progress("Motion") as bar:
                 how: dict[str, Any] = {"progress": bar, "memory": plate, "checkpoint": checkpoint}
                 simulated = simulate(self.scene, table, duration, known, **how)
-            if simulated.left_plate_table:
-                again = self._followed(simulated.lab.position[-1], simulated.levitated_s)
-            else:
-                again = self._plate_matters(simulated)
-            if not again:
+            left = simulated.left_plate_table
+            beyond = left and self._followed(simulated.lab.position[-1], simulated.levitated_s)
+            if not beyond and (left or not self._plate_matters(simulated)):
                 break
             if checkpoint:
                 checkpoint.remove()
@@ -498,8 +490,7 @@ class Levitation:
         """Make a table for a floater that left the last one at a place (3,) m and time, s; False where none can be."""
         memory = self.flight_plate
         assert memory is not None
-        up = np.array([0.0, 0.0, 1.0])
-        body = memory.plate.box.to_body(place + plate_depth(memory.plate, np.array([time])) * up)
+        body = memory.plate.box.to_body(place + plate_depth(memory.plate, np.array([time])) * np.eye(3)[2])
         try:
             region = wider_region(memory.plate, memory.table.region, self.scene.floater.radius, body)
             where = "leaves the range of the plate's table: again from the start, with a larger one."

@@ -8,6 +8,7 @@ from typing import Any
 
 import magpylib
 import numpy as np
+from magpylib import magnet as kinds
 from scipy.spatial.transform import Rotation
 
 from ..fem.cache import cache_folder
@@ -21,14 +22,7 @@ from ..geometry.shapes import Box, Cylinder, Sphere
 from ..geometry.solids import Part, Solid, known_shape
 from ..geometry.step_file import part_of
 
-KINDS = (
-    magpylib.magnet.Cuboid,
-    magpylib.magnet.Cylinder,
-    magpylib.magnet.CylinderSegment,
-    magpylib.magnet.Sphere,
-    magpylib.magnet.Tetrahedron,
-    magpylib.magnet.TriangularMesh,
-)
+KINDS = (kinds.Cuboid, kinds.Cylinder, kinds.CylinderSegment, kinds.Sphere, kinds.Tetrahedron, kinds.TriangularMesh)
 SIZES = ("diameter", "dimension", "vertices")
 MOST_TESLA = 10.0  # four times what iron saturates at; in millitesla every magnet has more
 MOST_TRIANGLES = 2000
@@ -160,17 +154,17 @@ def _magnet(source: Any) -> _Magnet:
 
 def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Any:
     """The body of a source in its place, or the solid of one that a scene file has no keys for."""
-    if isinstance(source, magpylib.magnet.Sphere):
+    if isinstance(source, kinds.Sphere):
         return Sphere(float(size) / 2, *pose)
-    if isinstance(source, magpylib.magnet.Cuboid):
+    if isinstance(source, kinds.Cuboid):
         return Box(size, *pose)
-    if isinstance(source, magpylib.magnet.Cylinder):
+    if isinstance(source, kinds.Cylinder):
         return Cylinder(float(size[0]) / 2, float(size[1]), *pose)
-    if isinstance(source, magpylib.magnet.CylinderSegment):
+    if isinstance(source, kinds.CylinderSegment):
         inner, outer, height, start, end = map(float, size)
         whole = abs(end - start - 360) < SAME_ANGLE
         return Cylinder(outer, height, *pose, inner) if whole else segment(inner, outer, height, start, end)
-    if isinstance(source, magpylib.magnet.Tetrahedron):
+    if isinstance(source, kinds.Tetrahedron):
         return faceted(size[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]])
     for fault in ("open", "disconnected", "selfintersecting"):
         if getattr(source, f"status_{fault}"):
@@ -198,7 +192,7 @@ def _joined(found: Sequence[_Magnet]) -> list[_Magnet]:
         others = [
             other
             for other in left
-            if all(isinstance(m.source, magpylib.magnet.CylinderSegment) and not m.body for m in (first, other))
+            if all(isinstance(m.source, kinds.CylinderSegment) and not m.body for m in (first, other))
             and float(np.linalg.norm(first.center - other.center)) < SAME * float(first.source.dimension[1])
             and float(first.rotation[:, 2] @ other.rotation[:, 2]) > 1 - SAME
             and _alike(first.in_rotor, other.in_rotor)
@@ -264,10 +258,10 @@ def _source(body: Solid, pose: dict[str, Any]) -> Any:
     if isinstance(body, Part):
         raise InputError("Input table must have no part from a file among its closed forms; instead it has one.")
     if isinstance(body, Sphere):
-        return magpylib.magnet.Sphere(diameter=2 * body.radius, **pose)
+        return kinds.Sphere(diameter=2 * body.radius, **pose)
     if isinstance(body, Cylinder):
         if body.inner_radius:
             ring = (body.inner_radius, body.radius, body.height, 0, 360)
-            return magpylib.magnet.CylinderSegment(dimension=ring, **pose)
-        return magpylib.magnet.Cylinder(dimension=(2 * body.radius, body.height), **pose)
-    return magpylib.magnet.Cuboid(dimension=body.size, **pose)
+            return kinds.CylinderSegment(dimension=ring, **pose)
+        return kinds.Cylinder(dimension=(2 * body.radius, body.height), **pose)
+    return kinds.Cuboid(dimension=body.size, **pose)

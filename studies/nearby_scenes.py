@@ -6,9 +6,9 @@ others, which no such law gives, are made anew beside it, with as many points.
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -73,6 +73,8 @@ class NearbyScenes:
     scene: Scene
     averaged: bool  # the motion of the floater's mean over turns about its moment
     with_plate: bool
+    _shares: dict[str, Array] = field(default_factory=dict, init=False)
+    _ends: dict[tuple[str, str], tuple[Any, Any, float]] = field(default_factory=dict, init=False)
 
     def step(self, key: str, value: float) -> float:
         """Of the differences by a key's number."""
@@ -131,15 +133,12 @@ class NearbyScenes:
         plate = self._plate(scene, offsets) if self.with_plate else None
         return self._setting(scene, with_effects(scene, effects), plate)
 
-    @cached_property
-    def _strength(self) -> float:
-        return float(np.linalg.norm(self.scene.rotor[0].polarization)) or 1.0
+    def _strong(self, scene: Scene) -> float:
+        before, after = (float(np.linalg.norm(one.rotor[0].polarization)) for one in (self.scene, scene))
+        return after / (before or 1.0)
 
     def _mutual(self, table: MutualTable, scene: Scene, offsets: Mapping[str, float]) -> Any:
-        lone, strong = magnified(self.scene.rotor, scene.rotor), 1.0
-        found: Any = moved_mutual(table, scene.rotor)
-        if "rotor.remanence_T" in offsets:
-            strong = float(np.linalg.norm(scene.rotor[0].polarization)) / self._strength
+        lone, found = magnified(self.scene.rotor, scene.rotor), cast(Any, moved_mutual(table, scene.rotor))
         for key, offset in offsets.items():
             moves = key.startswith("rotor.") and lone and lone[0] == 1.0
             if moves or key.endswith("remanence_T") or not key.startswith(("rotor.", "floater.")):
@@ -150,6 +149,7 @@ class NearbyScenes:
                 "mutual", key, table, lambda there: mutual_table_beside(table, there.rotor, there.floater.ball, note)
             )
             found = _Line(found, *ends[:2], offset / ends[2])
+        strong = self._strong(scene) if "rotor.remanence_T" in offsets else 1.0
         return found if strong == 1.0 else StrongerMutual(found, strong)
 
     def _losses(self, losses: RotorLosses, scene: Scene, offsets: Mapping[str, float]) -> Any:
@@ -178,8 +178,8 @@ class NearbyScenes:
             rates = memory.table.rates * (memory.plate.conductivity / scene.plate.conductivity)
             memory = replace(memory, table=replace(memory.table, rates=rates))
         if "rotor.remanence_T" in offsets:
-            strong = float(np.linalg.norm(scene.rotor[0].polarization)) / self._strength
-            memory = replace(memory, share=replace(memory.share, series=strong * memory.share.series))
+            series = self._strong(scene) * memory.share.series
+            memory = replace(memory, share=replace(memory.share, series=series))
         if any(key.startswith(("plate.center_mm", "plate.rotation_deg")) for key in offsets):
             memory = replace(memory, plate=replace(memory.plate, body=scene.plate.body))
         moves = {key: offset for key, offset in offsets.items() if _moves_rotor(key)}
@@ -188,10 +188,6 @@ class NearbyScenes:
             series = series + sum(offset * self._shares[key] for key, offset in moves.items())
             memory = replace(memory, share=replace(memory.share, distance=0.0, series=series[:, :, None]))
         return memory
-
-    @cached_property
-    def _shares(self) -> dict[str, Array]:
-        return {}
 
     def prepare(self, keys: Sequence[str]) -> None:
         """Differentiate the rotor's share of the plate's signals by keys that move both against each other."""
@@ -224,10 +220,6 @@ class NearbyScenes:
             except SceneError:  # it has an end here
                 self._ends[name, key] = base, make(changed(self.scene, {key: value + wide})), wide
         return self._ends[name, key]
-
-    @cached_property
-    def _ends(self) -> dict[tuple[str, str], tuple[Any, Any, float]]:
-        return {}
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,6 @@ class NoProcessError(ComputationError):
 
 
 def program() -> str:
-    """Digest of this version of the program."""
     return program_digest()
 
 

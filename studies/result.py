@@ -165,7 +165,6 @@ class Result:
         return listed_effects(self.levitation, found)
 
     def text(self) -> list[str]:
-        """Lines for a person."""
         levitation, lines = self.levitation, [self.failed] if self.failed else []
         if self.survey is not None and not self.failed:
             lines += words.equilibria_words(levitation, self.survey)

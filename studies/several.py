@@ -93,7 +93,6 @@ def outcome(found: Together) -> str:
 
 
 def several_summary(found: Together, levitation: Levitation) -> dict[str, Any]:
-    """For JSON."""
     flight, table = found.trajectories[0], levitation.table
     places = np.concatenate([one.rotor.position[:: max(1, len(one.time) // 500)] for one in found.trajectories])
     return {

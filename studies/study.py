@@ -54,12 +54,10 @@ def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
 
 
 def case_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
-    """The first case with the given labels."""
     return cases_with(result, **labels).isel(case=0)
 
 
 def each_case(result: xr.Dataset) -> list[xr.Dataset]:
-    """The cases of a joined result one by one."""
     return [result.isel(case=k) for k in range(result.sizes["case"])]
 
 

@@ -105,7 +105,6 @@ class Journal:
         self._sweep = hashlib.sha256(to_json(requested).encode()).hexdigest()[:16]
 
     def files(self) -> list[Path]:
-        """Those of this sweep."""
         return sorted(self.folder.glob(f"*-{self._sweep}.json"))
 
     def finished(self) -> dict[int, xr.Dataset]:

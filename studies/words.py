@@ -215,7 +215,6 @@ def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:
 
 
 def flight_words(levitation: Levitation, flight: Trajectory) -> str:
-    """Outcome of a trajectory, in one sentence."""
     kind, time = kind_of_flight(levitation, flight), f"{flight.levitated_s:.4g} s"
     if flight.levitated_s >= 7200:
         time += f" ({flight.levitated_s / 3600:.4g} h)"

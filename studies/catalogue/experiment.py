@@ -176,7 +176,6 @@ SEED = 42
 
 
 def experiment_points(quick: bool) -> list[Point]:
-    """The rotors of all designs, then the variants; `quick` has closed forms, four facts and two variants."""
     import dynesty  # noqa: F401  # where it is missing, that is said before anything is computed
 
     rotors = [point for design in _designs(SETTINGS[quick], True).values() for point in design]

@@ -317,7 +317,6 @@ class Models:
         return inputs, frequency * known["frequency"], values["spin"], strengths, np.full(len(inputs), longest)
 
     def error(self, kind: str, quantity: str) -> float:
-        """What a surrogate misses, see `Surrogate`."""
         return float(self.surrogates[kind].errors[PLACE[quantity]])
 
 

@@ -55,7 +55,6 @@ class PlateCase:
     complete: bool = False
 
     def plate(self, place: Array) -> Plate:
-        """The plate for a floater at `place` (3,) m."""
         size, away = np.array([*article.PLATE_SIZE[:2], self.thickness]), self.distance + self.thickness / 2
         if self.upright:
             center = np.array([away, 0.0, place[2]])

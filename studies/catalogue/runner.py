@@ -73,7 +73,6 @@ def read_result(path: Path) -> xr.Dataset:
 
 
 def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
-    """The figures of a result by name."""
     kind = str(result.attrs["study"])
     if kind in CATALOGUE:
         return {name: draw(result) for name, draw in CATALOGUE[kind].figures.items()}
@@ -156,7 +155,6 @@ def failed_points(result: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def failure_lines(result: xr.Dataset) -> list[str]:
-    """Which points failed, and why."""
     return [f"No value at {json.dumps(f['point'], ensure_ascii=False)}: {f['reason']}" for f in failed_points(result)]
 
 

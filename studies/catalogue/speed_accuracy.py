@@ -165,7 +165,6 @@ ERRORS: Columns = {
 
 
 def cube(problem: str) -> tuple[Magnet, ...]:
-    """The article's cube at the origin."""
     return horizontal(0.0, EDGE, REMANENCE, PERMEABILITIES[problem])
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from ...geometry.common import Array, InputError, no_argument, shown
-from ...geometry.files import file_content
+from ...geometry.files import file_content, write_whole
 from ..figures.style import FigureWidth
 from .console import ERRORS, printing
 
@@ -452,7 +452,5 @@ def new_scene(name: str, path: Path) -> Path:
         raise InputError(f"Input NAME must be one of {', '.join(KINDS)}; instead received {name}.")
     if path.exists():
         raise InputError(f"Input FILE must not exist yet; instead {path} is there. Choose another name.")
-    from ...geometry.files import write_whole
-
     write_whole(path, shipped_scene(KINDS[name]).read_bytes())
     return path

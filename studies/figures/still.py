@@ -58,7 +58,6 @@ def scene_picture(view: View) -> bytes:
 
 
 def sample_picture() -> bytes:
-    """A PNG of a sphere."""
     plotter = new_plotter((64, 64))
     plotter.add_mesh(pv.Sphere())
     return _png(plotter)
@@ -119,7 +118,6 @@ def turnable_scene(view: View) -> bytes:
 
 
 def new_plotter(size: tuple[int, int] = (1400, 1100)) -> pv.Plotter:
-    """An empty picture without a window."""
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # that there is no screen is no news here
     plotter = pv.Plotter(off_screen=True, window_size=size, lighting="three lights")
     plotter.set_background("white")

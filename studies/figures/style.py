@@ -189,7 +189,6 @@ def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure; the format follows the suffix."""
     write_whole(path, figure_bytes(figure, path.suffix[1:]))
 
 

@@ -66,7 +66,6 @@ class View:
     turnable: bool = False  # whether it is for a page that lets its reader turn it
 
     def draw(self) -> Iterator[bytes]:
-        """A PNG, or the scene for `renderer.turnable_page`."""
         from .still import scene_picture, turnable_scene
 
         yield turnable_scene(self) if self.turnable else scene_picture(self)
@@ -83,7 +82,6 @@ class Frames:
     axes: Array | None = None  # (n, 3, 3) of the floater where it is not round about its moment
 
     def draw(self) -> Iterator[float | bytes]:
-        """The finished part after each frame, and last a GIF."""
         from .still import flight_animation
 
         yield from flight_animation(self)
@@ -94,7 +92,6 @@ class Sample:
     """A sphere on 64 × 64 pixels: shows whether anything can be drawn at all."""
 
     def draw(self) -> Iterator[bytes]:
-        """A PNG."""
         from .still import sample_picture
 
         yield sample_picture()

@@ -77,7 +77,6 @@ class Page:
             self._become("with_query", dict(asked))
 
     def close(self) -> None:
-        """End all work."""
         if self.resting is not None:
             self.resting.cancel()
         for worker in (self.quick, self.slow, self.mapper, self.porter, self.flyer):
@@ -107,7 +106,6 @@ class Page:
 
     @property
     def near(self) -> list[work.Pose]:
-        """Where the equilibria were last seen."""
         return self.shown.places if self.shown else []
 
     def _became(self, is_other: bool, found: tuple[PageState, Shown | str]) -> None:

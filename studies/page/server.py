@@ -153,7 +153,6 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
 
 
 def program(path: str) -> str:
-    """The text of a program of the page, from the installed packages."""
     return files(__package__).joinpath("page.html" if path == "/" else path[1:]).read_text(encoding="utf-8")
 
 

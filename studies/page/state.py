@@ -43,12 +43,10 @@ class PageState:
 
     @cached_property
     def keys(self) -> Mapping[str, Any]:
-        """Of the scene file."""
         return scene_keys(self.scene)
 
     @property
     def models(self) -> Models:
-        """As the commands take them."""
         return Models(self.model, self.plate_model)
 
     @property

@@ -350,13 +350,11 @@ _flights: list[LiveFlight] = []  # The one of this process
 
 
 def begin_flight(state: PageState) -> Frame:
-    """The first frame of a trajectory."""
     _flights[:] = [Levitation(state.scene, state.models, state.spin).live_flight()]
     return _frame()
 
 
 def fly(seconds: float) -> Frame:
-    """The trajectory, so much later."""
     try:
         return _frame(_flights[0].onward(seconds))
     except SpinlevError as error:

@@ -58,7 +58,6 @@ class Worker:
 
     @property
     def busy(self) -> bool:
-        """Whether an answer is still to come."""
         return self._task is not None and not self._task.done()
 
     def ask(self, key: Hashable, call: Call, receive: Callable[[Any], None]) -> None:
