@@ -182,9 +182,9 @@ class Gradient:
             if name in MORE:
                 data[f"{name}_value"] = variable(("equilibrium", *dims), values[name], unit, label)
         if ends:
-            for name, place, *found in zip(ENDS, *range_ends(self, by), strict=True):
+            for name, place, *slopes in zip(ENDS, *range_ends(self, by), strict=True):
                 if name in ends:
-                    add(name, ("key",), "Hz", ENDS[name], *found)
+                    add(name, ("key",), "Hz", ENDS[name], *slopes)
                     data[f"{name}_value"] = variable((), place, "Hz", ENDS[name])
         data["number"] = variable(("key",), [self.numbers[key] for key in by], "as the key", "number of the scene")
         axes = {"equilibrium": np.arange(len(equilibria)), "key": list(by), "mode": list(MODES), "axis": list("xyz")}

@@ -312,8 +312,8 @@ def main_job(
     if failure:
         values["failed"] = str(failure)
         lines += [] if str(failure) in lines else [str(failure)]
-    said = {**levitation.labels, "body_spin": spin, "left_out": left_out_text(survey.left_out)}
-    dataset = _static_dataset(levitation, survey, alone, best).assign_attrs(said)
+    about = {**levitation.labels, "body_spin": spin, "left_out": left_out_text(survey.left_out)}
+    dataset = _static_dataset(levitation, survey, alone, best).assign_attrs(about)
     if flight:
         simulated = Result(levitation, flight=flight).dataset().assign_attrs(study="run")
         dataset = xr.merge([dataset, simulated], combine_attrs="no_conflicts")

@@ -65,7 +65,10 @@ def deviations(part: xr.Dataset) -> dict[str, Any]:
     """|B - B_fem| / |B_fem| (case, distance) of each simpler model, and last the finite elements' own error."""
     true = _of(part, "fem")
     size = np.hypot(true["off_axis"], true["on_axis"])
-    found = {m: np.hypot(*(_of(part, m)[name] - true[name] for name in COMPONENTS)) / size for m in FIELD_MODELS[:-1]}
+    found: dict[str, Any] = {}
+    for model in FIELD_MODELS[:-1]:
+        off_axis, on_axis = (_of(part, model)[name] - true[name] for name in COMPONENTS)
+        found[model] = np.hypot(off_axis, on_axis) / size
     return {**found, "fem": true["field_error"] / size}
 
 

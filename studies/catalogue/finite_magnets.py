@@ -175,9 +175,9 @@ def _dipole_lines(result: xr.Dataset) -> list[str]:
     for configuration, part in showing.by_configuration(result):
         for cause, models in [*CAUSES.items(), ("all together", TOTAL)]:
             relative = 100 / part["mode_frequency"].sel(model=models[0])
-            axial = ((each * relative).sel(mode="bounce") for each in change(part, "mode_frequency", models))
+            axial, doubt = ((each * relative).sel(mode="bounce") for each in change(part, "mode_frequency", models))
             cells = [showing.range_text(*change(part, name, models), scale) for name, scale in scales.items()]
-            rows.append((f"{configuration}: {cause}", *cells, showing.range_text(*axial)))
+            rows.append((f"{configuration}: {cause}", *cells, showing.range_text(axial, doubt)))
     head = ("change by", "distance (mm)", "polar angle (°)", "lowest (Hz)", "highest (Hz)", "axial mode (%)")
     limits = []
     for rotor, part in showing.by_rotor(result):

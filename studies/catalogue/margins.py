@@ -189,8 +189,8 @@ class Slopes:
             fixed = implicit.moved(setting, [(by, tangents[key]) for key, by in less.items()])
             motion = ForcedMotion(scene, setting.rates, setting.values, None)
             forced = None if fixed is None else motion.equilibrium(fixed)
-            known = isinstance(forced, Equilibrium)
-            found.append((forced.distance, forced.growth_per_s) if known else (np.nan, np.nan))
+            numbers = (forced.distance, forced.growth_per_s) if isinstance(forced, Equilibrium) else (np.nan, np.nan)
+            found.append(numbers)
         return np.array(found).T
 
 

@@ -381,7 +381,7 @@ def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") ->
     found = {}
     for key, given in values.items():
         several = isinstance(given, Iterable) and not isinstance(given, str | bytes | Mapping)
-        listed = list(given) if several else [given]
+        listed: list[Any] = list(given) if several else [given]
         fine = all(isinstance(v, str) if key in NAMES else is_number(v) for v in listed)
         if not listed or not fine:
             what = "names" if key in NAMES else "finite numbers"
