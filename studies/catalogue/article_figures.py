@@ -33,16 +33,6 @@ FIELD_COLUMNS: Columns = {
 }
 
 
-def field_points(quick: bool) -> list[Point]:
-
-    return [
-        {"configuration": name, "value": value, "model": model}
-        for name, kind in article.CONFIGURATIONS.items()
-        for value in (kind.tested[:: (len(kind.tested) - 1) // 2] if quick else kind.tested)
-        for model in FIELD_MODELS
-    ]
-
-
 def field_components(point: Point) -> xr.Dataset:
     """Field of one rotor by one model over `distance`, with the model's own error (0 for the article's formula)."""
     rotor = point["configuration"], point["value"]
@@ -135,7 +125,12 @@ FIELD_COMPONENTS = Study(
     name="field-components",
     summary="off-axis and on-axis field against the parameter of each rotor of the article, by four models",
     quick="all but three rotors of each kind",
-    points=field_points,
+    points=lambda quick: [
+        {"configuration": name, "value": value, "model": model}
+        for name, kind in article.CONFIGURATIONS.items()
+        for value in (kind.tested[:: (len(kind.tested) - 1) // 2] if quick else kind.tested)
+        for model in FIELD_MODELS
+    ],
     compute=field_components,
     figures={"field-components": components_figure, "field-components-differences": differences_figure},
     report=_components_lines,
@@ -323,16 +318,6 @@ SIDE_COLUMNS: Columns = {
 }
 
 
-def side_points(quick: bool) -> list[Point]:
-
-    return [
-        {"configuration": name, "value": value, "model": model, "step_hz": 10.0 if quick else 2.5}
-        for name, kind in article.CONFIGURATIONS.items()
-        for value in (article.QUICK[name] if quick else kind.levitated)
-        for model in article.MODELS
-    ]
-
-
 def side_mode(point: Point) -> xr.Dataset:
     """Radius of the circle of one rotor's floater at all frequencies, for δx = 1 mm a trajectory at `SIMULATED_HZ`."""
     grid = np.arange(article.LOWEST, article.HIGHEST + 1e-9, point["step_hz"])
@@ -425,7 +410,12 @@ SIDE_MODE = Study(
     name="side-mode",
     summary="the circle on which the floater goes with the rotor, and the article's formula for its radius",
     quick="all but one rotor of each kind; frequencies 10 Hz apart instead of 2.5 Hz",
-    points=side_points,
+    points=lambda quick: [
+        {"configuration": name, "value": value, "model": model, "step_hz": 10.0 if quick else 2.5}
+        for name, kind in article.CONFIGURATIONS.items()
+        for value in (article.QUICK[name] if quick else kind.levitated)
+        for model in article.MODELS
+    ],
     compute=side_mode,
     figures={"side-mode-orbit": orbit_figure, "side-mode-radius": radius_figure},
     report=_side_lines,

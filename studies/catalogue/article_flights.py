@@ -35,6 +35,8 @@ FORMULAS, FIELDS = ("semi-analytic", "analytic"), ("dipole", "fem")
 SIMULATED = "dipole"  # The field of the simulated trajectories, which are spread over a rotor's stable frequencies
 DISTANCE_KICK, SECONDS = 0.01, 1.0
 """Speed with which a simulated floater leaves its equilibrium upwards, m/s, and duration of the trajectory."""
+COARSE = {"step_hz": 10.0, "flights": 1, "interaction": "rigid"}
+FINE = {"step_hz": 2.5, "flights": 3, "interaction": "auto"}
 BOTH: tuple[str, ...] = ("frequency", "side")
 DISTANCE_COLUMNS: Columns = {
     "distance": (BOTH, "m", "levitation distance"),
@@ -47,19 +49,6 @@ DISTANCE_COLUMNS: Columns = {
     "flight_distance": (("flight",), "m", "mean levitation distance of a simulated trajectory"),
     "flight_error": (("flight",), "m", "difference between the trajectory's halves"),
 }
-
-
-def distance_points(quick: bool) -> list[Point]:
-
-    step, flights, interaction = (10.0, 1, "rigid") if quick else (2.5, 3, "auto")
-    more = {"step_hz": step, "flights": flights, "interaction": interaction}
-    return [
-        {"configuration": name, "value": value, "model": model, **more}
-        for name, kind in article.CONFIGURATIONS.items()
-        for value in (article.QUICK[name] if quick else kind.tested)
-        for model in (*FORMULAS, *FIELDS)
-        if (name, model) != ("vertical", "analytic")
-    ]
 
 
 def levitation_distance(point: Point) -> xr.Dataset:
@@ -210,7 +199,13 @@ LEVITATION_DISTANCE = Study(
     name="levitation-distance",
     summary="distance against frequency for every rotor of the article: equilibria, its formulas, simulations",
     quick="all but one rotor of each kind, mutual magnetisation, two of three trajectories; steps of 10 not 2.5 Hz",
-    points=distance_points,
+    points=lambda quick: [
+        {"configuration": name, "value": value, "model": model, **(COARSE if quick else FINE)}
+        for name, kind in article.CONFIGURATIONS.items()
+        for value in (article.QUICK[name] if quick else kind.tested)
+        for model in (*FORMULAS, *FIELDS)
+        if (name, model) != ("vertical", "analytic")
+    ],
     compute=levitation_distance,
     figures={"levitation-distance-models": models_figure, "levitation-distance-formulas": formulas_figure},
     report=_distance_lines,

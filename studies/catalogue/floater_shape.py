@@ -40,14 +40,6 @@ NUMBERS = {"configuration": "configuration", "value": "measure", "shape": "shape
 NUMBERS |= {"low_hz": "low", "high_hz": "high"}
 
 
-def shape_points(quick: bool) -> list[Point]:
-
-    rotors = article.levitated_rotors(True)[: 1 if quick else None]
-    aspects = [("cylinder", float(aspect)) for aspect in (QUICK if quick else ASPECTS)]
-    shapes = [*aspects, (CUBE, 1.0), (SPHERE, 1.0)]
-    return [{**rotor, "shape": shape, "aspect": aspect} for rotor in rotors for shape, aspect in shapes]
-
-
 def floater_of(shape: str, aspect: float) -> Floater:
     """A floater of the article's volume and material, of μr = 1: a cylinder of an aspect, a cube or a sphere."""
     ball = article.FLOATER
@@ -116,7 +108,12 @@ STUDY = Study(
     name="floater-shape",
     summary="limits of stable frequency by the floater's shape at equal volume: discs, rods, a cube and a sphere",
     quick="all rotors but δx = 2 mm, all cylinders but 1 : 2, 1 : 1 and 2 : 1",
-    points=shape_points,
+    points=lambda quick: [
+        {**rotor, "shape": shape, "aspect": float(aspect)}
+        for rotor in article.levitated_rotors(True)[: 1 if quick else None]
+        for shape, aspects in (("cylinder", QUICK if quick else ASPECTS), (CUBE, (1.0,)), (SPHERE, (1.0,)))
+        for aspect in aspects
+    ],
     compute=limits,
     figures={"floater-shape": shape_figure},
     report=_shape_lines,

@@ -324,13 +324,6 @@ NAMES: Columns = {
 }
 
 
-def design_points(quick: bool) -> list[Point]:
-    """Wanted frequencies for each configuration, with all wanted distances (mm)."""
-    wanted = {"distances_mm": [20.0] if quick else [20.0, 25.0, 30.0]}
-    frequencies = [120.0] if quick else [80.0, 120.0]
-    return [{"configuration": name, "frequency": f, **wanted} for f in frequencies for name in BEGUN]
-
-
 def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """The cubes with the largest margin by the closed form, and their measure in the field of the finite magnets."""
     name, frequency = point["configuration"], point["frequency"]
@@ -406,7 +399,11 @@ DESIGN = Study(
     name="design",
     summary="which displacement, tilt and magnet size give a wanted distance and frequency with the largest margin",
     quick="all but one of six wishes",
-    points=design_points,
+    points=lambda quick: [
+        {"configuration": name, "frequency": f, "distances_mm": [20.0] if quick else [20.0, 25.0, 30.0]}
+        for f in ([120.0] if quick else [80.0, 120.0])
+        for name in BEGUN
+    ],
     compute=design,
     figures={"design": margin_figure},
     report=_design_lines,

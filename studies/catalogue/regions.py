@@ -233,16 +233,6 @@ NUMBERS = {"configuration": "configuration", "value": "measure", "variant": "var
 NUMBERS |= {f"{name}_hz": name for name in ENDS}
 
 
-def limit_points(quick: bool) -> list[Point]:
-
-    rotors = article.levitated_rotors(False) if not quick else [{"configuration": "horizontal", "measure": 2.0}]
-    return [
-        {**rotor, "variant": variant}
-        for rotor in rotors
-        for variant in (VARIANTS if rotor["configuration"] == "horizontal" and not quick else VARIANTS[:2])
-    ]
-
-
 def spacer(displacement: float) -> Conductor:
     """A steel block as wide and deep as the cube, behind it, that puts the centre of mass on the axis.
 
@@ -323,7 +313,11 @@ UPPER_LIMIT = Study(
     name="upper-limit",
     summary="until which frequency trajectories last, below rotors that do and do not conduct",
     quick="all rotors but δx = 2 mm; conducting spacers",
-    points=limit_points,
+    points=lambda quick: [
+        {**rotor, "variant": variant}
+        for rotor in ([{"configuration": "horizontal", "measure": 2.0}] if quick else article.levitated_rotors(False))
+        for variant in (VARIANTS if rotor["configuration"] == "horizontal" and not quick else VARIANTS[:2])
+    ],
     compute=upper_limit,
     figures={"upper-limit": limit_figure},
     report=_limit_lines,

@@ -211,16 +211,6 @@ def _many(number: int) -> Array:
     return np.asarray(rng.uniform(0.013, 0.04, (number, 1)) * way / np.linalg.norm(way, axis=1)[:, None])
 
 
-def peer_pace() -> float:
-    """Seconds per point of magpylib's B alone for the same cube."""
-    import magpylib
-
-    peer = magpylib.magnet.Cuboid(polarization=(1.305, 0, 0), dimension=(0.01,) * 3)
-    points = _many(TIMED_POINTS)
-    peer.getB(points[:10])
-    return min(timeit.repeat(lambda: peer.getB(points), timer=time.process_time, number=1)) / TIMED_POINTS
-
-
 def apart(name: str, quick: bool) -> Measured:
     """`measure` in a process of its own with an empty cache, forked from one that has only imported the libraries."""
     fresh = get_context("forkserver")
@@ -243,6 +233,8 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
 
     Of the methods `names` (None: all), against a reference of tolerance `truth` (None: the study's own).
     """
+    import magpylib
+
     catalogue = {name: method for name, method in methods(quick).items() if names is None or name in names}
     requested = truth or (QUICK_TRUTH if quick else TRUTH_TOLERANCE)
     truths = {}
@@ -264,7 +256,10 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
         "problem": ("approach", [method.problem for method in catalogue.values()]),
         "distance": variable(("distance",), np.array(DISTANCES), "m", "distance from the cube's centre"),
     }
-    return xr.Dataset(data, coords, {"magpylib_seconds_per_point": peer_pace()})
+    peer, many = magpylib.magnet.Cuboid(polarization=(1.305, 0, 0), dimension=(0.01,) * 3), _many(TIMED_POINTS)
+    peer.getB(many[:10])
+    pace = min(timeit.repeat(lambda: peer.getB(many), timer=time.process_time, number=1)) / TIMED_POINTS
+    return xr.Dataset(data, coords, {"magpylib_seconds_per_point": pace})  # of B alone, for the same cube
 
 
 def _largest(values: Array, truth: Array, rank: int) -> Array:
