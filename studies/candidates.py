@@ -35,6 +35,7 @@ MAGNET_DENSITY = 7500.0  # kg/m³, of a rotor's magnets, whose scene file has no
 # the bounds: where it leads nowhere there is a fold
 HALVES, SHORT = 3, 0.02
 DRAWS, SEED = 32, 20250708  # of scenes to begin at where the given one has no equilibrium
+Limits = Mapping[str, tuple[float, float]]  # least and most, by name
 
 
 def survey_near(levitation: Levitation, places: Array, moments: Array) -> Survey | None:
@@ -182,7 +183,7 @@ def _answer(name: str) -> tuple[str, float]:
 class Search:
     """Scenes that differ in numbers with ends `free`, by key, each with the equilibrium followed from the last."""
 
-    def __init__(self, levitation: Levitation, free: Mapping[str, tuple[float, float]]) -> None:
+    def __init__(self, levitation: Levitation, free: Limits) -> None:
         self.scene, numbers = scene_numbers(levitation.scene)
         self.keys, self.low, self.high = tuple(free), *np.array(list(free.values()), float).T
         self.first = np.array([numbers[key] for key in free])

@@ -23,7 +23,7 @@ from ..geometry.common import Array, ComputationError, InputError, SpinlevError,
 from ..geometry.files import write_whole
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, load_scene, scene_numbers, scene_text, toml_tables
-from .candidates import OF_SCENE, Candidate, Search, survey_near
+from .candidates import OF_SCENE, Candidate, Limits, Search, survey_near
 from .cli.console import note, to_json
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
 from .figures.style import PALETTE, legend_below, panels, plot_branch, save_figures, styled
@@ -66,7 +66,7 @@ NEARER, MISSING = 0.1, 12  # part of what limits are missed by that so many scen
 CURVE = 81  # points of a branch that is kept
 # Models that are searched at once; and by how much limits are missed, in their sizes, with which others need no search
 SIMPLE, ROUGH = (("dipole", "none"), ("cuboid", "none")), 0.1
-Limits = Mapping[str, tuple[float, float]]
+Best = tuple[Candidate, Array]  # a scene and its numbers
 
 
 def _range(name: str, value: object) -> tuple[float, float]:
@@ -189,7 +189,7 @@ class _Problem:
                 self.kept, self.missed = self.search.looked_at, worst[0]
             self.nearest = worst[0], f": {worst[1]} is {known.values(worst[1]).min():.4g} where it is nearest to them"
 
-    def solved(self) -> tuple[Candidate, Array]:
+    def solved(self) -> Best:
         search = self.search
         z = (search.at_near - search.low) / self.width
         if self.raised:
@@ -222,7 +222,7 @@ class _Problem:
         return known, numbers
 
 
-def optimised(search: Search, goal: tuple[str, int], limits: Limits) -> tuple[Candidate, Array]:
+def optimised(search: Search, goal: tuple[str, int], limits: Limits) -> Best:
     """The scene that makes a measure large (1) or small (-1) within `limits`, and its numbers.
 
     Raises ComputationError where no scene that was looked at meets them.
@@ -248,9 +248,7 @@ def optimised(search: Search, goal: tuple[str, int], limits: Limits) -> tuple[Ca
     return found, numbers
 
 
-def _front(
-    search: Search, goals: Sequence[tuple[str, int]], limits: Limits, points: int
-) -> list[tuple[Candidate, Array]]:
+def _front(search: Search, goals: Sequence[tuple[str, int]], limits: Limits, points: int) -> list[Best]:
     """Scenes from the best by the first of two goals to the best by the second, that of the second in equal steps."""
     (first, (name, sense)), found = goals, [optimised(search, goals[0], limits)]
     last = optimised(search, (name, sense), limits)
@@ -321,9 +319,7 @@ def design(
     return designed(levitation, wanted, bounds, ends, points)
 
 
-def checked_goals(
-    goals: object, free: object, limits: object, points: int
-) -> tuple[list[str], dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
+def checked_goals(goals: object, free: object, limits: object, points: int) -> tuple[list[str], Limits, Limits]:
     """Goals, bounds of free numbers and limits as they are used. Raises InputError."""
     wanted = [goals] if isinstance(goals, str) else list(goals) if isinstance(goals, Sequence) else []
     if not 1 <= len(wanted) <= 2 or len(set(map(str, wanted))) < len(wanted):
@@ -337,10 +333,10 @@ def checked_goals(
         raise InputError(f"Input limits must be ranges by {said}; instead received {shown(limits)}.")
     check_names(given, MEASURES, "limits", "what a scene can be asked for")
     ends = {name: _range(f"limits.{name}", value) for name, value in given.items()}
-    return [str(one) for one in wanted], checked_free(free), ALWAYS | ends
+    return [str(one) for one in wanted], checked_free(free), {**ALWAYS, **ends}
 
 
-def checked_free(free: object, levitation: Levitation | None = None) -> dict[str, tuple[float, float]]:
+def checked_free(free: object, levitation: Levitation | None = None) -> Limits:
     """Bounds of free numbers, which hold those of a `levitation` and have derivatives in it. Raises InputError."""
     if not isinstance(free, Mapping) or not free:
         raise InputError(f"Input free must be least and most by key of the scene file; instead received {shown(free)}.")
@@ -366,9 +362,7 @@ def checked_free(free: object, levitation: Levitation | None = None) -> dict[str
     return bounds
 
 
-def designed(
-    levitation: Levitation, goals: Sequence[str], bounds: Mapping[str, tuple[float, float]], limits: Limits, points: int
-) -> xr.Dataset:
+def designed(levitation: Levitation, goals: Sequence[str], bounds: Limits, limits: Limits, points: int) -> xr.Dataset:
     """The Dataset of `design`, for goals and limits that were checked."""
     checked_free(bounds, levitation)
     if (levitation.models.model, levitation.models.plate_model) not in SIMPLE:
@@ -379,7 +373,7 @@ def designed(
     return _dataset(search, levitation, goals, bounds, limits, [numbers for _, numbers in found])
 
 
-def _check_reach(levitation: Levitation, bounds: Mapping[str, tuple[float, float]], limits: Limits) -> None:
+def _check_reach(levitation: Levitation, bounds: Limits, limits: Limits) -> None:
     """ComputationError where not even point dipoles, of which a search takes seconds, come near the limits."""
     quick = Levitation(levitation.scene, Models("dipole", "none", interaction="rigid"), levitation.spin)
     known = {name: ends for name, ends in limits.items() if name not in LEAST}
@@ -394,8 +388,7 @@ def _check_reach(levitation: Levitation, bounds: Mapping[str, tuple[float, float
 
 
 def _dataset(
-    search: Search, first: Levitation, goals: Sequence[str], bounds: Mapping[str, tuple[float, float]],
-    limits: Limits, found: Sequence[Array],
+    search: Search, first: Levitation, goals: Sequence[str], bounds: Limits, limits: Limits, found: Sequence[Array]
 ) -> xr.Dataset:  # fmt: skip
     note("The scene that was found, searched anew ...")
     begun = replace(first.models, model=search.models.model)
@@ -414,8 +407,9 @@ def _dataset(
         texts.append(scene_text(first.scene if k == 0 else scene))
     units = [label_of_key(key)["units"] for key in search.keys]
     ends = [limits.get(name, (-np.inf, np.inf)) for name in MEASURES]
-    values = np.array(rows)
-    over = ("curve", "step")
+    axes = {"key": list(search.keys), "unit": ("key", units), "measure": list(MEASURES), "end": ["least", "most"]}
+    axes["measure_unit"] = ("measure", [unit for unit, _ in MEASURES.values()])
+    values, over = np.array(rows), ("curve", "step")
     return xr.Dataset(
         {
             "number": variable(("point", "key"), np.array(numbers[1:]), "as the key", "number of the scene"),
@@ -429,13 +423,7 @@ def _dataset(
             "followed_stable": variable(over, [c[2] for c in curves], "1", "whether it is stable, or marginal"),
             "scene": (("point",), texts[1:]),
         },
-        {
-            "key": list(search.keys),
-            "unit": ("key", units),
-            "measure": list(MEASURES),
-            "measure_unit": ("measure", [unit for unit, _ in MEASURES.values()]),
-            "end": ["least", "most"],
-        },
+        axes,
         {"study": "designed", "goals": ", ".join(goals), **search.near.levitation.labels},
     )
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ..dynamics.equilibria.equilibrium import AXIAL, SIDE, TILT, Equilibrium
 from ..geometry.common import Array, ComputationError, InputError, shown
 from ..geometry.scene.files import changed, scene_numbers
-from .candidates import Candidate, Search
+from .candidates import Candidate, Limits, Search
 from .cli.options import FieldModel, Models, PlateModel, Requested, documented
 from .design import checked_free
 from .figures.style import PALETTE, legend_below, panels, styled
@@ -123,9 +123,7 @@ def _ringing(times: Array, values: Array) -> list[float]:
 class _Rows:
     """The scenes of a table's rows, and what was measured in them."""
 
-    def __init__(
-        self, levitation: Levitation, table: Mapping[str, Array], free: Mapping[str, tuple[float, float]]
-    ) -> None:
+    def __init__(self, levitation: Levitation, table: Mapping[str, Array], free: Limits) -> None:
         scene, numbers = scene_numbers(levitation.scene)
         known = {**MEASURABLE, **MODE_OF}
         self.measures = [name for name in table if name in known]

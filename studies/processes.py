@@ -29,6 +29,7 @@ THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 BEGIN = "import sys, pickle; from multiprocessing.connection import Connection; c = Connection(int(sys.argv[1])); \
 sys.path[:] = pickle.loads(c.recv_bytes()); from {module} import serve; serve(c)"
 Function = Callable[[Any], Iterable[Any]]
+Answers = Generator[tuple[Any, Any], None, None]  # with their items
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,7 @@ def program() -> str:
     return program_digest()
 
 
-def results(
-    number: int, function: Function, items: deque[Any], showing: bool = False
-) -> Generator[tuple[Any, Any], None, None]:
+def results(number: int, function: Function, items: deque[Any], showing: bool = False) -> Answers:
     """Results of a `function`, which gives an iterable, for `items` as they come; a `Death` for what is missing.
 
     Each comes with its item; who iterates may append others. At most `number` processes work; those that only draw

@@ -59,6 +59,7 @@ OF_A_STATE = (
 )
 PLACES = 500  # of a trajectory, at which the field's error is looked at
 Columns = Mapping[str, tuple[tuple[str, ...], str, str]]  # dimensions, unit and a name for an axis label, by name
+Found = Mapping[str, Any] | Sequence[Any]  # quantities by name, or in the order of a table of columns
 DRIVE: Columns = {
     "rotor_frequency": (("time",), "Hz", "frequency of the rotor"),
     "motor_torque": (("time",), "N m", "torque of the motor, mean since the sample before"),
@@ -251,7 +252,7 @@ def label_of_key(key: str) -> dict[str, str]:
     return {"units": ENDS.get(end, "1"), "long_name": name}
 
 
-def columns(table: Columns, found: Mapping[str, Any] | Sequence[Any], **sizes: int) -> dict[str, xr.Variable]:
+def columns(table: Columns, found: Found, **sizes: int) -> dict[str, xr.Variable]:
     """Variables by name as a `table` of columns has them: dimensions, unit and label of each quantity.
 
     `found` are the quantities by name, or all of them in the table's order; `sizes` are of the dimensions of what was

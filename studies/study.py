@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from .result import Columns, columns
+from .result import Columns, Found, columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Point = Mapping[str, Any]  # what distinguishes one point of a study, in types that JSON knows
+Compute = Callable[[Point], xr.Dataset]  # one point's labelled result, the same whoever computes it
 Batch = Mapping[int, Point]  # numbered points that are computed together
 # How to compute each of several points that help each other.
 Prepared = Callable[[Sequence[Point]], Sequence[Callable[[], xr.Dataset]]]
@@ -36,9 +37,7 @@ LABELS = {
 }
 
 
-def recorded(
-    point: Point, table: Columns, found: Mapping[str, Any] | Sequence[Any], axes: Mapping[str, Any], **sizes: int
-) -> xr.Dataset:
+def recorded(point: Point, table: Columns, found: Found, axes: Mapping[str, Any], **sizes: int) -> xr.Dataset:
     """A point's result from numbers, with those of `LABELS` that it has, ready to be joined along `case`.
 
     `table`, `found` and `sizes` are as of `columns`; `axes` are coordinates.
@@ -68,8 +67,7 @@ class Study:
     name: str  # by which it is asked for, and which its files have
     summary: str  # what it gives, in a line
     points: Callable[[bool], Sequence[Point]]  # takes `quick` and returns the points
-    # Takes a point and returns its labelled result, the same whoever computes it
-    compute: Callable[[Point], xr.Dataset]
+    compute: Compute
     # By the name of its files, what draws each figure from the joined result alone; one message a figure
     figures: Mapping[str, Callable[[xr.Dataset], Figure]]
     report: Callable[[xr.Dataset], list[str]]  # what it says, in lines, from the joined result alone

@@ -23,7 +23,7 @@ from ..geometry.files import seal, unsealed, write_whole
 from .cli.console import missing_extra, note, progress, to_json
 from .cli.options import Workers
 from .processes import Death, NoProcessError, program, results
-from .study import Batch, Point, Prepared, Study
+from .study import Batch, Compute, Point, Prepared, Study
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -33,6 +33,7 @@ SHOWING = ("studies/catalogue", "studies/cli", "studies/figures", "studies/page"
 TRIES = 3  # how often a point is begun whose process dies
 PATIENCE = 10.0  # seconds to wait for a scheduler, also for one that does not answer any more
 Attempt = tuple[int, xr.Dataset | str]  # the number of a point, and its result or why it has none
+Answers = Generator[tuple[Batch, Attempt | Death], None, None]  # of other processes
 
 
 class SweepError(ComputationError):
@@ -175,9 +176,7 @@ def computed(by: Workers, study: Study, points: Sequence[Point], missing: Set[in
         yield from job(batches.popleft())
 
 
-def attempts(
-    compute: Callable[[Point], xr.Dataset], prepared: Prepared | None, missing: Set[int], points: Batch
-) -> Iterator[Attempt]:
+def attempts(compute: Compute, prepared: Prepared | None, missing: Set[int], points: Batch) -> Iterator[Attempt]:
     """Results of the `missing` ones of numbered `points` that are computed together, or why there is none.
 
     `compute` and `prepared` are of the study.
@@ -197,9 +196,7 @@ def attempts(
                 yield k, missing_extra(error) or f"{type(error).__name__}: {error}"
 
 
-def _completed(
-    answers: Generator[tuple[Batch, Attempt | Death], None, None], batches: deque[Batch], missing: Set[int]
-) -> Iterator[Attempt]:
+def _completed(answers: Answers, batches: deque[Batch], missing: Set[int]) -> Iterator[Attempt]:
     """The attempts of other processes; what is left of a batch whose process died goes back to `batches`."""
     finished: set[int] = set()
     deaths: Counter[int] = Counter()
@@ -218,9 +215,7 @@ def _completed(
             batches.extend({k: batch[k]} for k in left)  # one of them killed the process: which?
 
 
-def _on_scheduler(
-    address: str, job: Any, batches: deque[Batch]
-) -> Generator[tuple[Batch, Attempt | Death], None, None]:
+def _on_scheduler(address: str, job: Any, batches: deque[Batch]) -> Answers:
     """The attempts of the scheduler's workers; those of another version of the program are not used."""
     with _client(address) as client:
         from concurrent.futures import CancelledError

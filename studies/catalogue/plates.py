@@ -186,7 +186,7 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
                 continue
             varied = part["rotor_frequency"] if sweep == "frequency" else part["value"] * SWEEPS[sweep][2]
             for mode, color in zip(result["mode"].values, PALETTE, strict=False):
-                _damped(panel, varied, part["growth"].sel(mode=mode), part["error"], style, color, fill)
+                _damped(panel, varied, part["growth"].sel(mode=mode), part["error"], style, color=color, mfc=fill)
                 showing.explain(panel, {showing.mode_label(mode): "-"}, color=color)
             showing.explain(panel, {words: style}, mfc=fill, ms=4)
         panel.set_xlabel(SWEEPS[sweep][1])
@@ -197,12 +197,10 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
     return figure
 
 
-def _damped(
-    axes: Axes, x: ArrayLike, growth: xr.DataArray, error: ArrayLike, style: str, color: str, fill: str | None
-) -> None:
+def _damped(axes: Axes, x: ArrayLike, growth: xr.DataArray, error: ArrayLike, style: str, **look: Any) -> None:
     """Damping rates with their errors, and as crosses the growth rates of what is not damped, on one log axis."""
-    axes.errorbar(x, -growth.where(growth < 0), np.abs(growth) * error, fmt=style, color=color, mfc=fill, ms=4)
-    axes.plot(x, growth.where(growth >= 0), "x", color=color, ms=5)
+    axes.errorbar(x, -growth.where(growth < 0), np.abs(growth) * error, fmt=style, ms=4, **look)
+    axes.plot(x, growth.where(growth >= 0), "x", color=look["color"], ms=5)
     axes.set_yscale("log")
     if (growth >= 0).any():
         showing.explain(axes, {"growth rate (unstable)": "x"}, ms=5)
@@ -215,7 +213,7 @@ def rotors_figure(result: xr.Dataset) -> Figure:
     for sweep, place, marker, color in zip(ROTORS, PLACES, "os", PALETTE, strict=False):
         part = part_of(result, sweep)
         places = np.arange(part.sizes["case"])
-        _damped(axes, places, part["growth"].max("mode"), part["error"], marker, color, None)
+        _damped(axes, places, part["growth"].max("mode"), part["error"], marker, color=color)
         showing.explain(axes, {f"plate {place}": marker}, color=color, ms=4)
         rotors = zip(part["configuration"].values.tolist(), part["value"].values.tolist(), strict=True)
         axes.set_xticks(places, [article.rotor_label(*rotor).replace(" = ", "\n") for rotor in rotors])

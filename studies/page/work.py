@@ -108,9 +108,7 @@ class Shown:
     lines: list[Array] = field(default_factory=list)  # of the field, m, where they were asked for
 
 
-def become(
-    state: PageState, method: str, arguments: tuple[Any, ...], near: Sequence[Any]
-) -> tuple[PageState, Shown | str]:
+def become(state: PageState, method: str, arguments: Any, near: Sequence[Any]) -> tuple[PageState, Shown | str]:
     """Another state by a `method` of the `state` with `arguments`; its preview from `near`, or why there is none."""
     made: PageState = getattr(state, method)(*arguments)
     made.keys  # noqa: B018  # travels with it: the page's own process does not look for overlaps
@@ -260,9 +258,7 @@ def article_points(state: PageState) -> dict[str, Any]:
     return {"tested": known.tested, "levitated": known.levitated, "flights": ARTICLE_FLIGHTS.get(kind, ())}
 
 
-def regions(
-    state: PageState, spans: tuple[tuple[float, float], tuple[float, float]], model: str, points: int
-) -> Regions:
+def regions(state: PageState, spans: Sequence[tuple[float, float]], model: str, points: int) -> Regions:
     """Where something levitates stably without plate over `spans` of frequency (Hz) and measure (mm or °).
 
     For a `state`, by a `model` of the field at so many `points` along each axis; magnets that move against each other
