@@ -219,6 +219,7 @@ LEVITATION_DISTANCE = Study(
 # of equilibria.  In the motion are real air, eddy currents in floater and rotor, and mutual magnetisation; in that of
 # `quick` Stokes drag and the floater's currents alone.
 FREQUENCIES = np.array([115.0, 140.0, 150.0, 160.0, 170.0, 200.0])
+ROUGHLY, WHOLLY = {"model": "dipole", "complete": False}, {"model": "fem", "complete": True}
 DISPLACEMENTS = (1.0, 1.5, 2.0)
 """δx in mm: as in the experiment, what gives its fall at 115 Hz, and what is lost in oscillations within these."""
 KICK = 1e-3  # Speed with which a trajectory begins upwards, m/s
@@ -331,13 +332,7 @@ TRAJECTORIES = Study(
     summary="linear fall, stable and unstable trajectory: the distance against time, simulated and averaged",
     quick="finite elements (point dipoles instead), eddy currents in the rotor, real air, mutual magnetisation",
     points=lambda quick: [
-        {
-            "configuration": "horizontal",
-            "model": "dipole" if quick else "fem",
-            "duration_s": 60.0,
-            "complete": not quick,
-            "value": value,
-        }
+        {"configuration": "horizontal", **(ROUGHLY if quick else WHOLLY), "duration_s": 60.0, "value": value}
         for value in DISPLACEMENTS
     ],
     compute=trajectories,
