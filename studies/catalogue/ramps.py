@@ -89,8 +89,8 @@ def ramps_numbers(result: xr.Dataset) -> dict[str, Any]:
     found = []
     for one in each_case(result):
         steady = {"lowest_stable_hz": float(one["lowest"]), "highest_stable_hz": float(one["highest"])}
-        told = [(w, r, float(one["lost_at"].sel(way=w, rate=r))) for w in WAYS for r in one["rate"].values.tolist()]
-        lost = [{"way": w, "rate_hz_per_s": r, "lost_at_hz": None if at != at else at} for w, r, at in told]
+        ended = [(w, r, float(one["lost_at"].sel(way=w, rate=r))) for w in WAYS for r in one["rate"].values.tolist()]
+        lost = [{"way": w, "rate_hz_per_s": r, "lost_at_hz": None if at != at else at} for w, r, at in ended]
         rotor = {"configuration": one["configuration"].item(), "value": float(one["measure"])}
         found.append({**rotor, **steady, "lost": lost})
     return {"ramps": found}

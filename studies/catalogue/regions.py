@@ -185,8 +185,8 @@ def _map_lines(result: xr.Dataset) -> list[str]:
         ends = zip(*(one[name].values for name in ("lowest", "low_kind", "highest", "high_kind")), strict=True)
         stable = [f"{low:.1f} ({a}) to {high:.1f} Hz ({b})" for low, a, high, b in ends if np.isfinite(low)]
         pairs = zip(one["plate_frequency"].values, one["plate_growth"].values, strict=True)
-        told = [(f, f"{g:+.2g}" if np.isfinite(g) else "no equilibrium") for f, g in pairs if np.isfinite(f)]
-        plate = [f"{f:.0f} Hz {growth}" for f, growth in told]
+        found = [(f, f"{g:+.2g}" if np.isfinite(g) else "no equilibrium") for f, g in pairs if np.isfinite(f)]
+        plate = [f"{f:.0f} Hz {growth}" for f, growth in found]
         known = zip(*(one[name].values for name in ("metal", *LASTING)), strict=True) if "high" in one else ()
         lasting = [f"{low:.1f} to {high:.1f} Hz ({of} rotor; then {end})" for of, low, high, _, end in known if end]
         cells = (" and ".join(stable) or "never", ", ".join(plate), " and ".join(lasting))
