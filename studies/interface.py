@@ -21,23 +21,9 @@ from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import driven, scene_text
 from .catalogue.entries import CATALOGUE
 from .catalogue.runner import figures_of, question_study
+from .cli import options
 from .cli.console import missing_extra
-from .cli.options import (
-    FieldModel,
-    InteractionModel,
-    Models,
-    PlateModel,
-    Quantity,
-    Requested,
-    Workers,
-    check_steps,
-    checked_values,
-    combinations,
-    documented,
-    finite,
-    positive,
-    unknown_study,
-)
+from .cli.options import FieldModel, InteractionModel, Models, PlateModel, Quantity, Requested, Workers, documented
 from .coils import coils_summary, modes_of
 from .compare import compared, compared_dataset, field_rtol
 from .demagnetising import working_point_dataset
@@ -128,7 +114,7 @@ def compare(
     [18.83, 19.1]
     """
     name = "frequencies_hz"
-    grid = None if frequencies_hz is None else np.array(checked_values({name: frequencies_hz})[name])
+    grid = None if frequencies_hz is None else np.array(options.checked_values({name: frequencies_hz})[name])
     if grid is not None and grid.min() <= 0:
         raise InputError(f"Input frequencies_hz must be positive; instead received {grid.min():g}.")
     known = given_scene(scene)
@@ -268,12 +254,12 @@ def field_map(
     """
     if plane not in PLANES:
         raise InputError(f"Input plane must be one of {', '.join(PLANES)}; instead received {plane}.")
-    check_steps("steps", steps)
-    ends = None if extent_mm is None else 1e-3 * np.array([finite("extent_mm", end) for end in extent_mm])
+    options.check_steps("steps", steps)
+    ends = None if extent_mm is None else 1e-3 * np.array([options.finite("extent_mm", end) for end in extent_mm])
     if ends is not None and not (len(ends) == 4 and ends[0] < ends[1] and ends[2] < ends[3]):
         said = "left, right, lower and upper end in rising order, mm"
         raise InputError(f"Input extent_mm must be {said}; instead received {extent_mm}.")
-    return plane_map(given_scene(scene), plane, ends, 1e-3 * finite("offset_mm", offset_mm), steps)
+    return plane_map(given_scene(scene), plane, ends, 1e-3 * options.finite("offset_mm", offset_mm), steps)
 
 
 @documented
@@ -382,7 +368,7 @@ def ensemble(
     >>> flights.ended_by.values.tolist()
     ['duration', 'contact']
     """
-    positive("duration_s", duration_s)
+    options.positive("duration_s", duration_s)
     if (starts is None) == (n is None):
         raise InputError("Input starts must be given, or n with spread; instead received both or neither.")
     number = Workers(workers).checked().workers or os.cpu_count() or 1
@@ -454,12 +440,13 @@ def sweep(
     """
     loaded = given_scene(scene)
     models = Models(model, plate_model, **requested).checked()
-    where = tuple(1e-3 * finite("place_mm", coordinate) for coordinate in place_mm)
+    where = tuple(1e-3 * options.finite("place_mm", coordinate) for coordinate in place_mm)
     if len(where) != 3:
         raise InputError(f"Input place_mm must be three numbers; instead received {place_mm!r}.")
-    question = Question(loaded, "scene", ask, models, finite("spin", spin), finite("duration_s", duration_s), where)
-    grid = checked_values(values)
-    return _computed(question_study(question, grid), combinations(grid), Workers(workers, scheduler), Path(out))
+    numbers = options.finite("spin", spin), options.finite("duration_s", duration_s)
+    question = Question(loaded, "scene", ask, models, *numbers, where)
+    grid = options.checked_values(values)
+    return _computed(question_study(question, grid), options.combinations(grid), Workers(workers, scheduler), Path(out))
 
 
 @documented
@@ -493,7 +480,7 @@ def run_study(
         No point could be computed.
     """
     if name not in CATALOGUE:
-        raise unknown_study(name, CATALOGUE)
+        raise options.unknown_study(name, CATALOGUE)
     study = CATALOGUE[name]
     return _computed(study, study.points(quick), Workers(workers, scheduler), Path(out))
 

@@ -35,27 +35,10 @@ from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, los
 from ..geometry.common import Array, SpinlevError, Watch, unwatched
 from ..geometry.scene.contents import AbsoluteStart, Plate
 from ..geometry.solids import moved
+from . import plan as plans
 from .cli.console import detail, note, progress, stages
 from .cli.options import FieldModel, Models, finite, positive
-from .plan import (
-    PlatePlan,
-    RotorField,
-    SceneLike,
-    SharedTables,
-    check_coils,
-    check_drive,
-    check_room,
-    check_way,
-    equations_key,
-    far_plan,
-    field_key,
-    levitating_scene,
-    looser,
-    map_of,
-    nearest_faces,
-    plate_plan,
-    sources,
-)
+from .plan import PlatePlan, RotorField, SceneLike, SharedTables
 
 AHEAD = 1.0  # of a trajectory, s, that is looked at beforehand
 ANEW = 2  # tables at most that are made anew for an equilibrium that leaves the one about where it was without plate
@@ -72,7 +55,7 @@ class Levitation:
     """
 
     def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
-        self.scene = levitating_scene(scene)
+        self.scene = plans.levitating_scene(scene)
         self.still = replace(self.scene, drive=()) if self.scene.drive else self.scene
         """The scene with a rotor that keeps its first frequency, of which the equilibria are."""
         self.models = models.checked()
@@ -103,7 +86,8 @@ class Levitation:
         self._tables = other._tables
         table, name, rotor = other.table if changed else None, self.models.model, self.scene.rotor
         if isinstance(table, RotorTable) and name == table.model in PERMEABLE and follows(table, rotor):
-            self._tables.once(field_key(self.scene, name, self.models.rtol), lambda: changed_table(table, rotor, True))
+            key = plans.field_key(self.scene, name, self.models.rtol)
+            self._tables.once(key, lambda: changed_table(table, rotor, True))
 
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
@@ -153,14 +137,14 @@ class Levitation:
 
     def field(self, model: str) -> RotorField:
         """The rotor's field by any model, accurate wherever the floater can be: from its radius off the magnets on."""
-        scene, rtol, nearest = self.scene, self.models.rtol, nearest_faces(self.scene.floater)
+        scene, rtol, nearest = self.scene, self.models.rtol, plans.nearest_faces(self.scene.floater)
         if model == "map":
-            return self._tables.once(field_key(scene, model, rtol), lambda: map_of(scene))
+            return self._tables.once(plans.field_key(scene, model, rtol), lambda: plans.map_of(scene))
         chosen = partial(resolve_model, scene.rotor, model, rtol, nearest)
-        name, reason = self._tables.once(f"model {field_key(scene, model, rtol)}", chosen)
+        name, reason = self._tables.once(f"model {plans.field_key(scene, model, rtol)}", chosen)
         if model == "auto":
             detail(f"Field model: {name} ({reason})")
-        key = field_key(scene, name, rtol)
+        key = plans.field_key(scene, name, rtol)
         if name in PERMEABLE:
             make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest)
             return self._tables.table(key, name, f"Rotor's field by {PERMEABLE[name]}", make)
@@ -212,7 +196,7 @@ class Levitation:
     @cached_property
     def equations_key(self) -> str:
         """All that decides tables and equations; scenes where it is the same differ in parameters of the motion."""
-        return equations_key(self.scene, self.models)
+        return plans.equations_key(self.scene, self.models)
 
     @property
     def rates(self) -> Rates:
@@ -228,20 +212,20 @@ class Levitation:
         The latter where a conductor is in the floater's way, the rotor turns too fast for its metal, or the field of a
         coil does not stand still in the rotor's frame.
         """
-        check_coils(self.scene)
+        plans.check_coils(self.scene)
         interaction = self.interaction
         note("Equilibria ...")
         with stages("Equilibria") as watch:
             watch("compiling the equations of motion", 0.0)
             found = self._searched(interaction, self.equations_key, watch, self.rates)
         if (place := most_like_levitation(found.equilibria)) is not None:
-            check_way(self.scene, place.position)
+            plans.check_way(self.scene, place.position)
         return found
 
     def survey_in(self, model: str) -> Survey:
         """All equilibria in the rotor's field alone by a model: without plate and without all that it brings about."""
         models = replace(self.models, model=cast(FieldModel, model), interaction="rigid")
-        return self._searched(self.field(model), f"alone {equations_key(self.scene, models)}", unwatched)
+        return self._searched(self.field(model), f"alone {plans.equations_key(self.scene, models)}", unwatched)
 
     def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
         """All equilibria in a table, from the cache if they were searched for before."""
@@ -272,7 +256,7 @@ class Levitation:
                 break
             way = past[0].laboratory_turn.position
             place = np.array([np.hypot(*way.T[:2]).max(), 0.0, way[:, 2].mean()])
-            self.plate = self.plate_about(place, plate_plan(self.scene, self.models, place))
+            self.plate = self.plate_about(place, plans.plate_plan(self.scene, self.models, place))
             over = with_plate(self.still, self.interaction, found, self.plate, self.rates)
         return over
 
@@ -332,7 +316,7 @@ class Levitation:
             if there is not None:
                 down = self.scene.plate.body.center - plate_depth(self.scene.plate, np.array([time])) * np.eye(3)[2]
                 plate = replace(self.scene.plate, body=moved(self.scene.plate.body, down))
-                check_room(replace(self.scene, plate=plate), there.position, f" at {frequency:g} Hz")
+                plans.check_room(replace(self.scene, plate=plate), there.position, f" at {frequency:g} Hz")
 
     # The plate's currents
 
@@ -346,12 +330,12 @@ class Levitation:
         alone = self.absolute or scene.plate is None or not scene.frequency
         place = self._place(() if alone else self.quiet.without_plate.equilibria)
         if place is not None:
-            check_room(scene, place)
-        plan = plate_plan(scene, self.models, place if self._nearest is None else self._nearest)
+            plans.check_room(scene, place)
+        plan = plans.plate_plan(scene, self.models, place if self._nearest is None else self._nearest)
         if plan.model == "none" or scene.plate is None or place is None:
             return None
         if (far := self._foreseen() if plan.model == "reduced" else None) is not None:
-            plan = far_plan(plan, self.models, far)
+            plan = plans.far_plan(plan, self.models, far)
             if plan.model == "slab":
                 return far
         return self.plate_about(place, plan)
@@ -360,7 +344,7 @@ class Levitation:
         """The plate's currents as planned, for a floater about a place (3,) m that turns with the rotor."""
         assert self.scene.plate is not None
         radius, frequency = self.scene.floater.radius, self.scene.fastest
-        field = sources(self.table), place, radius, frequency
+        field = plans.sources(self.table), place, radius, frequency
         requested = plate_around(self.scene.plate, plan.model, *field, plan.rtol, plan.region)
 
         def make(watch: Watch) -> tuple[tuple[PlateTable, RotorShare], bool]:
@@ -449,7 +433,7 @@ class Levitation:
         after a step of the drive; FlightStopped, which holds what was simulated, where the user stopped it.
         """
         positive("duration", duration)
-        check_drive(self.scene, duration)
+        plans.check_drive(self.scene, duration)
         if duration in self.simulated:
             return self.simulated[duration]
         self._check_drive()
@@ -508,7 +492,7 @@ class Levitation:
             return False
         way = _seen(plate, simulated)
         self._nearest = way[int(np.argmin(plate.body.distance(way)))]
-        if plate_plan(self.scene, self.models, self._nearest).model == "none":
+        if plans.plate_plan(self.scene, self.models, self._nearest).model == "none":
             return False
         note("The floater comes so near to the plate that its currents count; it begins anew with them.")
         del self.plate
@@ -523,7 +507,7 @@ class Levitation:
         try:
             self.wider = self.plate_about(place, plan)
         except AccuracyError:
-            self.wider = self.plate_about(place, replace(plan, rtol=looser(plan.rtol)))
+            self.wider = self.plate_about(place, replace(plan, rtol=plans.looser(plan.rtol)))
 
 
 def _seen(plate: Plate, simulated: Trajectory, most: int | None = None) -> Array:

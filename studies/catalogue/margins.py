@@ -17,7 +17,6 @@ from ...dynamics.equilibria.orbits import ForcedMotion
 from ...geometry.common import Array, ComputationError
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import changed, scene as written_scene
-from ...geometry.scene.floater import Floater
 from ...geometry.scene.making import sphere
 from ..candidates import Search, survey_near
 from ..cli.console import note
@@ -86,16 +85,6 @@ def spreads(configuration: str) -> Array:
     return np.append(TILT_SPREAD, found[1:]) if configuration == "tilt" else found
 
 
-def scene_of(configuration: str, values: Mapping[str, float], frequency: float = 100.0) -> Scene:
-    """The scene of a rotor with all parameters given by name (SI; measure: mm or °), at a frequency in Hz."""
-    floater = Floater(values["diameter"] / 2, values["floater_remanence"], 1.05, values["density"])
-    scene = article.rotor_scene(
-        configuration, values["measure"], frequency, drag=False,
-        edge=values["edge"], remanence=values["rotor_remanence"], permeability=1.0, floater=floater,
-    )  # fmt: skip
-    return replace(scene, gravity=np.array([0.0, 0.0, -values["gravity"]]))
-
-
 def nominal(configuration: str, measure: float, model: FieldModel = "cuboid") -> Nominal:
     """The rotor as it should be, its field by `model`. Raises EquilibriumError where it does not levitate."""
     values = {name: known.nominal for name, known in PARAMETERS.items()} | {"measure": measure}
@@ -123,14 +112,14 @@ def _keyed(configuration: str) -> dict[str, tuple[str, float]]:
     }
 
 
-def _written(configuration: str, values: Mapping[str, float], frequency: float) -> Scene:
-    cube = {"edge_mm": 1e3 * values["edge"], "remanence_T": values["rotor_remanence"]}
+def scene_of(configuration: str, values: Mapping[str, float], frequency: float = 100.0) -> Scene:
+    """The scene of a rotor in vacuum with all parameters given by name (SI; measure: mm or °), at a frequency in Hz."""
+    cube = {"edge_mm": 1e3 * values["edge"], "remanence_T": values["rotor_remanence"], "recoil_permeability": 1.0}
     measure = _keyed(configuration)["measure"][0].removeprefix("rotor.")
-    rotor = {"configuration": configuration, measure: values["measure"], "recoil_permeability": 1.0, **cube}
+    rotor = {"configuration": configuration, measure: values["measure"], **cube}
     size, remanence = 1e3 * values["diameter"], values["floater_remanence"]
     ball = sphere(diameter_mm=size, remanence_T=remanence, density_kg_m3=values["density"])
-    still = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}
-    down = [0.0, 0.0, -values["gravity"]]
+    still, down = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}, [0.0, 0.0, -values["gravity"]]
     return written_scene(frequency_hz=frequency, rotor=rotor, floater=ball, gravity_m_s2=down, drag=still)
 
 
@@ -145,7 +134,7 @@ class Slopes:
 
     @classmethod
     def of(cls, base: Nominal) -> Self:
-        levitation = article.levitation_of(_written(base.configuration, base.values, float(base.grid[1])), base.model)
+        levitation = article.levitation_of(scene_of(base.configuration, base.values, float(base.grid[1])), base.model)
         keys, found, ways = _keyed(base.configuration), np.zeros((2, len(PARAMETERS), len(QUANTITIES))), []
         for k, end in enumerate((base.stable.low, base.stable.high)):
             gradient = Gradient(levitation.elsewhere(frequency=end.parameter))
@@ -330,7 +319,7 @@ def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
     measure, begun, bounds = BEGUN[name]
     key = _keyed(name)["measure"][0]
     values = {known: PARAMETERS[known].nominal for known in PARAMETERS} | {"measure": measure}
-    scene = _written(name, values, begun)
+    scene = scene_of(name, values, begun)
     free = {key: bounds, "rotor.edge_mm": EDGES, "frequency_hz": (min(begun, frequency), max(begun, frequency))}
     search, elements, parts = Search(article.levitation_of(scene, "cuboid"), free), None, []
     for distance in point["distances_mm"]:  # each from where the last one ended

@@ -76,8 +76,8 @@ frequency_hz = 50.0
 def measured_heights() -> tuple[Array, Array]:
     """Times (n,) s and heights (n,) m of the lower face of problem 28's disc."""
     lines = files(__package__).joinpath("team28_height.csv").read_text(encoding="utf-8").splitlines()
-    table = np.loadtxt([line for line in lines if line[:1].isdigit()], delimiter=",")
-    return table[:, 0] * 1e-3, table[:, 1] * 1e-3
+    time, height = 1e-3 * np.loadtxt(lines, delimiter=",", skiprows=2).T
+    return time, height
 
 
 def resting_height(scene: Scene, modes: FloatingModes) -> float:

@@ -339,8 +339,8 @@ def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, gr
 def measured_line() -> tuple[Array, Array]:
     """x (17,) m and measured B_z (17, 4) T."""
     lines = files(__package__).joinpath("team7_line_A1B1.csv").read_text(encoding="utf-8").splitlines()
-    table = np.loadtxt([line for line in lines if line[:1].isdigit()], delimiter=",")
-    return table[:, 0] * 1e-3, table[:, 1:] * 1e-4  # gauss
+    x, *fields = np.loadtxt(lines, delimiter=",", skiprows=3).T
+    return x * 1e-3, np.array(fields).T * 1e-4  # gauss
 
 
 def compute_line(frequency: float, x: Array, mesh: ConductorMesh, order: int = 3) -> Array:

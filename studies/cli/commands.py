@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ...geometry.common import InputError
+from . import options
 from .console import note
 from .options import (
     Answer,
@@ -27,18 +28,6 @@ from .options import (
     SceneFile,
     Spin,
     Workers,
-    check_spin,
-    check_steps,
-    default_scene,
-    frequency_grid,
-    map_extent,
-    new_scene,
-    parse_vary,
-    positive,
-    ramp as parse_ramp,
-    read_points,
-    three_numbers,
-    unknown_study,
 )
 
 if TYPE_CHECKING:
@@ -81,14 +70,14 @@ def run(
     gradient
         Also the derivatives of the equilibria by all numbers of the scene file, gradient.nc.
     """
-    positive("--duration-s", duration_s)
-    check_spin("--spin", spin)
+    options.positive("--duration-s", duration_s)
+    options.check_spin("--spin", spin)
     requested = requested.checked()
     if quick:
         interaction: InteractionModel = "rigid" if requested.interaction == "auto" else requested.interaction
         rtol, plate_rtol = max(requested.rtol, 1e-3), max(requested.plate_rtol, 0.05)
         requested = replace(requested, interaction=interaction, rtol=rtol, plate_rtol=plate_rtol)
-    loaded = _loaded(scene or default_scene())
+    loaded = _loaded(scene or options.default_scene())
     from ...fem.cache import owned
     from ..run import main_job
 
@@ -146,13 +135,13 @@ def field(
 
         return working_point_job(Levitation(_loaded(scene), requested), output.folder)
     if plane is not None:
-        extent = None if extent_mm is None else map_extent(extent_mm)
-        check_steps("--steps", steps)
+        extent = None if extent_mm is None else options.map_extent(extent_mm)
+        options.check_steps("--steps", steps)
         from ..exchange import field_map_job
 
         return field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)
     assert points is not None
-    loaded, places = _loaded(scene), read_points(points)
+    loaded, places = _loaded(scene), options.read_points(points)
     from ..run import field_job
 
     return field_job(loaded, places, requested, output.folder)
@@ -173,7 +162,7 @@ def equilibria(
     gradient
         Also their derivatives by all numbers of the scene file, gradient.nc.
     """
-    check_spin("--spin", spin)
+    options.check_spin("--spin", spin)
     loaded = _loaded(scene)
     from ..run import equilibria_job
 
@@ -206,8 +195,8 @@ def compare(
     plate_rtol
         Relative accuracy of the plate's response.
     """
-    check_spin("--spin", spin)
-    frequencies = None if frequency_hz is None else frequency_grid(frequency_hz)
+    options.check_spin("--spin", spin)
+    frequencies = None if frequency_hz is None else options.frequency_grid(frequency_hz)
     loaded = _loaded(scene)
     from ..compare import compare_job, field_rtol
 
@@ -237,9 +226,9 @@ def simulate(
     resume
         Go on from the checkpoint of the same trajectory in --out, if one is there.
     """
-    step = None if ramp is None else parse_ramp(ramp)
+    step = None if ramp is None else options.ramp(ramp)
     if duration_s is not None:
-        positive("--duration-s", duration_s)
+        options.positive("--duration-s", duration_s)
     loaded = _loaded(scene)
     if step:
         from ...geometry.scene.files import driven
@@ -280,8 +269,8 @@ def plate(
     rtol
         Relative accuracy of the tensor.
     """
-    positive("--rtol", rtol)
-    place = three_numbers("--at", at)
+    options.positive("--rtol", rtol)
+    place = options.three_numbers("--at", at)
     loaded = _loaded(scene)
     from ..run import plate_job
 
@@ -336,8 +325,8 @@ def study(
     if vary:
         if name is None:
             raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")
-        values, place = parse_vary(vary), three_numbers("--at", at)
-        positive("--duration-s", duration_s)
+        values, place = options.parse_vary(vary), options.three_numbers("--at", at)
+        options.positive("--duration-s", duration_s)
         loaded = _loaded(Path(name))
         from ..catalogue.runner import question_job
         from ..question import Question
@@ -350,7 +339,7 @@ def study(
         summaries = {key: entry.summary for key, entry in CATALOGUE.items()}
         return {"studies": summaries}, [f"{k:22} {v}" for k, v in summaries.items()]
     if name not in CATALOGUE:
-        raise unknown_study(name, CATALOGUE)
+        raise options.unknown_study(name, CATALOGUE)
     from ..catalogue.runner import study_job
 
     return study_job(name, quick, engine.checked(), output.folder)
@@ -441,7 +430,7 @@ def new(name: str, file: Path, *, output: Output = Output()) -> Answer:
     file
         Where to write it; an existing file is left alone.
     """
-    path = new_scene(name, file)
+    path = options.new_scene(name, file)
     return {"file": str(path)}, [f"Written: {path}. Next: spinlev run {path}"]
 
 
@@ -491,7 +480,7 @@ def explore(
     """
     if not 0 <= port <= 65535:
         raise InputError(f"Input --port must be between 0 and 65535; instead received {port}.")
-    source = scene or default_scene()
+    source = scene or options.default_scene()
     loaded = _loaded(source)
     from ..page.server import serve
 
