@@ -14,7 +14,7 @@ from ..geometry.common import Array
 from ..geometry.scene.contents import Scene
 from .cli.console import note
 from .cli.options import Answer
-from .figures.style import PALETTE, legend_below, panels, save_figures, styled
+from .figures.style import PALETTE, drawn, panels, save_figures
 from .result import Columns, columns, variable, write_dataset
 
 COLUMNS: Columns = {
@@ -91,7 +91,7 @@ def coils_job(scene: Scene, duration: float, rtol: float, out: Path) -> Answer:
     return values, [*lines, f"Trajectory in {path}, figure in {out / 'trajectory.png'}"]
 
 
-@styled
+@drawn
 def coils_figure(result: xr.Dataset) -> Figure:
     """Height and heat against time."""
     figure, ((height, heat),) = panels(1, 2, 2.6)
@@ -106,5 +106,4 @@ def coils_figure(result: xr.Dataset) -> Figure:
         height.set_ylabel("place of the centre (mm)")
     heat.plot(time, result["heat"], color=PALETTE[1], lw=0.8)
     heat.set(xlabel="time (s)", ylabel="Joule heat (J)")
-    legend_below(figure)
     return figure

@@ -24,7 +24,7 @@ from ..geometry.scene.files import scene_text
 from ..geometry.solids import Part
 from .cli.console import aligned, note, to_json
 from .cli.options import Answer, FieldModel, Models
-from .figures.style import COLORS, NAMES, PALETTE, legend_below, panels, save_figures, styled
+from .figures.style import COLORS, NAMES, PALETTE, drawn, panels, save_figures
 from .levitation import Levitation
 from .plan import PlatePlan, sources
 from .result import variable, write_dataset
@@ -250,7 +250,7 @@ def _cells(row: Compared) -> tuple[str, ...]:
     )
 
 
-@styled
+@drawn
 def compare_figure(result: xr.Dataset) -> Figure:
     """Levitation distance of every model by frequency, and how far each is from the best."""
     figure, ((left, right),) = panels(1, 2, 2.9)
@@ -272,7 +272,6 @@ def compare_figure(result: xr.Dataset) -> Figure:
         panel.set_xlabel("rotor frequency (Hz)")
     left.set_ylabel("levitation distance (mm)")
     right.set_ylabel(f"difference from {names[best['model'].item()]} (mm)")
-    legend_below(figure, left)
     return figure
 
 

@@ -26,7 +26,7 @@ from ..geometry.scene.files import changed, load_scene, scene_numbers, scene_tex
 from .candidates import OF_SCENE, Candidate, Limits, Search, survey_near
 from .cli.console import note, to_json
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
-from .figures.style import PALETTE, legend_below, panels, plot_branch, save_figures, styled
+from .figures.style import PALETTE, drawn, panels, plot_branch, save_figures
 from .gradient import Gradient
 from .levitation import Levitation
 from .nearby_scenes import unknown_over_plate
@@ -470,7 +470,7 @@ def _lines(result: xr.Dataset) -> list[str]:
     return lines
 
 
-@styled
+@drawn
 def design_figure(result: xr.Dataset) -> Figure:
     """Free numbers within their bounds and the branch of equilibria before and after; of two goals their curve."""
     figure, ((left, right),) = panels(1, 2, 2.9)
@@ -488,7 +488,6 @@ def design_figure(result: xr.Dataset) -> Figure:
             part = (result["number"].sel(key=key) - ends[0]) / (ends[1] - ends[0])
             right.plot(result["value"].sel(measure=other), part, "o-", color=color, label=str(key))
         right.set(xlabel=f"{MEASURES[other][1]} ({MEASURES[other][0]})", ylabel="number, from its least to its most")
-        legend_below(figure, right)
         return figure
     after = (result["number"].isel(point=0).values - low) / (high - low)
     left.hlines(places, 0, 1, color="0.85", lw=4)
@@ -505,7 +504,6 @@ def design_figure(result: xr.Dataset) -> Figure:
         values = result["first_value"] if curve == 0 else result["value"].isel(point=0)
         right.plot(values.sel(measure="frequency_hz"), values.sel(measure="distance_mm"), "o", color=color, ms=4)
     right.set(xlabel="rotor frequency (Hz)", ylabel="levitation distance (mm)")
-    legend_below(figure, left)
     return figure
 
 

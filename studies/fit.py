@@ -17,7 +17,7 @@ from ..geometry.scene.files import changed, scene_numbers
 from .candidates import Candidate, Limits, Search
 from .cli.options import FieldModel, Models, PlateModel, Requested, documented
 from .design import checked_free
-from .figures.style import PALETTE, legend_below, panels, styled
+from .figures.style import PALETTE, drawn, panels
 from .levitation import Levitation
 from .plan import SceneLike
 from .result import label_of_key, variable
@@ -313,7 +313,7 @@ def fit(
     )  # fmt: skip
 
 
-@styled
+@drawn
 def fit_figure(result: xr.Dataset) -> Figure:
     """What was measured, with its standard deviations, and what is computed, one panel a measure."""
     names, rows = result["measure"].values.tolist(), np.arange(result.sizes["row"])
@@ -332,5 +332,4 @@ def fit_figure(result: xr.Dataset) -> Figure:
         other = ("s⁻¹", f"decay of the {mode} mode") if name.endswith(DECAY) else ("Hz", f"{mode} mode")
         unit, said = MEASURABLE.get(name, other)
         panel.set(xlabel=label, ylabel=f"{said} ({unit})")
-    legend_below(figure, axes[0][0])
     return figure

@@ -14,7 +14,7 @@ from ...dynamics.continuation.frequencies import kicked, levitating_branch
 from ...dynamics.flights.flight import simulate
 from ...dynamics.motion.state import polar_angle
 from ...geometry.common import Array
-from ..figures.style import DASHES, NAMES, PALETTE, legend_below, panels, plain_log, plot_branch, styled
+from ..figures.style import DASHES, NAMES, PALETTE, drawn, panels, plain_log, plot_branch
 from ..levitation import Levitation
 from ..plan import sources
 from ..result import Columns, variable
@@ -65,7 +65,7 @@ def deviations(part: xr.Dataset) -> dict[str, Any]:
 COMPONENTS = {"off_axis": r"off-axis field $B_\perp$ (mT)", "on_axis": r"on-axis field $B_z$ (mT)"}
 
 
-@showing.drawn
+@drawn
 def components_figure(result: xr.Dataset) -> Figure:
     """Both components of the field below the rotor against the parameter of each configuration."""
     styles = {"fem": DASHES["fem"], "dipole": DASHES["dipole"], "article": "+"}
@@ -86,7 +86,7 @@ def components_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@showing.drawn
+@drawn
 def differences_figure(result: xr.Dataset) -> Figure:
     """How far the simpler models are from the finite elements."""
     figure, rows = showing.configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
@@ -215,7 +215,7 @@ POINTS = {
 }
 
 
-@showing.drawn
+@drawn
 def parts_figure(result: xr.Dataset) -> Figure:
     """Attraction, repulsion and net force at one frequency by each way of computing, and how far these are apart."""
     figure, ((left, right),) = panels(1, 2, 3.9)
@@ -239,7 +239,7 @@ def parts_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@showing.drawn
+@drawn
 def net_figure(result: xr.Dataset) -> Figure:
     """The net force at every frequency, and the polar angle that goes with it."""
     figure, ((net, angle),) = panels(1, 2, 3.2)
@@ -342,7 +342,7 @@ def _predicted(simulated: xr.Dataset) -> float:
     return 1e3 * float(side_radius(-float(simulated["flight_z"].mean()), SIMULATED_HZ))
 
 
-@styled
+@drawn
 def orbit_figure(result: xr.Dataset) -> Figure:
     """The orbit of rotor and floater seen from above, and their coordinates, in one trajectory."""
     figure, ((above, *others),) = panels(1, 3, 2.9)
@@ -362,11 +362,10 @@ def orbit_figure(result: xr.Dataset) -> Figure:
         for sign in (-1, 1):
             panel.axhline(sign * radius, color="k", ls=":", lw=1.6)
         panel.set(xlabel="time (ms)", ylabel=f"{name} (mm)")
-    legend_below(figure, above)
     return figure
 
 
-@showing.drawn
+@drawn
 def radius_figure(result: xr.Dataset) -> Figure:
     """The radius of the side mode against frequency for every rotor, and the article's formula."""
     figure, rotors = showing.rotor_panels(result, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")

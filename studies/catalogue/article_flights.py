@@ -18,13 +18,13 @@ from ...dynamics.motion.state import Scales, polar_angle
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..figures.style import PALETTE, plot_branch
+from ..figures.style import PALETTE, drawn, plot_branch
 from ..levitation import Levitation
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
 from . import article
 from .article import analytic_distance, balanced
-from .showing import by_configuration, by_rotor, drawn, explain, rotor_panels, small_multiples, span, text_table
+from .showing import by_configuration, by_rotor, explain, rotor_panels, small_multiples, span, text_table
 
 # Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.
 #

@@ -27,11 +27,11 @@ from ...fem.plate.tables import PlateAround
 from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Lowering, Scene
-from ..figures.style import PALETTE, colour_bar, panels, styled, titled
+from ..figures.style import PALETTE, colour_bar, drawn, panels, styled, titled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
 from . import article
-from .showing import by_rotor, configuration_panels, drawn, text_table
+from .showing import by_rotor, configuration_panels, text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
 """From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m."""

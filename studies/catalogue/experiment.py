@@ -20,7 +20,7 @@ from scipy.special import logsumexp, ndtri
 from scipy.stats import qmc
 
 from ...geometry.common import Array
-from ..figures.style import PALETTE, legend_below, panels, styled
+from ..figures.style import PALETTE, drawn, panels, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .experiment_design import design_row
@@ -45,7 +45,7 @@ from .experiment_model import (
     prior_values,
     quantile,
 )
-from .showing import drawn, records, text_table, uncertain
+from .showing import records, text_table, uncertain
 
 KEPT = 1000  # Draws of the posterior that are kept
 TOGETHER = 500  # Draws that are evaluated in one call
@@ -351,7 +351,7 @@ def unknowns_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@styled
+@drawn
 def facts_figure(result: xr.Dataset) -> Figure:
     """Each fact's probability beforehand, given the others, and in the fit; and which facts go together."""
     weighed, gain = facts_weighed(result.isel(variant=0))
@@ -368,7 +368,6 @@ def facts_figure(result: xr.Dataset) -> Figure:
     right.set_xticks(places, names, rotation=90)
     right.grid(False)
     figure.colorbar(shades, ax=right, shrink=0.6, label="logarithm of the gain")
-    legend_below(figure, left)
     return figure
 
 

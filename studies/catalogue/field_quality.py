@@ -24,11 +24,11 @@ from ...geometry.magnets import Magnet, horizontal, tilt, vertical
 from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.shapes import Box, Cylinder, ring, rotation_matrix
 from ..cli.console import progress
-from ..figures.style import PALETTE
+from ..figures.style import PALETTE, drawn
 from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE
-from .showing import drawn, explain, last_crossing, small_multiples, text_table
+from .showing import explain, last_crossing, small_multiples, text_table
 
 # Where the point dipole, and models between it and the field of the finite magnets, can be trusted.
 #

@@ -23,7 +23,7 @@ from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import load_scene
 from ...geometry.scene.floater import Floater
 from ..cli.options import Models, shipped_scene
-from ..figures.style import PALETTE, panels
+from ..figures.style import PALETTE, drawn, panels
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, recorded, study_of_one
@@ -117,7 +117,7 @@ PAIR = {"article": ("--", PALETTE[5], "point dipoles"), "mutual": ("-", PALETTE[
 """Models that are compared in figures: line, colour, name."""
 
 
-@showing.drawn
+@drawn
 def distances_figure(result: xr.Dataset) -> Figure:
     """The levitation distance by point dipoles and in the field of the finite magnets."""
     figure, rotors = showing.rotor_panels(result, 3.0, "frequency of the rotor (Hz)", "levitation distance (mm)")
@@ -131,7 +131,7 @@ def distances_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@showing.drawn
+@drawn
 def causes_figure(result: xr.Dataset) -> Figure:
     """By how much each cause changes the distance: mean and range over the frequencies."""
     figure, rows = showing.configuration_panels(result, 2.8, ylabel="change of the distance (mm)")
@@ -150,7 +150,7 @@ def causes_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@showing.drawn
+@drawn
 def ranges_figure(result: xr.Dataset) -> Figure:
     """The frequencies of stable levitation by point dipoles and in the field of the finite magnets."""
     figure, rows = showing.configuration_panels(result, 2.8, ylabel="stable frequencies (Hz)")
@@ -331,7 +331,7 @@ LABELS = {
 }
 
 
-@showing.drawn
+@drawn
 def floater_figure(result: xr.Dataset) -> Figure:
     """What the rigid dipole misses against distance: share of force and torque; axial force by its two causes."""
     figure, ((left, right),) = panels(1, 2, 3.3)

@@ -16,7 +16,7 @@ from ...dynamics.continuation.frequencies import levitating_ranges
 from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import Box, Cylinder
-from ..figures.style import PALETTE
+from ..figures.style import PALETTE, drawn
 from ..result import Columns
 from ..study import Point, Study, recorded
 from . import article, showing
@@ -69,7 +69,7 @@ def limits(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, (*row, *of), {})
 
 
-@showing.drawn
+@drawn
 def shape_figure(result: xr.Dataset) -> Figure:
     """Range of stable frequencies against the aspect of the floater, one panel for each rotor."""
     rotors = dict(showing.by_rotor(result))

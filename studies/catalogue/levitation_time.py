@@ -15,11 +15,11 @@ from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...dynamics.motion.state import Scales
 from ...geometry.common import MAGNET_CONDUCTIVITY
 from ...geometry.scene.contents import Drag, Scene
-from ..figures.style import PALETTE, styled
+from ..figures.style import PALETTE, drawn, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .article import FLOATER, PERMEABILITY, REMANENCE, levitation_of, losses, rotor_label, rotor_scene
-from .showing import drawn, small_multiples, span, text_table
+from .showing import small_multiples, span, text_table
 
 
 class DriftCase(NamedTuple):

@@ -22,7 +22,7 @@ from ..candidates import Search, survey_near
 from ..cli.console import note
 from ..cli.options import FieldModel
 from ..design import ALWAYS, GOALS, optimised
-from ..figures.style import PALETTE, legend_below, panels, plain_log
+from ..figures.style import PALETTE, drawn, panels, plain_log
 from ..gradient import Gradient, equilibrium_at
 from ..result import Columns, variable
 from ..study import Point, Study, cases_with, each_case, recorded
@@ -221,7 +221,7 @@ def band(part: xr.Dataset, quantity: str) -> Array:
     return np.asarray(SCALES[quantity][0] * np.nanpercentile(values, [50, *PERCENTILES], axis=-1))
 
 
-@showing.drawn
+@drawn
 def _contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figure:
     """What one standard deviation of each parameter does to distance or lowest frequency; with errors."""
     figure, rotors = showing.rotor_panels(result, 3.6, words, "", sharex=True)
@@ -237,7 +237,7 @@ def _contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figu
     return figure
 
 
-@showing.drawn
+@drawn
 def _bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> Figure:
     """Quantities of the rotors within all tolerances together."""
     figure, rows = showing.configuration_panels(result, 2.6, ylabel=words)
@@ -345,7 +345,7 @@ def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
     return xr.concat(parts, "case")
 
 
-@showing.drawn
+@drawn
 def margin_figure(result: xr.Dataset) -> Figure:
     """Largest margin, and the edge that has it, against the wanted distance for every configuration and frequency."""
     figure, (row,) = panels(1, 2, 2.6)
@@ -359,7 +359,6 @@ def margin_figure(result: xr.Dataset) -> Figure:
         panel.set(xlabel="wanted distance (mm)", ylabel=words)
     row[0].yaxis.set_major_formatter(PercentFormatter(1.0))
     row[0].set_ylim(0, None)
-    legend_below(figure, row[0])
     return figure
 
 

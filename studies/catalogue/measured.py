@@ -31,10 +31,9 @@ from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Coil, Plate, Scene
 from ...geometry.scene.files import parse_scene
 from ...geometry.shapes import Box, Sphere, ring
-from ..figures.style import PALETTE, panels
+from ..figures.style import PALETTE, drawn, panels
 from ..result import Columns, columns, variable
 from ..study import Point, Study
-from . import showing
 from .plates import FREQUENCIES, compute_line, measured_line, team7_mesh
 
 DURATION, GRAVITY = 1.72, 9.81
@@ -453,7 +452,7 @@ def _measured_lines(result: xr.Dataset) -> list[str]:
     return lines
 
 
-@showing.drawn
+@drawn
 def measured_figure(result: xr.Dataset) -> Figure:
     """Problem 28's height, and every experiment's deviation with the errors of computation and measurement."""
     figure, ((left, right),) = panels(1, 2, 3.0)

@@ -22,7 +22,7 @@ from ...geometry.meshes.plate import Block, ConductorMesh, graded_partition, hex
 from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box, rotation_matrix
 from ..cli.options import PlateModel
-from ..figures.style import PALETTE, panels, plain_log
+from ..figures.style import PALETTE, drawn, panels, plain_log
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with, each_case, study_of_one
@@ -174,7 +174,7 @@ def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
     }
 
 
-@showing.drawn
+@drawn
 def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
     """Damping rate of each mode against what is varied; crosses: it grows; bars: error of the plate's table."""
     titles = {SWEEPS[sweep][0]: sweep for sweep in sweeps}
@@ -206,7 +206,7 @@ def _damped(axes: Axes, x: ArrayLike, growth: xr.DataArray, error: ArrayLike, st
         showing.explain(axes, {"growth rate (unstable)": "x"}, ms=5)
 
 
-@showing.drawn
+@drawn
 def rotors_figure(result: xr.Dataset) -> Figure:
     """Damping rate of the least stable mode of every rotor of the article, plate below and beside, face at 18 mm."""
     figure, ((axes,),) = panels(1, 1, 3.4)
@@ -221,7 +221,7 @@ def rotors_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@showing.drawn
+@drawn
 def means_figure(result: xr.Dataset) -> Figure:
     """What the plate does on average: it moves the floater, pushes it, brakes it and is warmed."""
     titles = {title: (name, label) for name, (title, label) in MEANS.items()}
@@ -403,7 +403,7 @@ def team7_lines(result: xr.Dataset) -> list[str]:
     return lines
 
 
-@showing.drawn
+@drawn
 def team7_figure(result: xr.Dataset) -> Figure:
     """The four curves with what is measured, and their deviation."""
     figure, ((left, right),) = panels(1, 2, 3.2)

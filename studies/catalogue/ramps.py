@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ...dynamics.continuation.frequencies import at_frequency, kicked
 from ...dynamics.flights.flight import simulate
 from ...geometry.scene.contents import DriveStep
-from ..figures.style import PALETTE
+from ..figures.style import PALETTE, drawn
 from ..result import Columns
 from ..study import Point, Study, each_case, recorded
 from ..words import ENDS
@@ -53,7 +53,7 @@ def ramps(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, found, {"way": list(WAYS), "rate": ("rate", list(RATES), {"units": "Hz/s"})})
 
 
-@showing.drawn
+@drawn
 def ramps_figure(result: xr.Dataset) -> Figure:
     """The stable range of each rotor as a bar, and where its floater is lost on the way down and up."""
     figure, rows = showing.configuration_panels(result, 3.4, ylabel="frequency of the rotor (Hz)")

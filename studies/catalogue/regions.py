@@ -17,7 +17,7 @@ from ...geometry.magnets import Conductor
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box
 from ..cli.console import note
-from ..figures.style import COLORS, NAMES, PALETTE
+from ..figures.style import COLORS, NAMES, PALETTE, drawn
 from ..levitation import Levitation
 from ..result import Columns
 from ..study import Point, Study, cases_with, each_case, recorded
@@ -139,7 +139,7 @@ MARKS = {
 }
 
 
-@showing.drawn
+@drawn
 def map_figure(result: xr.Dataset) -> Figure:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
     figure, rows = showing.configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)")
@@ -271,7 +271,7 @@ def upper_limit(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, found, {})
 
 
-@showing.drawn
+@drawn
 def limit_figure(result: xr.Dataset) -> Figure:
     """Levitation time against frequency of each rotor, one line for each variant."""
     rotors, words = dict(showing.by_rotor(result)), ("frequency (Hz)", "levitation time (s)")

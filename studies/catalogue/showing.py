@@ -1,8 +1,7 @@
 """What figures and reports of several studies share: panels, legends, colours of rotors; tables and numbers."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import wraps
-from typing import Any, ParamSpec, SupportsFloat, TypeVar
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, SupportsFloat, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -15,27 +14,11 @@ from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
 from ..cli.console import aligned
-from ..figures.style import PALETTE, legend_below, panels, styled, titled
+from ..figures.style import PALETTE, panels, titled
 from ..study import cases_with, each_case
 from .article import CONFIGURATIONS, label_of, rotor_label
 
 TITLES = {"horizontal": "displaced cube", "vertical": "two cubes", "tilt": "tilted cube"}
-Arguments = ParamSpec("Arguments")
-
-
-def drawn(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
-    """Let a function draw in the project's style; all that has a name is explained below the panels."""
-
-    @styled
-    @wraps(draw)
-    def inside(*arguments: Arguments.args, **options: Arguments.kwargs) -> Figure:
-        figure = draw(*arguments, **options)
-        legend_below(figure)
-        return figure
-
-    return inside
-
-
 Shown = TypeVar("Shown")
 
 

@@ -32,12 +32,12 @@ from ...geometry.common import Array
 from ...geometry.magnets import Magnet, horizontal
 from ...geometry.meshes.magnets import MeshSettings, mesh_magnets
 from ..cli.console import note
-from ..figures.style import PALETTE
+from ..figures.style import PALETTE, drawn
 from ..processes import safe_path
 from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, REMANENCE
-from .showing import drawn, explain, small_multiples, text_table
+from .showing import explain, small_multiples, text_table
 
 Magnets = tuple[Magnet, ...]
 Build = Callable[[Any, Magnets], tuple[FieldTable, int]]  # Makes a table, and says its number of unknowns

@@ -18,7 +18,7 @@ from ...dynamics.motion.state import polar_angle
 from ...geometry.common import Array
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ...geometry.solids import Solid
-from .style import COLORS, DASHES, NAMES, PALETTE, legend_below, panels, plain_log, plot_branch, styled, titled
+from .style import COLORS, DASHES, NAMES, PALETTE, drawn, panels, plain_log, plot_branch, styled, titled
 from .view import near_plate, triangles
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ MARGIN = 0.3  # Of the range of distances along a drive that is shown, above and
 MOST = 0.8  # Of its way is shown where it is far from the equilibria, so that a fall at its end is not
 
 
-@styled
+@drawn
 def scene_figure(scene: Scene) -> Figure:
     """A scene to scale, from the side and from above, as it stands at t = 0; nothing is computed for it."""
     from matplotlib.patches import Polygon
@@ -86,11 +86,10 @@ def scene_figure(scene: Scene) -> Figure:
         panel.set_xlim(-1.05 * reach, 1.05 * reach)
     top.set_ylim(-1.05 * reach, 1.05 * reach)
     side.axvline(0.0, color="0.3", lw=0.8, ls="-.", label="axis of rotation")
-    legend_below(figure, side)
     return figure
 
 
-@styled
+@drawn
 def field_figure(result: xr.Dataset) -> Figure:
     """The field's two components on the axis below the rotor, and how far the models are from the best of them."""
     figure, ((left, right),) = panels(1, 2, 3.2)
@@ -114,7 +113,6 @@ def field_figure(result: xr.Dataset) -> Figure:
     left.set(xlabel=DISTANCE, ylabel=f"|B component| (mT), {NAMES[reference]}")
     plain_log(left.yaxis)
     right.set(xlabel=DISTANCE, ylabel=f"|ΔB| / |B| against {NAMES[reference]}")
-    legend_below(figure)
     return figure
 
 
@@ -126,7 +124,7 @@ def _kinds(result: xr.Dataset, prefix: str = "") -> xr.DataArray:
     return stable.copy(data=kinds)
 
 
-@styled
+@drawn
 def force_figure(result: xr.Dataset) -> Figure:
     """Axial force against distance with its equilibria marked, for every model that has them; a zoom on the first."""
     figure, ((axes, near),) = panels(1, 2, 3.6)
@@ -165,11 +163,10 @@ def force_figure(result: xr.Dataset) -> Figure:
         near.locator_params(nbins=5)
     else:
         near.set_axis_off()
-    legend_below(figure, axes)
     return figure
 
 
-@styled
+@drawn
 def trajectory_figure(result: xr.Dataset) -> Figure:
     """Distance and polar angle of a trajectory as envelopes, and a closer look at its beginning, or its end if lost."""
     figure, ((far, look), (tilt, above)) = panels(2, 2, 2.4)
@@ -214,7 +211,6 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     above.set(xlabel=f"x (mm), {frame}", ylabel="y (mm)", aspect="equal", adjustable="datalim")
     for panel in (far, look, tilt, above):
         panel.locator_params(axis="x", nbins=5)
-    legend_below(figure)
     return figure
 
 
@@ -256,7 +252,7 @@ def working_point_figure(found: xr.Dataset) -> Figure:
     return figure
 
 
-@styled
+@drawn
 def modes_figure(result: xr.Dataset) -> Figure:
     """Rate and frequency of every normal mode; open where it decays, filled where it grows."""
     figure, ((axes,),) = panels(1, 1, 3.4)
@@ -276,7 +272,6 @@ def modes_figure(result: xr.Dataset) -> Figure:
     axes.plot([], [], "o", color="0.3", label="filled: grows")
     axes.set(yscale="log", xlabel="frequency, rotor's frame (Hz)", ylabel="rate of decay or growth (s⁻¹)")
     axes.margins(0.08)
-    legend_below(figure)
     return figure
 
 
@@ -287,7 +282,7 @@ def drawable(result: xr.Dataset) -> bool:
     return family <= FAMILY or (len(others) == 1 and {result[k].dtype.kind for k in (along, *others)} <= set("iuf"))
 
 
-@styled
+@drawn
 def question_figure(result: xr.Dataset) -> Figure:
     """Curves over the number with most values, one for each combination of the others, or maps where they are many.
 
@@ -316,7 +311,6 @@ def question_figure(result: xr.Dataset) -> Figure:
             axes[0].plot([], [], style, color="0.4", lw=1.0, label=f"{words}{plate}")
     if "stable" in shown and len(members) <= FAMILY:
         axes[0].plot([], [], "o--", ms=3, color="0.3", mfc="white", label="unstable")
-    legend_below(figure)
     return figure
 
 
@@ -452,7 +446,7 @@ def _beside_lines(result: xr.Dataset) -> list[str]:
     return [*lines, f"Stable levitation by the point dipole, same conditions{plate}: at {lasts} points."]
 
 
-@styled
+@drawn
 def drive_figure(result: xr.Dataset) -> Figure:
     """Of a drive distance against frequency, smallest to largest, over the equilibria; the motor's work in time."""
     figure, ((along, work),) = panels(1, 2, 3.0)
@@ -484,5 +478,4 @@ def drive_figure(result: xr.Dataset) -> Figure:
     along.set_xlim(frequency.min() - 0.1 * span, frequency.max() + 0.1 * span)
     work.plot(time, 1e3 * result["motor_work"], color=PALETTE[2], lw=0.6, label="work of the motor")
     work.set(xlabel="time (s)", ylabel="work of the motor (mJ)")
-    legend_below(figure)
     return figure

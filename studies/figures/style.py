@@ -92,6 +92,18 @@ def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
     return inside
 
 
+def drawn(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
+    """Let a function draw in the project's style; all that has a name is explained below the panels."""
+
+    @wraps(draw)
+    def inside(*arguments: Arguments.args, **options: Arguments.kwargs) -> Figure:
+        figure = draw(*arguments, **options)
+        legend_below(figure)
+        return figure
+
+    return styled(inside)
+
+
 def titled(panel: Axes, words: str) -> None:
     """Add words to the letter of a panel."""
     panel.set_title(f"{panel.get_title('left')} {words}".strip())
@@ -158,15 +170,11 @@ def plain_log(axis: Any, ticks: Sequence[float] = ()) -> None:
     axis.set_major_formatter("{x:g}")
 
 
-def legend_below(figure: Figure, *labelled: Any) -> None:
-    """One legend below all panels for the axes `labelled`, or all, in as many columns as fit, up to six.
-
-    The figure becomes higher by its height.
-    """
+def legend_below(figure: Figure) -> None:
+    """One legend below all panels, in as many columns as fit, up to six; the figure becomes higher by its height."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    named = labelled or figure.axes
-    entries = {n: h for axes in named for h, n in zip(*axes.get_legend_handles_labels(), strict=True)}
+    entries = {n: h for axes in figure.axes for h, n in zip(*axes.get_legend_handles_labels(), strict=True)}
     canvas: Any = FigureCanvasAgg(figure)
     for columns in range(min(len(entries), 6), 0, -1):
         legend = figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns)
