@@ -167,10 +167,10 @@ def _of_shape(square: Value, sphericity: float) -> Value:
 
 
 FLOATER_SHAPE = "the floater's shape"
-HEIGHTS = np.array([0.45, 0.78, 0.9])  # Of the dipoles off the centre, in half heights of the floater
+HEIGHTS = np.array([0.3, 0.6, 0.9])  # Of the dipoles off the centre, in half heights of the floater
 # Of the radius, in place of the half height of a flatter floater, whose dipoles would cancel: those of 16 × 1 mm were
 # 5e7 times what they are together, and energy was kept to 1e-6.
-REACH = 0.5
+REACH = 0.55
 
 
 @dataclass(frozen=True, eq=False)
