@@ -35,7 +35,7 @@ from ..motion.events import (
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory
 from ..motion.state import DRIVEN, STEADY, Parameter, State, Vector
 from .flight import LEFT, MOST_SAMPLES, Course, Flight
-from .trajectory import DURATION, IntegrationError, Recorder, Trajectory
+from .trajectory import DIVISIONS, DURATION, PARTS, IntegrationError, Recorder, Trajectory
 
 BATCH = 8  # Measured: a trajectory in a batch of 8 takes a quarter of the time of one alone, of 4 a half, of 16 a third
 TOGETHER = 200  # Steps between two looks for trajectories that have ended; a hundred are about 16 turns
@@ -47,7 +47,7 @@ Begun = tuple[State, Array | None]  # starts, and their offsets from an equilibr
 class _Passenger(Course):
     """A trajectory on a slot for balls of one kind, free of the plate; each leg of its drive is one for itself."""
 
-    over = False
+    over = watched = False  # whether it is; whether its samples are looked at for contact
     end = 0.0  # Scaled time at which "duration" interrupts it
 
     def __init__(self, course: Course, left: bool = False) -> None:
@@ -94,15 +94,23 @@ class _Passenger(Course):
 
 
 class _Launch(_Passenger):
-    """A launch over a plate's currents; each leg of the plate's way is integrated for itself, too."""
+    """A launch over a plate's currents; each leg of the plate's way is integrated for itself, too.
+
+    Of a floater that is no sphere samples alone tell of contact with its surface.
+    """
 
     def __init__(self, course: Course, left: bool) -> None:
         super().__init__(course, left)
         self.ended_by = CONTACT
+        if not self.flight.scene.floater.is_sphere:
+            self.recorder, self.watched = Recorder(np.zeros(0), self.flight.interval(self.duration), 1), True
 
     @property
     def legs(self) -> Iterator[Leg]:
         return iter(motion_legs(self.flight.scene, self.duration))
+
+    def record(self, times: Array, states: Array) -> None:
+        """Nothing: it is not of interest where it was."""
 
     def follow(self, meaning: str) -> bool:
         """Beyond the table it goes on; at the end of a leg the next one begins."""
@@ -150,24 +158,28 @@ class SimdBatch:
         while active:
             recorded = any(one.recorder for one in active.values())
             found, _ = integrator.propagate_until(ends, max_steps=TOGETHER, c_output=recorded)
-            if recorded:
-                self._record(active, ends, found)
+            touched = self._record(active, ends, found) if recorded else {}
             for slot, (outcome, _, _, steps) in enumerate(integrator.propagate_res):
                 if slot not in active:
                     continue
                 one = active[slot]
                 one.steps += int(steps)
-                one.time, one.state = (float(integrator.time[slot]), 0.0), one.state.copy()
-                one.state[: self._count] = integrator.state[:, slot]
-                if outcome in (hy.taylor_outcome.success, hy.taylor_outcome.step_limit):
+                time, state = touched.get(slot, (float(integrator.time[slot]), integrator.state[:, slot]))
+                one.time, one.state = (time, 0.0), one.state.copy()
+                one.state[: self._count] = state
+                if slot in touched:
+                    meaning = CONTACT
+                elif outcome in (hy.taylor_outcome.success, hy.taylor_outcome.step_limit):
                     continue
-                if outcome == hy.taylor_outcome.err_nf_state:
+                elif outcome == hy.taylor_outcome.err_nf_state:
                     raise IntegrationError(
                         f"A floater's state became infinite at t = {one.seconds:.6g} s: it began in a magnet, or the "
                         "plate's table is too small for this start."
                     )
-                timed = outcome == hy.taylor_outcome.time_limit
-                meaning = DURATION if timed else self._meanings[-outcome.value - 1]
+                elif outcome == hy.taylor_outcome.time_limit:
+                    meaning = DURATION
+                else:
+                    meaning = self._meanings[-outcome.value - 1]
                 if one.follow(meaning):
                     ends[slot] = one.end
                     self._put(slot, one, meaning == LEFT)  # else what it has crossed must not count again
@@ -194,20 +206,32 @@ class SimdBatch:
         if anew:
             self._integrator.reset_cooldowns(slot)
 
-    def _record(self, active: Mapping[int, _Passenger], ends: Array, found: Any) -> None:
+    def _record(self, active: Mapping[int, _Passenger], ends: Array, found: Any) -> dict[int, tuple[float, Array]]:
+        """Have samples recorded; scaled time and state of those watched that touch something, by their slots."""
         now, due = self._integrator.time, dict[int, Array]()
         for slot, one in active.items():
             if one.recorder:
                 due[slot] = one.recorder.due(one.time[0], float(now[slot]), float(ends[slot]))
         if not (most := max(len(times) for times in due.values())):
-            return
+            return {}
         grid = np.tile(now, (most, 1))
         for slot, times in due.items():
             grid[: len(times), slot] = times
-        states = found(grid)
+        states, touched = found(grid), dict[int, tuple[float, Array]]()
         for slot, times in due.items():
+            one, own = active[slot], states[: len(times), :, slot]
             if len(times):
-                active[slot].record(times, states[: len(times), :, slot])
+                one.record(times, own)
+            if len(times) and one.watched and (first := one.touching(times, own)) is not None:
+                span = np.append(one.time[0], times)[first : first + 2]
+                for _ in range(DIVISIONS):
+                    grid = np.tile(now, (PARTS + 1, 1))
+                    grid[:, slot] = np.linspace(span[0], span[1], PARTS + 1)
+                    own = found(grid)[:, :, slot]
+                    first = one.touching(grid[:, slot], own) or PARTS
+                    span = grid[first - 1 : first + 1, slot]
+                touched[slot] = float(span[-1]), own[first]
+        return touched
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,11 +287,8 @@ def ensemble(
     of a body that is not round.
     """
     _check(scene, starts, duration)
-    unit = starts.moment / np.linalg.norm(starts.moment, axis=1)[:, None]
-    starts = replace(starts, moment=unit)
-    if not scene.floater.round and starts.axes is None:
-        starts = replace(starts, axes=np.array([scene.floater.axes(moment) for moment in unit]))
-    pieces = [slice(first, first + together) for first in range(0, len(unit), together)]
+    starts = _whole(scene, starts)
+    pieces = [slice(first, first + together) for first in range(0, len(starts.moment), together)]
     given = [(starts[piece], None if offset is None else offset[piece]) for piece in pieces]
     return Endings.joined(list(mapped(partial(_ended, scene, table, duration), given)))
 
@@ -279,6 +300,15 @@ def _check(scene: Scene, starts: State, duration: float) -> None:
         raise InputError("Input starts must have one state at least; instead received none.")
     if scene.moving:
         raise InputError("Input drive must have no center_mm and no axis in many trajectories at once; instead it has.")
+
+
+def _whole(scene: Scene, starts: State) -> State:
+    """Starts (n, 3) with unit moments and, of a body that is not round, with axes."""
+    unit = starts.moment / np.linalg.norm(starts.moment, axis=1)[:, None]
+    starts = replace(starts, moment=unit)
+    if scene.floater.round or starts.axes is not None:
+        return starts
+    return replace(starts, axes=np.array([scene.floater.axes(moment) for moment in unit]))
 
 
 def _ended(scene: Scene, table: FieldTable, duration: float, given: Begun) -> Endings:
@@ -363,9 +393,10 @@ def launched(
     """Simulate a scene's floater over its plate from many starts, for `duration` (s) each, or until contact or loss.
 
     Contact with the rotor is that of `flight_events`; where a step misses an edge, contact is noticed at the latest
-    where the sphere meets the largest one inside the magnet.  The plate is an obstacle without edges.  The field is the
-    table's own expressions, so that a short one (dipoles, closed forms) is fast. Raises InputError: `duration` is not
-    positive, there is no start, the plate does not lie flat, or the floater is no sphere, of which this is contact.
+    where the sphere meets the largest one inside the magnet.  The plate is an obstacle without edges.  Of a floater
+    that is no sphere samples tell of contact, as in a trajectory alone.  The field is the table's own expressions, so
+    that a short one (dipoles, closed forms) is fast. Raises InputError: `duration` is not positive, there is no start,
+    or the plate does not lie flat.
 
     Parameters
     ----------
@@ -379,7 +410,6 @@ def launched(
     Accuracy: that of the tables; beyond the range of the plate's the currents' field is continued as it is, and
     `Endings.left_plate_table` says which trajectories went there.
     """
-    scene.floater.must_be("sphere", where="for launches over currents in a plate", instead="Simulate them one by one.")
     _check(scene, starts, duration)
     flight, count = Flight(scene, table, duration, memory=memory, in_balls=False), len(starts.position)
     equations, (scales, values) = flight.equations(0)[0], (flight.scales, flight.values)
@@ -389,10 +419,9 @@ def launched(
         *range_events(memory, position, turn),
         *((obstacle, CONTACT) for obstacle in _obstacles(scene, memory, position)),
     ]
-    unit = starts.moment / np.linalg.norm(starts.moment, axis=1)[:, None]
-    starts = replace(starts, moment=unit)
+    starts = _whole(scene, starts)
     if currents is None:  # what the floater's moment alone leaves in the plate; the rotor's part is not integrated
-        force, now, states = PlateForce(memory, values), np.zeros(count), scales.pack(starts)
+        force, now, states = PlateForce(memory, values), np.zeros(count), replace(scales, pointing=None).pack(starts)
         silent = np.where(np.isin(np.arange(12), (6, 7, 8)), 0.0, states)
         own = force(now, states).signals - force(now, silent).signals
         if scene.drive:  # there the rotor's part is integrated, but for its mean
@@ -404,9 +433,10 @@ def launched(
     for k in range(count):
         course = flight.begin(starts[k], duration, None if currents is None else currents[k])
         if currents is None:
-            course.state[12 : 12 + own.shape[1]] = own[k]
+            first = len(flight.own_states(starts[k]))
+            course.state[first : first + own.shape[1]] = own[k]
         passengers.append(_Launch(course, bool(outside[k])))
-    free = clearance(scene, np.zeros(count), starts.position) > 0
+    free = clearance(scene, np.zeros(count), starts.position, starts.orientation) > 0
     if free.any():
         SimdBatch(equations, events, step_error, False).fly(
             [f for f, there in zip(passengers, free, strict=True) if there]
@@ -425,11 +455,11 @@ def _obstacles(scene: Scene, memory: PlateMemory, position: Vector) -> list[hy.e
         raise InputError("Input plate must be one for many trajectories at once; instead there are several.")
     if abs(abs(box.rotation[2, normal]) - 1) > FLAT:
         raise InputError("Input plate must lie flat under the rotor; instead it is turned. Leave out rotation_deg.")
-    face = float(box.center[2] + box.size[normal] / 2)
+    face, inner = float(box.center[2] + box.size[normal] / 2), scene.floater.inner_radius
     depth = hy.par[Parameter.PLATE_DEPTH] + hy.par[Parameter.PLATE_SPEED] * hy.time
-    found = [position[2] + depth - face / length - 1.0]
+    found = [position[2] + depth - face / length - inner / scene.floater.radius]
     for body in scene.turning_bodies:
         apart = [length * position[i] - float(body.center[i]) for i in range(3)]
-        near = float(np.min(body.size)) / 2 + scene.floater.radius
+        near = float(np.min(body.size)) / 2 + inner
         found.append((hy.sum([a * a for a in apart]) - near**2) / (length * length))
     return found

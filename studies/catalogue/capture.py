@@ -1,4 +1,7 @@
-"""Which floaters are captured: launches drawn at random over the plate of every rotor that was tried."""
+"""Which floaters are captured: launches drawn at random over the plate of every rotor that was tried.
+
+Of one rotor also a disc, a rod and a cube of the sphere's volume, let go as the sphere is.
+"""
 
 import math
 from collections.abc import Sequence
@@ -31,6 +34,7 @@ from ..figures.style import PALETTE, colour_bar, drawn, panels, styled, titled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
 from . import article
+from .floater_shape import CUBE, SPHERE, body_of
 from .showing import by_rotor, configuration_panels, text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
@@ -142,6 +146,10 @@ PARTS = (1 / 6, 1 / 2, 5 / 6)  # Places in the range of stable frequencies
 TOGETHER, BATCHES = 2000, 5  # Trajectories of a point, and points for each rotor and frequency: 10 000 in all
 CHECKED = 8  # Launches of each rotor and frequency that are simulated on while the plate goes down
 FEW = 24  # Launches of a point in the quick setting
+SHAPES = {SPHERE: (SPHERE, 1.0), "disc": ("cylinder", 0.5), "rod": ("cylinder", 2.0), CUBE: (CUBE, 1.0)}
+"""Floaters and their heights over their diameters, see `body_of`."""
+SHAPED, OF_SHAPE = {"configuration": "vertical", "measure": 14.0, "part": 0.5, "batch": 0, "checked": 0}, 400
+"""The launches of those that are no spheres, and how many there are of each."""
 FLIGHTS = ("flight",)
 COLUMNS: Columns = {
     "rotor_frequency": ((), "Hz", "frequency of the rotor"),
@@ -150,6 +158,7 @@ COLUMNS: Columns = {
     "high": ((), "Hz", "highest stable frequency without a plate"),
     "part": ((), "1", "place in the range of stable frequencies"),
     "batch": ((), "1", "number of the batch"),
+    "shape": ((), "", "shape of the floater"),
     "settled": ((), "1", "trajectories that still levitated when the plate began to go down"),
     "stayed": ((), "1", "those of them that were up after it had gone down"),
     "farther": (FLIGHTS, "m", "farther from the rotor than where it levitates"),
@@ -163,7 +172,10 @@ COLUMNS: Columns = {
 
 
 def capture_points(quick: bool) -> list[Point]:
-    """All rotors and frequencies again and again, a batch of launches each time, so that a stop leaves equal shares."""
+    """All rotors and frequencies again and again, a batch of launches each time, so that a stop leaves equal shares.
+
+    At last floaters of other shapes, of which quick settings have the cube.
+    """
     rotors = [(name, value) for name, kind in article.CONFIGURATIONS.items() for value in kind.tested]
     every = [
         (*rotor, part, batch, TOGETHER, 0 if batch else CHECKED)
@@ -171,19 +183,23 @@ def capture_points(quick: bool) -> list[Point]:
     ]
     names = ("configuration", "measure", "part", "batch", "flights", "checked")
     requested = [(*rotor, 0.5, 0, FEW, 0) for rotor in article.QUICK_ROTORS] if quick else every
-    return [dict(zip(names, values, strict=True)) for values in requested]
+    shapes, count = ([CUBE], FEW) if quick else (list(SHAPES)[1:], OF_SHAPE)
+    others = [{**SHAPED, "flights": count, "shape": shape} for shape in shapes]
+    return [*(dict(zip(names, values, strict=True)) for values in requested), *others]
 
 
 def capture(point: Point) -> xr.Dataset:
     """One batch of launches below one rotor, see `COLUMNS`; the outcomes are numbers of `WORDS`."""
     rotor, count = (point["configuration"], point["measure"], point["part"]), point["flights"]
-    found: dict[str, Any] = {"part": point["part"], "batch": point["batch"], "settled": 0, "stayed": 0}
+    shape = point.get("shape", SPHERE)
+    found: dict[str, Any] = {"part": point["part"], "batch": point["batch"], "settled": 0, "stayed": 0, "shape": shape}
     try:
         place = place_of(*rotor)
     except EquilibriumError:
         found["outcome"] = np.full(count, float(NO_EQUILIBRIUM))
         return recorded(point, COLUMNS, found, {}, flight=count)
     how, states = launches(place, count, seed_of(*rotor, point["batch"]))
+    place = place if shape == SPHERE else _with_floater(place, shape)
     ended = _simulated(place, states, SETTLED)
     low = ended.last.position[:, 2] < -(place.distance + BELOW) / 2
     outcome = np.where(ended.ended_by == CONTACT, np.where(low, PLATE, ROTOR), LOST)
@@ -196,6 +212,12 @@ def capture(point: Point) -> xr.Dataset:
         later = _simulated(place, first, SETTLED + LOWERED / LOWERING_SPEED + AFTER, lowered=True)
         found |= {"settled": np.sum(later.levitated_s >= SETTLED), "stayed": np.sum(later.ended_by == DURATION)}
     return recorded(point, COLUMNS, found, {}, flight=count)
+
+
+def _with_floater(place: Place, shape: str) -> Place:
+    """A place with another floater of the same volume and material."""
+    floater = replace(body_of(*SHAPES[shape]), conductivity=place.scene.floater.conductivity)
+    return replace(place, scene=replace(place.scene, floater=floater))
 
 
 def _simulated(place: Place, states: State, seconds: float, lowered: bool = False) -> Endings:
@@ -221,15 +243,19 @@ def share_text(hits: ArrayLike) -> str:
 
 
 def each_place(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
-    """The launches of each rotor and frequency of a joined result, by its label, its batches put together."""
+    """The launches of each rotor, frequency and shape of a joined result, by its label, its batches put together."""
     found = []
     for label, rotor in by_rotor(result):
-        for part in np.unique(rotor["part"].values):
-            some = cases_with(rotor, part=part)
+        for part, shape in product(np.unique(rotor["part"].values), SHAPES):
+            some = cases_with(rotor, part=part, shape=shape)
+            if not some.sizes["case"]:
+                continue
             flights = some[[name for name, (dims, *_) in COLUMNS.items() if dims]].stack(trial=("case", "flight"))
             one = flights.isel(trial=np.isfinite(flights["outcome"].values)).drop_vars(["trial", "case", "flight"])
-            one = one.assign(some[["configuration", "measure", "part", "rotor_frequency"]].isel(case=0))
-            found.append((label, one.assign(some[["settled", "stayed"]].sum())))
+            one = one.assign(some[["configuration", "measure", "part", "shape", "rotor_frequency"]].isel(case=0))
+            found.append(
+                (label if shape == SPHERE else f"{label}, {shape}", one.assign(some[["settled", "stayed"]].sum()))
+            )
     return found
 
 
@@ -243,7 +269,7 @@ def share_figure(result: xr.Dataset) -> Figure:
     """The capture probability of each rotor at each part of its frequencies; bars: one standard deviation."""
     figure, rows = configuration_panels(result, 2.7, ylabel="capture probability (%)")
     for axes, name, own in rows:
-        every = [one for _, one in each_place(own)]
+        every = [one for _, one in each_place(own) if one["shape"] == SPHERE]
         for part, color in zip(np.unique(own["part"]), PALETTE, strict=False):
             some = [one for one in every if one["part"] == part]
             label = f"{part:.0%} of the stable range"
@@ -338,6 +364,7 @@ def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
         rows.append({
             "configuration": one["configuration"].item(),
             "value": float(one["measure"]),
+            "shape": one["shape"].item(),
             "levitated_in_article": _levitated(one),
             "frequency_hz": None if np.isnan(frequency) else frequency,
             "flights": one.sizes["trial"],

@@ -41,17 +41,20 @@ NUMBERS |= {"low_hz": "low", "high_hz": "high"}
 
 
 def floater_of(shape: str, aspect: float) -> Floater:
+    """The mean over turns of a floater as of `body_of`; of a sphere itself."""
+    floater = body_of(shape, aspect)
+    return floater if floater.is_sphere else floater.averaged
+
+
+def body_of(shape: str, aspect: float) -> Floater:
     """A floater of the article's volume and material, of μr = 1: a cylinder of an aspect, a cube or a sphere."""
     ball = article.FLOATER
     material = ball.remanence, 1.0, ball.density
     if shape == SPHERE:
         return Floater(ball.radius, *material)
-    if shape == CUBE:
-        edges = np.full(3, np.cbrt(ball.volume))
-        return Floater(float(np.linalg.norm(edges) / 2), *material, body=Box(edges)).averaged
     radius = float(np.cbrt(ball.volume / (2 * np.pi * aspect)))
-    body = Cylinder(radius, 2 * radius * aspect)
-    return Floater(body.circumradius, *material, body=body).averaged
+    body = Box(np.full(3, np.cbrt(ball.volume))) if shape == CUBE else Cylinder(radius, 2 * radius * aspect)
+    return Floater(body.circumradius, *material, body=body)
 
 
 def limits(point: Point) -> xr.Dataset:

@@ -16,7 +16,8 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import tilt
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Lowering, Plate, Scene
-from spinlev.geometry.shapes import Box, rotation_matrix
+from spinlev.geometry.scene.floater import Floater
+from spinlev.geometry.shapes import Box, Cylinder, rotation_matrix
 
 MAGNETS = tilt(np.radians(10), 10e-3, 1.305, 1.0)
 TABLE = rotor_table(MAGNETS, "dipole")
@@ -109,6 +110,33 @@ def test_over_a_plate_that_goes_down_it_is_so_too(starts):
     assert alone.time[-1] > 0.005  # while the plate goes down
     found = launched(scene, TABLE, memory, few, float(alone.time[-1]), 1e-13, currents[None])
     assert np.abs(found.last.position[0] - alone.rotor.position[-1]).max() < 1e-9
+
+
+@pytest.mark.parametrize("body", [Cylinder(7e-3, 5e-3), Box((10e-3,) * 3)], ids=["disc", "cube"])
+def test_launches_of_other_shapes_are_what_each_is_alone(memory, body):
+    """By another integrator, to round-off; the plate is touched by the lowest point of the true surface."""
+    floater = Floater(body.circumradius, FLOATER.remanence, 1.0, FLOATER.density, body=body)
+    scene, duration = replace(SCENE, floater=floater), 0.008
+    moment = np.array([[0.1, 0.0, 0.995], [0.3, -0.2, 0.93]])
+    places, falling = 1e-3 * np.array([[0, 0, -22], [0, 0, -26]]), np.array([[0, 0, 0], [0, 0, -0.8]])
+    starts = State(places, falling, moment, np.zeros((2, 3)))
+    begun = [
+        initial_state(replace(scene, start=AbsoluteStart(*(v[k] for v in starts.vectors))), TABLE, [], memory)
+        for k in range(2)
+    ]
+    found = launched(scene, TABLE, memory, starts, duration, 1e-13, np.array([currents for _, currents in begun]))
+    assert found.ended_by.tolist() == ["duration", "contact"]
+    alone = integrate(
+        Flight(scene, TABLE, duration, PLATE_TOLERANCE, True, memory, in_balls=False),
+        begun[0][0],
+        duration,
+        currents=begun[0][1],
+    )
+    assert np.abs(found.last.position[0] - alone.rotor.position[-1]).max() < 1e-10
+    assert np.abs(found.last.moment[0] - alone.rotor.moment[-1]).max() < 1e-8
+    (solid,) = floater.placed(found.last.position[1], found.last.orientation[1])
+    lowest = solid.center[2] - solid.support(np.array([[0.0, 0.0, -1.0]]))[0]
+    assert lowest == pytest.approx(-0.035, abs=1e-6)
 
 
 def test_what_cannot_be_flown_is_said(memory, starts):

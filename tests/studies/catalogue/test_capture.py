@@ -35,8 +35,9 @@ def place():
 
 
 def test_points_are_ten_thousand_launches_of_every_rotor_that_was_tried():
-    points = CAPTURE.points(False)
-    flights = {}
+    every, flights = CAPTURE.points(False), {}
+    assert {p["shape"] for p in every if "shape" in p} == {"disc", "rod", "cube"}
+    points = [p for p in every if "shape" not in p]
     for p in points:
         key = p["configuration"], p["measure"], p["part"]
         flights[key] = flights.get(key, 0) + p["flights"]
@@ -89,8 +90,9 @@ def test_seeds_differ_from_rotor_to_rotor_and_from_batch_to_batch():
     assert len({tuple(seed_of(*a)) for a in asked}) == 4
 
 
-def test_a_small_point_is_computed_drawn_and_told():
-    row = CAPTURE.compute(POINT)
+@pytest.mark.parametrize("shape", ["sphere", "cube"])
+def test_a_small_point_is_computed_drawn_and_told(shape):
+    row = CAPTURE.compute({**POINT, "shape": shape})
     assert set(np.unique(row["outcome"])) <= set(range(4))
     held = (row["outcome"] == CAPTURED).values
     np.testing.assert_array_equal(row["levitated"].values[held], 1.0)
@@ -103,10 +105,13 @@ def test_a_small_point_is_computed_drawn_and_told():
     assert numbers[0]["flights"] == 24
     assert numbers[0]["captured"] == pytest.approx(held.mean())
     assert numbers[0]["captured"] + sum(numbers[0][word.replace(" ", "_")] for word in WORDS[1:]) == pytest.approx(1)
-    assert f"{row['rotor_frequency'].item():.1f} Hz" in CAPTURE.report(result)[1]
+    told = CAPTURE.report(result)[1]
+    assert f"{row['rotor_frequency'].item():.1f} Hz" in told
+    assert ("cube" in told) == (shape == "cube")
+    assert numbers[0]["shape"] == shape
     beyond = int(sum(result["left_plate_table"].values.ravel() == 1))
     assert any(line.startswith(f"{beyond} of ") and "plate's table" in line for line in CAPTURE.report(result))
-    for draw in CAPTURE.figures.values():
+    for draw in CAPTURE.figures.values() if shape == "sphere" else ():  # figures are of spheres
         assert draw(result).axes
 
 
