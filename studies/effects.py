@@ -8,7 +8,7 @@ import numpy as np
 
 from ..dynamics.equilibria.equilibrium import LOCKED, MARGINAL, Equilibrium
 from ..dynamics.equilibria.perturbed import growth_by_floater, growth_by_rotor, shift_by_mutual
-from ..dynamics.motion.body_shape import response_error
+from ..dynamics.motion.body_shape import MISSED, MISSED_BY_PLATE, response_error
 from ..dynamics.motion.coils import COILS
 from ..dynamics.motion.effects import NOTHING_PERMEABLE
 from ..dynamics.motion.floater_effects import (
@@ -146,11 +146,12 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
 
 def _shape(levitation: Levitation) -> ListedEffect:
     floater = levitation.scene.floater
+    missed = MISSED_BY_PLATE if levitation.scene.plate else MISSED
     coils = f", {COILS}," if levitation.scene.other_coils else ""
     why = (
         f"its multipoles and its polarizability in the rotor's field; plate, the magnets' response{coils} and the "
         f"rotor's currents have its dipole and a sphere of its volume, whose error is up to "
-        f"{response_error(floater):.0%} of their force, and of that times its radius for their torque"
+        f"{response_error(floater, missed):.0%} of their force, and of that times its radius for their torque"
     )
     return ListedEffect(FLOATER_SHAPE, True, None, None, why)
 

@@ -43,14 +43,19 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Sta
         scene = levitation.elsewhere(start=OffsetStart(np.zeros(3)))
         begun, _ = initial_state(scene.scene, levitation.interaction, levitation.quiet.equilibria)
         return displaced(begun, columns["offset_mm"], levitation.scene.angular_velocity), columns["offset_mm"]
-    near = columns.pop("body_x", None)
+    near, floater = columns.pop("body_x", None), levitation.scene.floater
+    if near is not None and floater.round:
+        raise InputError(
+            "Input starts.body_x must be left out of a floater that is round about its moment, as it changes nothing; "
+            "instead it is given."
+        )
     defaults = {"velocity_mm_s": (0.0, 0.0, 0.0), "moment": (0.0, 0.0, 1.0), "spin_hz": (0.0, 0.0, 0.0)}
     whole = {key: columns.get(key, np.array([defaults.get(key)])) for key in list(UNITS)[1:-1]}
     position, velocity, moment, spin = (np.tile(v, (count, 1)) if len(v) == 1 else v for v in whole.values())
     sizes = np.linalg.norm(moment, axis=1)
     if not sizes.all():
         raise InputError("Input starts.moment must be directions, not zero; instead received one that is.")
-    found, floater = State(position, velocity, moment / sizes[:, None], spin), levitation.scene.floater
+    found = State(position, velocity, moment / sizes[:, None], spin)
     if not floater.round:
         sides = [None] * count if near is None else np.broadcast_to(near, (count, 3))
         axes = np.array([floater.axes(m, x) for m, x in zip(found.moment, sides, strict=True)])

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
+from ..motion.body_shape import MISSED_BY_PLATE, response_error
 from ..motion.events import clearance
 from ..motion.plate import PlateCoupling, PlateForce, PlateMemory
 from ..motion.rates import Rates
@@ -381,10 +382,11 @@ class ForcedMotion:
         if orbit is None:
             return LeftOut(known, why, part)
         turn, motion, wrong = scales.unpack(orbit.states), floquet_modes(orbit), 0.0
-        if self.memory:  # the part of what the plate moves it that its table may be wrong by
+        if self.memory:  # the part of what the plate moves it that its table, and it for a shape, may be wrong by
             places = known.position if known.turn is None else resampled(known.turn.position, len(orbit.states))
             moved = np.linalg.norm(orbit.states[:, :3] * scales.length - places, axis=1).max()
-            wrong = self.memory.error * float(moved)
+            missed = response_error(self.scene.floater, MISSED_BY_PLATE)  # by its shape, of a force as small as this
+            wrong = (self.memory.error + missed) * float(moved)
         own = float(np.mean(np.sum(turn.spin * turn.moment, axis=1)))
         found = Equilibrium(
             state=scales.unpack(orbit.mean),

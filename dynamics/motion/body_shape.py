@@ -65,6 +65,8 @@ WHICH = Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE
 # Times the multipoles' shares: a response misses them as its source and in its force, and near a body's ends they are
 # twice their mean over directions. Of a cube, a cuboid, a disc and a rod up to 3.4 is found.
 MISSED = 4.0
+# The same of a plate's: of a perfectly conducting one up to 5.1, a third of the radius off it.
+MISSED_BY_PLATE = 5.2
 # Of the radius: how far from the centre dipoles stand for multipoles. The nearer, the less they have of further ones
 # (of a cube's a fiftieth), and the stronger they are.
 STAND = 0.25
@@ -336,14 +338,15 @@ class BodyShape:
         return (found * known).ravel(), float(error) / ALLOWED[self._way]
 
 
-def response_error(floater: Floater) -> float:
+def response_error(floater: Floater, missed: float = MISSED) -> float:
     """Error of what responds to a floater as to its dipole and a sphere of its volume, by the force of that response.
 
-    From a third of its radius off contact; of the torque it is that part of the force times the radius.
+    From a third of its radius off contact; of the torque it is that part of the force times the radius. `missed` is
+    `MISSED` or `MISSED_BY_PLATE`.
     """
     if floater.is_sphere:
         return 0.0
-    return MISSED * float(shares(floater, floater_sources(floater), HIGHEST).sum())
+    return missed * float(shares(floater, floater_sources(floater), HIGHEST).sum())
 
 
 INDUCED_SHAPE = "shape of what is induced in the floater"

@@ -418,6 +418,11 @@ def overlap_faults(scene: Scene) -> Iterator[str]:
         yield from _own_overlaps(f"floater{number}", "magnets and bodies", parts)
         if not isinstance(start, AbsoluteStart):
             continue
+        if start.body_x is not None and one.floater.round and not scene.carried_by_coils:
+            yield (
+                f"Input start{number}.body_x must be left out of a floater that is round about its moment, as it "
+                "changes nothing; instead it is given."
+            )
         axes = one.floater.axes(start.moment / np.linalg.norm(start.moment), start.body_x)
         own, place = one.floater.placed(start.position, axes), ", ".join(f"{c * 1e3:g}" for c in start.position)
         for name, body in obstacles:

@@ -75,6 +75,7 @@ def test_cubes_drawn_and_given_have_axes_along_their_moments():
         ({}, "starts must be given, or n with spread"),
         ({"starts": AT, "n": 3}, "both or neither"),
         ({"starts": {"place": [0, 0, 0]}}, "keys among offset_mm, position_mm"),
+        ({"starts": {**AT, "body_x": [1, 0, 0]}}, "starts.body_x must be left out of a floater that is round"),
         ({"starts": {"velocity_mm_s": [0, 0, 0]}}, "either offset_mm or position_mm"),
         ({"starts": {"offset_mm": [0, 0, 0], "spin_hz": [0, 0, 0]}}, "offset_mm alone"),
         ({"starts": {"position_mm": [0, 0]}}, r"shape \(2,\)"),

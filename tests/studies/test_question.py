@@ -245,3 +245,16 @@ def test_a_sweep_is_beside_the_dipole_whatever_the_stability(tmp_path):
     assert "dipole of the magnets' true moments" in lines
     beside = sl.sweep(SCENE, {"frequency_hz": [110.0, 118.0]}, model="dipole", out=tmp_path, workers=1)
     assert question_lines(beside)[-1] == "Against finite elements: --vary model=dipole,fem."
+
+
+@pytest.mark.slow
+def test_error_bars_of_scenes_that_are_searched_together_have_what_mutual_magnetisation_misses():
+    """Displaced rotors share their equations, where the effect moves with the magnet; its error is each scene's own."""
+    scene, asked = replace(load_scene(SCENE), plate=None), {"ask": "equilibria", "model": "fem", "plate_model": "none"}
+    together = sl.sweep(scene, {"rotor.displacement_mm": [2.0, 2.2]}, interaction="mutual", **asked)
+    alone, rigid = (
+        sl.sweep(scene, {"rotor.displacement_mm": [2.2]}, interaction=i, **asked) for i in ("mutual", "rigid")
+    )
+    found = together.position_error.values[1]
+    assert found == pytest.approx(alone.position_error.values[0], rel=1e-4)
+    assert found[0] > 2 * rigid.position_error.values[0, 0]

@@ -196,6 +196,13 @@ def test_given_moments_of_inertia_take_the_place_of_the_shapes():
     assert parse_scene(scene_text(made({**CUBOID, "inertia_kg_m2": given}))).floater.moments_of_inertia == tuple(given)
 
 
+def test_a_direction_that_changes_nothing_is_refused():
+    start = {"position_mm": [0.0, 0.0, -25.0], "body_x": [0.0, 1.0, 0.0]}
+    assert made(CUBOID, start=start).start.body_x is not None
+    with pytest.raises(SceneError, match=r"start\.body_x must be left out of a floater that is round"):
+        made(CYLINDER, start=start)
+
+
 def test_what_needs_another_shape_says_so():
     with pytest.raises(InputError, match=r'floater.shape must be "sphere" there; instead received "cuboid". Do this.'):
         made(CUBOID).floater.must_be("sphere", where="there", instead="Do this.")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spinlev.dynamics.continuation.frequencies import stable_ranges
+from spinlev.dynamics.motion.body_shape import response_error
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.scene.floater import Floater
 from spinlev.geometry.shapes import Box, Cylinder
@@ -91,6 +92,9 @@ def test_forced_a_cylinder_levitates_where_its_mean_does(plate, tilt):
     assert (over[0].currents is not None) == (plate is not None)
     np.testing.assert_allclose(over[0].position, over[1].position, atol=1e-9)
     assert over[0].growth_per_s == pytest.approx(over[1].growth_per_s, rel=1e-6)
+    if plate:  # what the plate moves it is known as well as it responds to the shape
+        moved = np.linalg.norm(over[0].position - over[0].without.position)
+        assert over[0].position_error > response_error(cylinder_and_mean()[0].scene.floater) * moved
 
 
 def test_every_rotor_has_every_shape():
