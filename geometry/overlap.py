@@ -94,9 +94,8 @@ def _least_in_a_turn(
     angles = np.linspace(0.0, 2 * np.pi, number)
     values = np.asarray(many(angles), float)
     best, step = float(angles[np.argmin(values)]), float(angles[1])
-    found = scipy.optimize.minimize_scalar(
-        one, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-12}
-    )
+    bounds, options = (best - step, best + step), {"xatol": 1e-12}
+    found = scipy.optimize.minimize_scalar(one, bounds=bounds, method="bounded", options=options)
     return min((best, float(values.min())), (float(found.x), float(found.fun)), key=lambda pair: pair[1])
 
 

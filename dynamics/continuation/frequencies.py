@@ -77,10 +77,8 @@ def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: fl
     """
     family = by_frequency(scene, rates)
     start = _hanging(replace(scene, frequency=highest), table, family)
-    steps = Steps(longest=0.1)
-    points = follow_branch(
-        family, start, highest, SLOWEST, steps, lambda p: rotor_gap(scene, p.position, p.state[6:9]) < 0
-    )
+    steps, contact = Steps(longest=0.1), lambda p: rotor_gap(scene, p.position, p.state[6:9]) < 0
+    points = follow_branch(family, start, highest, SLOWEST, steps, contact)
     if not (folds := [k for k, point in enumerate(points) if point.kind == FOLD]):
         raise EquilibriumError(f"The levitating branch has no fold between {SLOWEST:g} and {highest:g} Hz.")
     end = folds[1] + 1 if len(folds) > 1 else len(points)
@@ -334,9 +332,8 @@ def way_out(
     """
     rates = [e.growth_per_s for e in equilibria]
     times = [f"{1 / g:.2g} s" if g < 10 else f"{1e3 / g:.2g} ms" for g in rates]
-    kinds = dict.fromkeys(
-        f"{1e3 * e.distance:.2f} mm (e-folding time {time})" for e, time in zip(equilibria, times, strict=True)
-    )
+    pairs = zip(equilibria, times, strict=True)
+    kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (e-folding time {time})" for e, time in pairs)
     found = f"only unstable ones: {', '.join(kinds)}" if kinds else "nor an unstable one below the rotor"
     if not scene.floater.round:
         scene, _, table = mean_over_turns(scene, table)

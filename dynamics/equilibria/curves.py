@@ -60,9 +60,8 @@ class SearchRange:
         nearest = 1.0 + max((-c[:, 2].min() for c in corners), default=0.0)
         beside = 1.0 + np.array([1.0, 1.1, 1.3, 2.0]) * max((np.abs(c[:, :2]).max() for c in corners), default=0.0)
         below = -np.geomspace(nearest, max(self.bound, nearest), 16)
-        places = np.concatenate(
-            [_rings(below, np.array([0.0, 0.15, 0.7]), 4), _rings(np.array([-0.01, -0.1, -0.4, -0.9]), beside, 12)]
-        )
+        near = _rings(below, np.array([0.0, 0.15, 0.7]), 4)
+        places = np.concatenate([near, _rings(np.array([-0.01, -0.1, -0.4, -0.9]), beside, 12)])
         moment = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if sum(map(abs, v)) in (1.0, 3.0)])
         moment /= np.linalg.norm(moment, axis=1, keepdims=True)
         return np.column_stack([np.repeat(places, len(moment), axis=0), np.tile(moment, (len(places), 1))])

@@ -186,11 +186,8 @@ def _survey_of_any_body(
     left_out: tuple[LeftOut, ...] = ()
     if scene.floater.turns_freely:
         known = _survey_of_mean(scene, means, spin, farthest, remembered, watch, quick)
-        found, curves, left_out = (
-            [replace(one, kind=AVERAGED) for one in known.equilibria],
-            known.curves,
-            known.left_out,
-        )
+        found = [replace(one, kind=AVERAGED) for one in known.equilibria]
+        curves, left_out = known.curves, known.left_out
     if scene.frequency:
         round_scene, exactly, _ = means
         values = parameters(round_scene, Scales.of(round_scene), frozen_spin=True)
@@ -226,10 +223,8 @@ def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, farthest: floa
     inside = SearchRange(scene, farthest).holds(position)
     known, doubts = field_doubts(table, position[inside] * scales.length)
     chosen = np.flatnonzero(inside)[known]
-    found = [
-        locked_equilibrium(scales, rates, values, position[k], quaternion[k], doubt)
-        for k, doubt in zip(chosen, doubts, strict=True)
-    ]
+    poses = zip(position[chosen], quaternion[chosen], doubts, strict=True)
+    found = [locked_equilibrium(scales, rates, values, *pose) for pose in poses]
     return without_twins([one for one in found if rotor_gap(scene, one.position, one.state.orientation) > 0])
 
 

@@ -539,9 +539,8 @@ class SurfaceCharges:
     def solved(self, right: Array) -> Array:
         """σ (n,) T of (1 + χ/2) σ - χ K σ = `right` (n,) T. Raises ComputationError where they do not converge."""
         share = 1 / (1 + self.contrast / 2)
-        whole = scipy.sparse.linalg.LinearOperator(
-            (len(right),) * 2, lambda v: v - share * self.contrast * self.normal_field(v), dtype=float
-        )
+        size, changed = (len(right),) * 2, share * self.contrast
+        whole = scipy.sparse.linalg.LinearOperator(size, lambda v: v - changed * self.normal_field(v), dtype=float)
         rtol = SOLVED * (1 + float(self.contrast.max()))
         found, failed = scipy.sparse.linalg.gmres(whole, share * right, rtol=rtol, restart=60, maxiter=5)
         if not failed:
@@ -572,7 +571,6 @@ class SurfaceCharges:
         sizes = np.array([magnet.body.size.min() for magnet in self.magnets])[self.owner]
         closed = remanent_field(carriers, self.places - INSET * sizes[:, None] * self.normals)
         kept = [one for one, magnet in zip(carriers, self.all, strict=True) if magnet.contrast]
-        rest = np.array(
-            [m.polarization_in_rotor - c.polarization_in_rotor for m, c in zip(self.magnets, kept, strict=True)]
-        )
+        pairs = zip(self.magnets, kept, strict=True)
+        rest = np.array([m.polarization_in_rotor - c.polarization_in_rotor for m, c in pairs])
         return self.solved(np.sum((rest[self.owner] + self.contrast[:, None] * closed) * self.normals, axis=1))

@@ -299,9 +299,8 @@ def _field_map(source: _Source, reading: MapReading, vectors: bool = True) -> Fi
     if not found.keys() >= {*AXES} or found.keys().isdisjoint(COMPONENTS):
         raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {', '.join(units) or 'none of them'}.")
     nothing = np.full(len(found["x"]), np.nan)
-    points, field, errors = (
-        np.stack([found.get(name, nothing) for name in names], axis=-1) for names in (AXES, COMPONENTS, ERRORS)
-    )
+    kinds = (AXES, COMPONENTS, ERRORS)
+    points, field, errors = (np.stack([found.get(n, nothing) for n in names], axis=-1) for names in kinds)
     is_known = (found.get(MASK, nothing) != 0) & (np.nan_to_num(found.get(GHOSTS, nothing)).astype(int) & HIDDEN == 0)
     if not is_known.any():
         raise FieldMapError(f"Input map must have points with a value; instead all {len(points)} are masked.")

@@ -400,10 +400,8 @@ def solve_currents(
             space, missed, omegas, residuals = train(
                 EddySpace(ladder.mesh, ladder.order + 1), grid, probes, others, frequencies, SPACE_SHARE * rtol, watch
             )
-            couplings = space_couplings(
-                space.couplings(unit_dipoles(corners)), space.inductances, 2 * np.pi * frequencies[1]
-            )
-            ladder.take(couplings)
+            couplings, shift = space.couplings(unit_dipoles(corners)), 2 * np.pi * frequencies[1]
+            ladder.take(space_couplings(couplings, space.inductances, shift))
             if ladder.error <= KEPT * ladder.allowed:
                 break
         else:

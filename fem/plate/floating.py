@@ -386,14 +386,12 @@ def free_modes(
             owners.append(number)
 
     def seen(poses: list[tuple[Array, Array]]) -> list[_Seen]:
-        each = [
-            [part for part, owner in zip(potentials, owners, strict=True) if owner == k] for k in range(len(shares))
-        ]
+        pairs = list(zip(potentials, owners, strict=True))
+        each = [[part for part, owner in pairs if owner == k] for k in range(len(shares))]
         return [_Seen(parts, *pose) for pose in poses for parts in each]
 
-    trained, probed, fitted = (
-        seen(sampled_poses(body, room, count, seed)) for seed, count in enumerate((POSES, PROBED, FITTED))
-    )
+    counts = enumerate((POSES, PROBED, FITTED))
+    trained, probed, fitted = (seen(sampled_poses(body, room, count, seed)) for seed, count in counts)
     mesh = plate_mesh(body, conductivity, _windings(coils, 2 * np.pi) - [*(low + high)[:2] / 2, low[2]], frequency)
     band, space, nothing = (0.1 * frequency, 4 * frequency), EddySpace(mesh, order), np.zeros((0, 3))
     states, missed, *_ = train(space, nothing, nothing, OtherSources(trained, probed), band, SHARE * rtol)

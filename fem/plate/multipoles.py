@@ -95,10 +95,8 @@ class Multipoles:
             known = dict(zip(keys, zip(sums[::2], sums[1::2], strict=True), strict=True))
             for number, (l, m, part) in kinds.items():
                 if m == 0:
-                    found[number] = [
-                        known[l + order, 0][0],
-                        *(e for b in range(order) for e in known[l + order, b + 1]),
-                    ]
+                    higher = (e for b in range(order) for e in known[l + order, b + 1])
+                    found[number] = [known[l + order, 0][0], *higher]
                     continue
                 # f is Θ_lm + conj, or i times -conj
                 found[number] = [(-2.0 if part else 2.0) * known[l + order, m][part]]

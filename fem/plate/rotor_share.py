@@ -86,9 +86,8 @@ def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> 
     `left_out`: degrees whose field at the plate is below this share of the rotor's are dropped. Raises InputError: the
     plate comes so near that an expansion does not converge in it.
     """
-    parts: list[Source] = [
-        PolarizedCuboid.of_magnet(magnet) for magnet in table.uniform if isinstance(magnet.body, Box)
-    ]
+    boxes = [magnet for magnet in table.uniform if isinstance(magnet.body, Box)]
+    parts: list[Source] = list(map(PolarizedCuboid.of_magnet, boxes))
     round_ones = [magnet for magnet in table.uniform if not isinstance(magnet.body, Box)]
     moments = []
     for magnet in round_ones:

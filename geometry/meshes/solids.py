@@ -160,10 +160,8 @@ def rule_in_solid(brep: str, order: int, smallest: float = SMALLEST) -> tuple[Ar
     found = [(points[~large], weights[~large])]
     for number in np.flatnonzero(large):
         found.append(_mapped(whole, mesh.GetTrafo(ng.ElementId(ng.VOL, int(number)))(whole), 1))
-    return (
-        np.concatenate([points.reshape(-1, 3) for points, _ in found]),
-        np.concatenate([weights.ravel() for _, weights in found]),
-    )
+    every, weigh = zip(*found, strict=True)
+    return np.concatenate([p.reshape(-1, 3) for p in every]), np.concatenate([w.ravel() for w in weigh])
 
 
 def _mapped(rule: Any, places: Any, elements: int) -> tuple[Array, Array]:

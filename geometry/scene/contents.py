@@ -51,9 +51,8 @@ class Plate:
         if len(plates) == 1:
             return plates[0]
         each = tuple(plate.conductivity for plate in plates)
-        return cls(
-            Compound.of([body for plate in plates for body in plate.body.placed]), max(each), plates[0].lowering, each
-        )
+        bodies = [body for plate in plates for body in plate.body.placed]
+        return cls(Compound.of(bodies), max(each), plates[0].lowering, each)
 
     @property
     def metal(self) -> float | tuple[float, ...]:
@@ -126,11 +125,7 @@ class Coil:
 
     def __repr__(self) -> str:
         size = f"Ø {2e3 * self.radius:.4g}, {1e3 * self.width:.4g} × {1e3 * self.height:.4g} mm"
-        current = (
-            f"a table of {len(self.current)} currents"
-            if isinstance(self.current, np.ndarray)
-            else f"{self.current:g} A"
-        )
+        current = f"a table of {len(self.corners)} currents" if self.corners else f"{self.current:g} A"
         current += f" at {self.frequency:g} Hz" if self.frequency else ""
         return f"Coil {size} at {millimetres(self.center)}, {self.turns:g} turns of {current}"
 

@@ -309,9 +309,8 @@ def _round_about(parts: Sequence[FloaterPart], center: Array, axis: Array) -> bo
     """Whether parts and their polarisations are round about a direction (3,) through a point (3,) m."""
     for part in parts:
         body, polarization = part.magnet.body, part.magnet.polarization_in_rotor
-        turns = isinstance(body, Sphere) or (
-            isinstance(body, Cylinder) and np.linalg.norm(np.cross(body.rotation[:, 2], axis)) < ROUND
-        )
+        along = isinstance(body, Cylinder) and np.linalg.norm(np.cross(body.rotation[:, 2], axis)) < ROUND
+        turns = along or isinstance(body, Sphere)
         off = np.linalg.norm(np.cross(body.center - center, axis)) > ROUND * body.circumradius
         across = np.linalg.norm(np.cross(polarization, axis)) > ROUND * np.linalg.norm(polarization)
         if not turns or off or across:

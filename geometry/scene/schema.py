@@ -222,9 +222,8 @@ class BallastTable(_Shaped):
 
     def piece(self, parts: Parts, conductivity: float | None) -> FloaterPart:
         """The part; `conductivity` is that of all magnets that do not name their own."""
-        return FloaterPart(
-            Magnet(self.body(parts), np.zeros(3), conductivity=self.conductivity_S_m), self.density_kg_m3
-        )
+        body = Magnet(self.body(parts), np.zeros(3), conductivity=self.conductivity_S_m)
+        return FloaterPart(body, self.density_kg_m3)
 
 
 class FloaterMagnetTable(BallastTable):
