@@ -193,8 +193,7 @@ class Compound(Body):
 
     @property
     def placed(self) -> "tuple[Solid, ...]":
-        turn = self.rotation
-        return tuple(moved(body, self.center + turn @ body.center, turn @ body.rotation) for body in self.bodies)
+        return tuple(carried(body, self.rotation, self.center) for body in self.bodies)
 
     @cached_property
     def size(self) -> Array:
@@ -286,13 +285,18 @@ def moved(body: Some, center: Array, rotation: Array | None = None) -> Some:
     return replace(body, center=center, rotation=body.rotation if rotation is None else rotation)  # type: ignore[type-var]
 
 
+def carried(body: Some, axes: Array, place: Array | float = 0.0) -> Some:
+    """The `body` of a frame that comes to be at a `place` (3,) m with `axes`, columns of (3, 3)."""
+    return moved(body, place + axes @ body.center, axes @ body.rotation)
+
+
 def known_shape(part: Part) -> Solid | None:
     """The shape that the part has, in the same place, its axes as near to the part's as can be; None for any other."""
     for local in _candidates(part):
         distances = np.abs(local.distance(part.triangles.reshape(-1, 3)))
         alike = np.allclose([local.volume, local.area], [part.volume, part.area], rtol=SAME_SHAPE, atol=0.0)
         if alike and distances.max() < SAME_SHAPE * part.circumradius:
-            return moved(local, part.center + part.rotation @ local.center, part.rotation @ local.rotation)
+            return carried(local, part.rotation, part.center)
     return None
 
 

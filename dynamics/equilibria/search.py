@@ -17,6 +17,7 @@ from ...fem.cache import TableKind
 from ...fem.rotor.table import ROUND_OFF, FieldTable, RangeError, RotorTable
 from ...geometry.common import Array, Report, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
+from ...geometry.shapes import rotation_matrix
 from ..motion.body_shape import BodyShape
 from ..motion.coils import BesideCoils
 from ..motion.effect import Interaction
@@ -209,15 +210,13 @@ def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, farthest: floa
     if not len(seeds.points):
         return []
     values = parameters(scene, scales)
-    angles = 2 * np.pi * np.arange(TURNS) / TURNS
+    turns = [rotation_matrix((0.0, 0.0, angle)) for angle in 360 / TURNS * np.arange(TURNS)]
     axes = list[Array]()
     for moment in seeds.points[:, 3:]:
         first, second = tangent_basis(moment[None])[0]
         plain = floater.axes(moment)
         across = np.stack([first, second, moment], axis=1)
-        for cosine, sine in zip(np.cos(angles), np.sin(angles), strict=True):
-            turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-            axes.append(across @ turn @ across.T @ plain)
+        axes += [across @ turn @ across.T @ plain for turn in turns]
     places = np.repeat(seeds.points[:, :3], TURNS, axis=0)
     position, quaternion = locked_poses(rates, values, places, np.array(axes))
     inside = SearchRange(scene, farthest).holds(position)

@@ -227,7 +227,6 @@ def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: A
     # ∂_i ∂'_j of the potential, from its Hankel moments of orders 0, 1 and 2 and the lateral offset
     angle = np.arctan2(offset[..., 1], offset[..., 0])
     result = np.zeros((*even.shape, 3, 3), complex)
-    result = np.zeros((*even.shape, 3, 3), complex)
     result[..., 0, 0] = (even - second * np.cos(2 * angle)) / 2
     result[..., 1, 1] = (even + second * np.cos(2 * angle)) / 2
     result[..., 0, 1] = result[..., 1, 0] = -second * np.sin(2 * angle) / 2

@@ -21,6 +21,7 @@ import numpy as np
 
 from ...geometry.common import MU_0, Array, Watch
 from ...geometry.scene.contents import Plate
+from ...geometry.shapes import rotation_matrix
 from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import Dipole, PolarizedCuboid
 from ..harmonics.expansion import without_noise
@@ -270,11 +271,12 @@ def _functions(
     omegas = 2 * np.pi * np.geomspace(*network.frequencies, 3)
     doubled = np.concatenate([np.tile(part, 2) for part in rates])
     scales = [1 / np.sqrt(part + omegas[1]) for part in rates]
-    point_scale = 1 / np.linalg.norm(
-        np.concatenate([value * scale[:, None, None] for value, scale in zip(values, scales, strict=True)]), axis=(0, 2)
-    )
+    scaled = [value * scale[:, None, None] for value, scale in zip(values, scales, strict=True)]
+    point_scale = 1 / np.linalg.norm(np.concatenate(scaled), axis=(0, 2))
     gap = float(height.min())
     centers = [np.array([0.0, 0.0, -depth * gap]) for depth in DEPTHS]
+    # to the meridians where cos mφ = sin mφ
+    turns = [rotation_matrix((0.0, 0.0, 45 / m if m else 0.0)) for m in range(len(values))]
     # they go with cos mφ, in the cylinder's frame
     choices = [Multipoles.at(centers, [(m, m, 0), (m + 1, m, 0)], gap) for m in range(len(values))]
     for halving in range(HALVINGS):
@@ -282,11 +284,9 @@ def _functions(
         fits = []
         for m, (choice, value, scale) in enumerate(zip(choices, values, scales, strict=True)):
             watch("field functions of the plate", m / len(values))
-            turn = _turn(m)
-            fits.append(
-                fit_multipoles(choice, places @ turn.T, value @ turn.T, scale, point_scale, part, lambda _: True, 1)
-            )
-        left = _pairs([fit.error @ _turn(m) for m, fit in enumerate(fits)])
+            there, turned = places @ turns[m].T, value @ turns[m].T
+            fits.append(fit_multipoles(choice, there, turned, scale, point_scale, part, lambda _: True, 1))
+        left = _pairs([fit.error @ turn for fit, turn in zip(fits, turns, strict=True)])
         error = max(tensor_error(_pairs(values), left, doubled, omega) for omega in omegas)
         if error <= tolerance:
             break
@@ -297,12 +297,6 @@ def _pairs(values: Sequence[Array]) -> Array:
     """Both partners of every order on the meridian φ = 0: (2 states, n, 3), from (states, n, 3) along ρ, φ and z."""
     wholes = [value * np.sqrt(2 if m else 1) for m, value in enumerate(values)]
     return np.concatenate([whole * axes for whole in wholes for axes in ([1, 0, 1], [0, 1, 0])])
-
-
-def _turn(order: int) -> Array:
-    """To the meridian where cos mφ = sin mφ."""
-    angle = np.pi / (4 * order) if order else 0.0
-    return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
 
 
 def _in_plate(fits: Sequence[Fit], frame: SlabFrame) -> tuple[Multipoles, Array]:

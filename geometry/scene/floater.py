@@ -14,8 +14,8 @@ import numpy as np
 
 from ..common import Array, InputError, frozen_array
 from ..magnets import Magnet, polarizability
-from ..shapes import Box, Cylinder, Sphere, unturned
-from ..solids import Part, Solid, moved
+from ..shapes import Box, Cylinder, Sphere, rotation_matrix, unturned
+from ..solids import Part, Solid, carried, moved
 from ..step_file import second_moments_of_part
 
 ROUND = 1e-9  # of sizes, moments of inertia and directions: what deviates less is round-off of a file
@@ -79,7 +79,7 @@ class Floater:
         bodies = [piece.magnet.body for piece in pieces]
         metals = [piece.magnet.conductivity for piece in pieces if piece.magnet.conductivity is not None]
         if center.any() or not np.array_equal(turn, np.eye(3)):
-            bodies = [moved(body, turn.T @ (body.center - center), turn.T @ body.rotation) for body in bodies]
+            bodies = [carried(moved(body, body.center - center), turn.T) for body in bodies]
         return cls(
             radius=max(body.farthest(np.zeros(3)) for body in bodies),
             remanence=max(float(np.linalg.norm(piece.magnet.polarization)) for piece in pieces),
@@ -87,7 +87,7 @@ class Floater:
             density=float(masses.sum() / sum(body.volume for body in bodies)),
             conductivity=max(metals, default=None),
             pieces=tuple(
-                replace(piece, magnet=replace(piece.magnet, body=body))
+                FloaterPart(replace(piece.magnet, body=body), piece.density)
                 for piece, body in zip(pieces, bodies, strict=True)
             ),
             moments_of_inertia=moments_of_inertia,
@@ -181,10 +181,8 @@ class Floater:
         """Its mean over turns about its moment, which is round."""
         turn, along = _frame_about(self.pointing), float(self.principal_inertia @ self.pointing**2)
         across = (float(self.principal_inertia.sum()) - along) / 2
-        pieces = tuple(
-            replace(p, magnet=replace(p.magnet, body=moved(body, turn.T @ body.center, turn.T @ body.rotation)))
-            for p, body in zip(self.parts, self.bodies, strict=True)
-        )
+        magnets = [replace(part.magnet, body=carried(part.magnet.body, turn.T)) for part in self.parts]
+        pieces = tuple(FloaterPart(one, part.density) for one, part in zip(magnets, self.parts, strict=True))
         return replace(self, body=None, pieces=pieces, moments_of_inertia=(across, across, along), mean=True)
 
     @cached_property
@@ -232,23 +230,19 @@ class Floater:
         if np.hypot(*x[:2]) < ROUND or np.hypot(*wanted[:2]) < ROUND:
             raise InputError("Input body_x must not be along the moment, nor the body's x; instead it is.")
         angle = np.arctan2(wanted[1], wanted[0]) - np.arctan2(x[1], x[0])
-        cosine, sine = np.cos(angle), np.sin(angle)
-        about = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        return np.asarray(there @ about @ own.T)
+        return np.asarray(there @ rotation_matrix((0.0, 0.0, np.degrees(angle))) @ own.T)
 
     def placed(self, position: Array, orientation: Array) -> tuple[Solid, ...]:
         """Its bodies with the centre of mass at (3,) m, see `axes` for the `orientation`."""
         if self.is_sphere:
             return (Sphere(self.radius, position),)
         axes = self.axes(orientation)
-        return tuple(moved(body, position + axes @ body.center, axes @ body.rotation) for body in self.bodies)
+        return tuple(carried(body, axes, position) for body in self.bodies)
 
     def magnets_at(self, position: Array, orientation: Array) -> tuple[Magnet, ...]:
         """Its magnets in their places, see `placed`."""
         axes = self.axes(orientation)
-        there = (replace(m, body=moved(m.body, position + axes @ m.body.center, axes @ m.body.rotation))
-                 for m in self.magnets)  # fmt: skip
-        return tuple(there)
+        return tuple(replace(magnet, body=carried(magnet.body, axes, position)) for magnet in self.magnets)
 
     def must_be(self, *shapes: str, where: str, instead: str) -> None:
         """Raises InputError for a floater of another shape than `where` needs; `instead` is a way out."""
