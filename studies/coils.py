@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..dynamics.flights import conductor
 from ..fem.closed_forms.coil import coils_field
-from ..fem.plate.floating import FloatingModes, FreeModes, cached_floating_modes
+from ..fem.plate.floating import FloatingModes, FreeModes, Levitated, cached_floating_modes
 from ..geometry.common import Array
 from ..geometry.scene.contents import Scene
 from .cli.console import note
@@ -39,7 +39,7 @@ def modes_of(scene: Scene, rtol: float = 1e-3) -> tuple[FloatingModes | FreeMode
     frequency = max(conductor.LOWEST, *(coil.frequency for coil in scene.coils))
     assert scene.floater.conductivity is not None
     floater = scene.floater.bodies[0], scene.floater.conductivity
-    return cached_floating_modes(*floater, scene.coils, supply.shares, region, frequency, rtol, note)
+    return cached_floating_modes(Levitated(*floater, scene.coils, supply.shares, frequency), region, rtol, note)
 
 
 def coils_summary(scene: Scene, duration: float, modes: FloatingModes | FreeModes) -> tuple[xr.Dataset, dict[str, Any]]:

@@ -204,52 +204,51 @@ class FloatingModes:
         return total
 
 
-def _windings(coils: Sequence[Coil], end: float) -> Array:
-    """(n, 3) m: edges of the windings at the level of the highest, from an angle of 0 to one (rad)."""
-    top = max(coil.center[2] + coil.height / 2 for coil in coils)
-    edges = [(coil.center, coil.radius + side * coil.width / 2) for coil in coils for side in (-1, 1)]
-    angles = np.linspace(0.0, end, 13)
-    return np.array([[c[0] + r * np.cos(a), c[1] + r * np.sin(a), top] for c, r in edges for a in angles])
+@dataclass(frozen=True, eq=False)
+class Levitated:
+    """A conductor over coils whose axes are along z."""
+
+    body: Solid  # its centre at the origin
+    conductivity: float  # S/m
+    coils: Sequence[Coil]
+    shares: Sequence[Sequence[float]]  # of each source, the current of each coil for 1 A
+    frequency: float  # of the currents, Hz
+
+    def mesh(self, place: Array, end: float, rule: MeshRule) -> ConductorMesh:
+        """The conductor's at a place (3,) m; the nearest that drive it are the windings' edges up to an angle (rad)."""
+        top = max(coil.center[2] + coil.height / 2 for coil in self.coils)
+        edges = [(coil.center, coil.radius + side * coil.width / 2) for coil in self.coils for side in (-1, 1)]
+        turns = [(np.cos(angle), np.sin(angle)) for angle in np.linspace(0.0, end, 13)]
+        near = np.array([[c[0] + r * x, c[1] + r * y, top] for c, r in edges for x, y in turns])
+        return plate_mesh(self.body, self.conductivity, near - place, self.frequency, rule)
 
 
 def floating_modes(
-    body: Solid,
-    conductivity: float,
-    coils: Sequence[Coil],
-    shares: Sequence[Sequence[float]],
-    heights: tuple[float, float],
-    frequency: float,
-    rtol: float = 1e-3,
-    order: int = 4,
-    rule: MeshRule | None = None,
+    over: Levitated, heights: Range, rtol: float = 1e-3, order: int = 4, rule: MeshRule | None = None
 ) -> FloatingModes:
-    """Modes of a conductor whose centre moves on the common axis z of coils, between two heights (m).
+    """Modes of a conductor whose centre moves on the common axis z of coils.
 
     Parameters
     ----------
-    body, conductivity : the conductor, mirrored across its x and y, and S/m
-    coils : below it
-    shares : of each source, the current of each coil for 1 A
-    frequency : of the currents, Hz
+    over : the conductor, mirrored across its x and y, and the coils
+    heights : lowest and highest of its centre, m
     rtol : relative accuracy asked of the mean force, for the states; the finite elements are as they are
     order, rule : of the finite elements; `error` is what one order less changes
     """
-    start = time.perf_counter()
-    half = float(body.half_edges[2])
-    low, high = heights
-    reach = (low - half, high + half)
-    outer = float(body.half_edges[:2].max())
-    sources = [AxialPotential.of(CoilField(coils, share), outer, reach).shortened(SHORTENED) for share in shares]
-    windings = _windings(coils, np.pi / 2) - [0.0, 0.0, low]
-    mesh = plate_mesh(body, conductivity, windings, frequency, rule or MeshRule())
-    made = modes_along(mesh, [source.at for source in sources], heights, frequency, rtol, order)
+    start, (low, high) = time.perf_counter(), heights
+    half, outer = float(over.body.half_edges[2]), float(over.body.half_edges[:2].max())
+    fields = [
+        AxialPotential.of(CoilField(over.coils, share), outer, (low - half, high + half)) for share in over.shares
+    ]
+    mesh = over.mesh(np.array([0.0, 0.0, low]), np.pi / 2, rule or MeshRule())
+    made = modes_along(mesh, [part.shortened(SHORTENED).at for part in fields], heights, over.frequency, rtol, order)
     return replace(made, seconds=time.perf_counter() - start)
 
 
 def modes_along(
     mesh: ConductorMesh,
     sources: Sequence[Callable[[float], Source]],
-    heights: tuple[float, float],
+    heights: Range,
     frequency: float,
     rtol: float,
     order: int,
@@ -297,9 +296,8 @@ class FreeModes:
     """Modes of a conductor over coils, in any pose, and the field of the coils where it can be."""
 
     rates: Array = field(metadata={"units": "1/s"})  # (states,) λ_i
-    places: Array = field(
-        metadata={"units": "m"}
-    )  # (k, 3) of the dipoles in the conductor, along its axes from its centre
+    # (k, 3) of the dipoles in the conductor, along its axes from its centre
+    places: Array = field(metadata={"units": "m"})
     moments: Array = field(metadata={"units": "A m2 J^-1/2"})  # (states, k, 3) m_ik of a unit of x_i
     potentials: tuple[AxialPotential, ...]  # those of the coils about each axis
     owners: tuple[int, ...]  # number of the source of each
@@ -353,28 +351,15 @@ def sampled_poses(body: Solid, room: Room, count: int, seed: int) -> list[tuple[
     return found
 
 
-def free_modes(
-    body: Solid,
-    conductivity: float,
-    coils: Sequence[Coil],
-    shares: Sequence[Sequence[float]],
-    room: Room,
-    frequency: float,
-    rtol: float = 1e-3,
-    order: int = 4,
-) -> FreeModes:
-    """Modes of a conductor in any pose over coils whose axes are along z.
+def free_modes(over: Levitated, room: Room, rtol: float = 1e-3, order: int = 4) -> FreeModes:
+    """Modes of a conductor in any pose over coils.
 
-    Parameters
-    ----------
-    body, conductivity : the conductor, its centre at the origin, and S/m
-    coils, shares : as of `floating_modes`
-    room : lowest and highest (3,) m of its centre, and a height (m) above all windings under which no point of it comes
-    frequency, rtol, order : as of `floating_modes`
+    `room`: lowest and highest (3,) m of its centre, and a height (m) above all windings under which no point of it
+    comes; `over`, `rtol`, `order`: as of `floating_modes`.
     """
-    start, ((low, high), floor), around = time.perf_counter(), room, body.circumradius
-    potentials, owners = list[AxialPotential](), list[int]()
-    for number, share in enumerate(shares):
+    start, ((low, high), floor), around = time.perf_counter(), room, over.body.circumradius
+    potentials, owners, coils = list[AxialPotential](), list[int](), over.coils
+    for number, share in enumerate(over.shares):
         used = [k for k, part in enumerate(share) if part]
         for axis in dict.fromkeys((float(coils[k].center[0]), float(coils[k].center[1])) for k in used):
             here = [k for k in used if tuple(coils[k].center[:2]) == axis]
@@ -387,13 +372,13 @@ def free_modes(
 
     def seen(poses: list[tuple[Array, Array]]) -> list[_Seen]:
         pairs = list(zip(potentials, owners, strict=True))
-        each = [[part for part, owner in pairs if owner == k] for k in range(len(shares))]
+        each = [[part for part, owner in pairs if owner == k] for k in range(len(over.shares))]
         return [_Seen(parts, *pose) for pose in poses for parts in each]
 
     counts = enumerate((POSES, PROBED, FITTED))
-    trained, probed, fitted = (seen(sampled_poses(body, room, count, seed)) for seed, count in counts)
-    mesh = plate_mesh(body, conductivity, _windings(coils, 2 * np.pi) - [*(low + high)[:2] / 2, low[2]], frequency)
-    band, space, nothing = (0.1 * frequency, 4 * frequency), EddySpace(mesh, order), np.zeros((0, 3))
+    trained, probed, fitted = (seen(sampled_poses(over.body, room, count, seed)) for seed, count in counts)
+    mesh = over.mesh(np.array([*(low + high)[:2] / 2, low[2]]), 2 * np.pi, MeshRule())
+    band, space, nothing = (0.1 * over.frequency, 4 * over.frequency), EddySpace(mesh, order), np.zeros((0, 3))
     states, missed, *_ = train(space, nothing, nothing, OtherSources(trained, probed), band, SHARE * rtol)
     tests = states.couplings([*fitted, *probed])
     every, wanted = _modes(states, tests, band[1])
@@ -403,14 +388,14 @@ def free_modes(
     while len(chosen) < DIPOLES:
         apart = np.minimum(apart, np.linalg.norm(points - points[chosen[-1]], axis=1))
         chosen.append(int(np.argmax(apart)))
-    places, end, rate = points[chosen], len(fitted), 2j * np.pi * frequency
+    places, end, rate = points[chosen], len(fitted), 2j * np.pi * over.frequency
     fields = [sum(part.field(one.place + places @ one.rotation.T)[0] for part in one.parts) @ one.rotation
               for one in [*fitted, *probed]]  # fmt: skip
     rows, scale = np.array(fields).reshape(len(fields), -1), 1 / np.sqrt(1 + (every / abs(rate)) ** 2)
     moments = np.asarray(np.linalg.lstsq(rows[:end], wanted[:end], rcond=REGULAR)[0], float)
     left, whole = (np.linalg.norm(part[end:] * scale, axis=1) for part in (rows @ moments - wanted, wanted))
     rough, fine = (np.diag(found) for found in (
-        solve_eddy(mesh, order - 1, frequency, probed[:CHECKED]).couplings,
+        solve_eddy(mesh, order - 1, over.frequency, probed[:CHECKED]).couplings,
         space_couplings([b[end : end + CHECKED] for b in tests], states.inductances, rate),
     ))  # fmt: skip
     error = missed + float(np.max(left / whole) + np.max(np.abs(rough - fine) / np.abs(fine)))
@@ -424,24 +409,15 @@ FREE = TableKind("floating-free", FreeModes, "Modes of a conductor in any pose o
 
 
 def cached_floating_modes(
-    body: Solid,
-    conductivity: float,
-    coils: Sequence[Coil],
-    shares: Sequence[Sequence[float]],
-    region: Range | Room,
-    frequency: float,
-    rtol: float,
-    report: Report,
+    over: Levitated, region: Range | Room, rtol: float, report: Report
 ) -> tuple[FloatingModes | FreeModes, bool]:
     """`floating_modes` or `free_modes`, by what the region is, from the cache if they are there, and whether they were.
 
-    `body`, `conductivity`, `coils`, `shares`, `region`, `frequency`, `rtol`: as of these; `report`: gets messages.
+    `over`, `region`, `rtol`: as of these; `report`: gets messages.
     """
-    windings = [(coil.center, coil.radius, coil.width, coil.height, coil.turns) for coil in coils]
-    inputs = (body.shape_numbers, conductivity, windings, [list(map(float, share)) for share in shares], region,
-              frequency, rtol)  # fmt: skip
-    given = body, conductivity, coils, shares
+    windings = [(coil.center, coil.radius, coil.width, coil.height, coil.turns) for coil in over.coils]
+    shares = [list(map(float, share)) for share in over.shares]
+    inputs = (over.body.shape_numbers, over.conductivity, windings, shares, region, over.frequency, rtol)
     if isinstance(region[0], float):
-        make = partial(floating_modes, *given, region, frequency, rtol)  # type: ignore[arg-type]
-        return FLOATING.cached(inputs, make, report)
-    return FREE.cached(inputs, partial(free_modes, *given, region, frequency, rtol), report)  # type: ignore[arg-type]
+        return FLOATING.cached(inputs, partial(floating_modes, over, region, rtol), report)  # type: ignore[arg-type]
+    return FREE.cached(inputs, partial(free_modes, over, region, rtol), report)  # type: ignore[arg-type]

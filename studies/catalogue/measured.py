@@ -24,7 +24,7 @@ from ...dynamics.flights import conductor
 from ...fem.closed_forms.eddy_bodies import polarizability, sphere_reaction, tube_drag, tube_reaction
 from ...fem.closed_forms.potentials import Dipole, HomogeneousField
 from ...fem.plate.eddy import plate_reaction, solve_eddy
-from ...fem.plate.floating import FloatingModes, floating_modes, modes_along
+from ...fem.plate.floating import FloatingModes, Levitated, floating_modes, modes_along
 from ...fem.plate.slab import Slab, drag_and_lift
 from ...geometry.common import MU_0, Array
 from ...geometry.meshes.plate import MeshRule, plate_mesh
@@ -95,8 +95,8 @@ def _modes(scene: Scene, order: int, heights: tuple[float, float] | None = None)
     """Modes of a scene's disc over its coils by finite elements of an order, and of one order less for the error."""
     (disc,), coils = scene.floater.bodies, scene.coils
     shares = conductor.Supply(coils, conductor.sources_of(coils)).shares
-    region = heights or conductor.heights_over(scene)
-    return floating_modes(disc, ALUMINIUM, coils, shares, region, coils[0].frequency, order=order)
+    over = Levitated(disc, ALUMINIUM, coils, shares, coils[0].frequency)
+    return floating_modes(over, heights or conductor.heights_over(scene), order=order)
 
 
 def _sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple[str, float]]:

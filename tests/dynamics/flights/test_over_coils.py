@@ -21,7 +21,7 @@ from spinlev.dynamics.flights.conductor import (
 from spinlev.fem.closed_forms.coil import CoilField
 from spinlev.fem.closed_forms.eddy_bodies import thin_field_torque
 from spinlev.fem.plate.eddy import solve_eddy
-from spinlev.fem.plate.floating import AxialPotential, _Seen, floating_modes, free_modes, sampled_poses
+from spinlev.fem.plate.floating import AxialPotential, Levitated, _Seen, floating_modes, free_modes, sampled_poses
 from spinlev.geometry.common import InputError
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.scene.contents import AbsoluteStart, Plate
@@ -35,10 +35,14 @@ SCENE = parse_scene(TEAM28)
 BODY, WEIGHT = SCENE.floater.bodies[0], SCENE.floater.mass * 9.81
 
 
+def conductor(scene, frequency):
+    shares = Supply(scene.coils, sources_of(scene.coils)).shares
+    return Levitated(scene.floater.bodies[0], 3.4e7, scene.coils, shares, frequency)
+
+
 @pytest.fixture(scope="module")
 def modes():
-    supply = Supply(SCENE.coils, sources_of(SCENE.coils))
-    return floating_modes(BODY, 3.4e7, SCENE.coils, supply.shares, heights_over(SCENE), 50.0, 1e-3, order=3)
+    return floating_modes(conductor(SCENE, 50.0), heights_over(SCENE), 1e-3, order=3)
 
 
 @pytest.fixture(scope="module")
@@ -139,15 +143,13 @@ DISC = parse_scene(PAIR)
 
 @pytest.fixture(scope="module")
 def free():
-    shares = Supply(DISC.coils, sources_of(DISC.coils)).shares
-    return free_modes(DISC.floater.bodies[0], 3.4e7, DISC.coils, shares, room_over(DISC), 100.0, order=3)
+    return free_modes(conductor(DISC, 100.0), room_over(DISC), order=3)
 
 
 @pytest.mark.slow
 def test_free_motion_along_the_axis_is_that_along_the_axis(free):
     """Both have finite elements of order 3 on other meshes: nearest to the coils 2e-3 of the force are between them."""
-    shares = Supply(DISC.coils, sources_of(DISC.coils)).shares
-    axial = floating_modes(DISC.floater.bodies[0], 3.4e7, DISC.coils, shares, heights_over(DISC), 100.0, order=3)
+    axial = floating_modes(conductor(DISC, 100.0), heights_over(DISC), order=3)
     for height in (2.5e-3, 6e-3, 15e-3):
         force = free.mean_force(np.array([0.0, 0.0, height]), np.eye(3), np.array([14.0]), 100.0)
         assert np.hypot(*force[:2]) < 1e-3 * abs(force[2])
@@ -200,8 +202,7 @@ def test_sphere_that_spins_over_a_steady_coil_slows_down_as_in_a_uniform_field()
     scene = assemble(
         {"floater": ball, "coils": [coil], "start": start, "drag": drag, "gravity_m_s2": [0.0] * 3}, "spun"
     )
-    shares = Supply(scene.coils, sources_of(scene.coils)).shares
-    modes = free_modes(scene.floater.bodies[0], 3.4e7, scene.coils, shares, room_over(scene), 50.0, order=2)
+    modes = free_modes(conductor(scene, 50.0), room_over(scene), order=2)
     motion = free_motion(scene, modes, 0.03)
     field = CoilField(scene.coils).flux_density(motion.position[:1])[0, 2] * 15.0
     rate = thin_field_torque(0.01, 3.4e7) * field**2 / scene.floater.inertia
