@@ -136,27 +136,38 @@ def survey(
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
     """
     check_turning(scene)
+    search = _Search(farthest, remembered, watch)
     if not scene.floater.round:
-        return _survey_of_any_body(scene, table, spin, farthest, rates, remembered, watch)
+        return _survey_of_any_body(scene, table, spin, rates, search)
     if scene.floater.mean:
-        return _survey_of_mean(scene, mean_over_turns(scene, table), spin, farthest, remembered, watch)
+        return _survey_of_mean(scene, mean_over_turns(scene, table), spin, search)
     scales = Scales.of(scene)
     equations = rates or Rates(with_effects(scene, table))
     top = _own_spin(scene) * scales.time * scales.spin_ratio
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio, top)
-    known = remembered(lambda: _search(scene, table, balance, farthest, watch), "")
+    known = search.found(scene, table, balance, "")
     if np.any(scene.gravity[:2]) and any(of_whole_body(scene, equations, e) for e in upright(scene, balance, known)):
         balance = replace(balance, rates=Rates(mean_over_turns(scene, table)[1]))
     return survey_of(scene, balance, known)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What `survey` has of a search."""
+
+    farthest: float
+    remembered: Remembered
+    watch: Watch
+
+    def found(self, scene: Scene, table: FieldTable, balance: Balance, kind: str) -> FixedPoints:
+        return self.remembered(lambda: _searched(scene, table, balance, self.farthest, self.watch), kind)
 
 
 def _survey_of_mean(
     scene: Scene,
     means: tuple[Scene, Interaction, Interaction],
     spin: float,
-    farthest: float,
-    remembered: Remembered,
-    watch: Watch,
+    search: _Search,
     quick: Rates | None = None,
 ) -> Survey:
     """`survey` of a body's mean over turns (`mean_over_turns`), from its multipoles, whose rates are `quick`."""
@@ -164,21 +175,13 @@ def _survey_of_mean(
     scales, ratio = Scales.of(round_scene), round_scene.floater.spin_ratio
     values, own = parameters(round_scene, scales, frozen_spin=True), _own_spin(scene) * scales.time * ratio
     about = Balance(quick or Rates(roughly), values, spin * ratio, own)
-    seeds = remembered(lambda: _search(round_scene, exactly, about, farthest, watch), AVERAGED)
-    exact, points = _by_whole_body(scene, exactly, about, seeds.points, farthest)
+    seeds = search.found(round_scene, exactly, about, AVERAGED)
+    exact, points = _by_whole_body(scene, exactly, about, seeds.points, search.farthest)
     here, doubts = field_doubts(exactly, points[:, :3] * scales.length)
     return survey_of(round_scene, exact, FixedPoints.at(exact, points[here], doubts, seeds.curves))
 
 
-def _survey_of_any_body(
-    scene: Scene,
-    table: FieldTable,
-    spin: float,
-    farthest: float,
-    rates: Rates | None,
-    remembered: Remembered,
-    watch: Watch,
-) -> Survey:
+def _survey_of_any_body(scene: Scene, table: FieldTable, spin: float, rates: Rates | None, search: _Search) -> Survey:
     """`survey` of a body that is not round about its moment: its mean over turns about that, and frequency-locked."""
     means = mean_over_turns(scene, table)
     quick = Rates(means[2])
@@ -186,16 +189,18 @@ def _survey_of_any_body(
     curves: tuple[ForceCurve, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     if scene.floater.turns_freely:
-        known = _survey_of_mean(scene, means, spin, farthest, remembered, watch, quick)
+        known = _survey_of_mean(scene, means, spin, search, quick)
         found = [replace(one, kind=AVERAGED) for one in known.equilibria]
         curves, left_out = known.curves, known.left_out
     if scene.frequency:
         round_scene, exactly, _ = means
         values = parameters(round_scene, Scales.of(round_scene), frozen_spin=True)
         still = Balance(quick, values, round_scene.floater.spin_ratio, still=True)
-        seeds = remembered(lambda: _search(round_scene, exactly, still, farthest, watch), LOCKED)
+        seeds = search.found(round_scene, exactly, still, LOCKED)
         rates = rates or Rates(with_effects(scene, table))
-        locked = _survey(_locked(scene, with_effects(scene, table), seeds, farthest, rates), curves or seeds.curves)
+        locked = _survey(
+            _locked(scene, with_effects(scene, table), seeds, search.farthest, rates), curves or seeds.curves
+        )
         if np.any(scene.gravity[:2]):
             alone = replace(scene, plate=None)
             locked = _forced(ForcedMotion(alone, rates, parameters(scene, Scales.of(scene)), None), locked)
@@ -227,7 +232,7 @@ def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, farthest: floa
     return without_twins([one for one in found if rotor_gap(scene, one.position, one.state.orientation) > 0])
 
 
-def _search(scene: Scene, table: FieldTable, balance: Balance, farthest: float, watch: Watch) -> FixedPoints:
+def _searched(scene: Scene, table: FieldTable, balance: Balance, farthest: float, watch: Watch) -> FixedPoints:
     scales = Scales.of(scene)
     balance.rates.compile()
     curves, where = fixed_points(balance, SearchRange(scene, farthest), watch)

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
+from typing import Any
 
 import ngsolve
 import numpy as np
@@ -451,18 +452,7 @@ def _fitted(space: CurrentSpace, places: Array, images: Array) -> tuple[Array, A
 CURRENTS = TableKind("plate-currents", PlateSolution, "Currents of a plate by finite elements")
 
 
-def cached_currents(
-    plate: Plate,
-    boxes: Sequence[Region],
-    frequencies: tuple[float, float],
-    rtol: float,
-    rule: MeshRule | None = None,
-    others: OtherSources | None = None,
-    *,
-    report: Report,
-    watch: Watch = unwatched,
-) -> PlateSolution:
-    """`solve_currents` from the cache if it is there; `report` gets messages, `watch` progress."""
-    inputs = plate.body.shape_numbers, plate.metal, tuple(boxes), frequencies, rtol, rule, others
-    make = partial(solve_currents, plate, boxes, frequencies, rtol, rule, others, watch)
-    return CURRENTS.cached(inputs, make, report)[0]
+def cached_currents(plate: Plate, *given: Any, report: Report, watch: Watch = unwatched) -> PlateSolution:
+    """`solve_currents` of all up to the others, `given`, from the cache if it is there; `report` gets messages."""
+    inputs, solve = (plate.body.shape_numbers, plate.metal, *given), partial(solve_currents, watch=watch)
+    return CURRENTS.cached(inputs, partial(solve, plate, *given), report)[0]

@@ -109,7 +109,7 @@ class PlateAround:
             return from_slab(plate, region, frequencies, rtol, others, far)
         boxes = [outer_box(region, plate.body), outer_box(rotor_box(plate, rotor), plate.body)]
         outer = outer_frequencies(frequencies)
-        solution = solve(plate, boxes, outer, rtol, self.rule)
+        solution = solve(plate, boxes, outer, rtol, self.rule, None)
         watch("reduced plate model", 0.0)
         error = error_of(solution, others.probes)
         if error > OTHERS_SHARE * (NETWORK_SHARE * rtol - solution.mesh_error):
