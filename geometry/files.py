@@ -28,13 +28,8 @@ from .common import ComputationError, InputError, printable, shown
 
 MEGA = 1_000_000
 # What is no file of a disk.
-KINDS = {
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
+KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+KINDS |= dict.fromkeys((stat.S_IFCHR, stat.S_IFBLK), "a device")
 LONGEST = 300  # Characters of a file's name in a message
 MEMORY = 2_000_000_000  # Bytes of address space of another process; the libraries alone take a third of it
 SLOWER = 4.0  # How much longer by the clock than by the processor a call may take: the machine has others to serve

@@ -109,16 +109,10 @@ class Family(BalanceCurve):
     def at(self, unknowns: Array, tangent: Array, parameter: float) -> BranchPoint:
         """The equilibrium at a solution `unknowns` (7,) at `parameter`, whose branch goes on along a `tangent` (7,)."""
         balance = self.balance(parameter)
-        state = balance.states(unknowns[None, :3], unknowns[None, 3:6])
-        return BranchPoint(
-            parameter=parameter,
-            spin=float(balance.spin) / self.spin_ratio,
-            position=unknowns[:3] * balance.values[Parameter.LENGTH],
-            state=state[0],
-            tangent=tangent,
-            motion=modes(state[0], self.rates(state, balance.values)[1][0]),
-            time_unit=float(balance.values[Parameter.TIME]),
-        )
+        length, time = balance.values[[Parameter.LENGTH, Parameter.TIME]].tolist()
+        (state,) = states = balance.states(unknowns[None, :3], unknowns[None, 3:6])
+        motion, spin = modes(state, self.rates(states, balance.values)[1][0]), float(balance.spin) / self.spin_ratio
+        return BranchPoint(parameter, spin, unknowns[:3] * length, state, tangent, motion, time)
 
     def after(self, unknowns: Array, tangent: Array, step: float) -> BranchPoint:
         """The equilibrium a `step` along the branch from `unknowns` (7,) on a `tangent`. Raises EquilibriumError."""

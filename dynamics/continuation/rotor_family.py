@@ -223,12 +223,10 @@ def rotor_family(
         magnet if move == Move() else replace(magnet, body=moved(magnet.body, np.zeros(3), np.eye(3)))
         for magnet, move in zip(scene.rotor, moves, strict=True)
     )
-    alone = [
-        cached_rotor_table((magnet,), model, rtol, lambda _: None, nearest)[0]
-        if model in PERMEABLE  # elements take a second, and are kept
-        else rotor_table((magnet,), model, rtol, nearest)
-        for magnet in rotor
-    ]
+    if model in PERMEABLE:  # elements take a second, and are kept
+        alone = [cached_rotor_table((magnet,), model, rtol, lambda _: None, nearest)[0] for magnet in rotor]
+    else:
+        alone = [rotor_table((magnet,), model, rtol, nearest) for magnet in rotor]
     parts = list(zip(rotor, moves, alone, strict=True))
     effects = (*_mutual_magnetisation(scene, parts, interaction, rtol), *_currents(scene, parts))
     return RotorFamily(scene, rotor, moves, MovableField(tuple((table, move) for _, move, table in parts)), effects)

@@ -150,15 +150,8 @@ def _averaged(torque: SlowTorque, points: list[BranchPoint], duration: float, en
         bend = float(course(arc[-1], 2)[0] / pace(arc[-1]))  # d²s/dℓ² over ds/dt there
         remaining = abs(bend) / 2 * (arc[-1] - arc[before]) ** 2
         last_fall = float(ESCAPE * (4 * remaining / slowest**4) ** 0.2)
-    return Drift(
-        time=times,
-        spin=spin,
-        distance=distance,
-        growth_per_s=growth(lengths),
-        ended_by=ended,
-        balance_spin=float(course(balances[0])[0]) if len(balances) else np.nan,
-        last_fall_s=last_fall,
-    )
+    balance_spin = float(course(balances[0])[0]) if len(balances) else np.nan
+    return Drift(times, spin, distance, growth(lengths), ended, balance_spin, last_fall)
 
 
 def drift(

@@ -273,9 +273,6 @@ def continued(
     there = points[:, 6] > 0
     landed = solve(ways.balances(there.astype(float), which), points[:, :3], points[:, 3:6], EVERY, NEWTON_STEPS)
     met = landed[2] < CONVERGED_STEP
-    return (
-        np.concatenate([np.flatnonzero(good), rest[which[met]]]),
-        np.concatenate([np.ones(good.sum(), bool), there[met]]),
-        np.concatenate([places[good], landed[0][met]]),
-        np.concatenate([turned[good], landed[1][met]]),
-    )
+    position, moment = (np.concatenate([a[good], b[met]]) for a, b in ((places, landed[0]), (turned, landed[1])))
+    followed = np.concatenate([np.flatnonzero(good), rest[which[met]]])
+    return followed, np.concatenate([np.ones(good.sum(), bool), there[met]]), position, moment

@@ -276,24 +276,18 @@ class _RoundSurface(Surface):
         half, outer, inner = body.height / 2, body.radius, body.inner_radius
         self.body, self.count = body, count
         # middle and half way of each line (r, z), and its normal
-        self.lines = [
-            (np.array([outer, 0.0]), np.array([0.0, half]), np.array([1.0, 0.0])),
-            *(
-                (np.array([(outer + inner) / 2, s * half]), np.array([(outer - inner) / 2, 0.0]), np.array([0.0, s]))
-                for s in (-1.0, 1.0)
-            ),
-        ]
-        if inner:
-            self.lines.append((np.array([inner, 0.0]), np.array([0.0, half]), np.array([-1.0, 0.0])))
+        face, wall = (outer + inner) / 2, ((outer - inner) / 2, 0.0)
+        lines = [((outer, 0.0), (0.0, half), (1.0, 0.0)), *(((face, s * half), wall, (0.0, s)) for s in (-1.0, 1.0))]
+        lines += [((inner, 0.0), (0.0, half), (-1.0, 0.0))] if inner else []
+        self.lines = [(np.array(middle), np.array(way), np.array(normal)) for middle, way, normal in lines]
         (x, weights), turns = rule or graded(count), 2 * count
         self.section = np.concatenate([middle + x[:, None] * way for middle, way, _ in self.lines])
         across = np.concatenate([np.broadcast_to(normal, (count, 2)) for _, _, normal in self.lines])
         widths = np.concatenate([weights * np.linalg.norm(way) for _, way, _ in self.lines])
         angle = 2 * np.pi * np.arange(turns) / turns
+        turned = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
         self.places, self.normals = (
-            np.stack(
-                np.broadcast_arrays(r[:, None] * np.cos(angle), r[:, None] * np.sin(angle), z[:, None]), axis=-1
-            ).reshape(-1, 3)
+            (r[:, None, None] * turned + z[:, None, None] * [0.0, 0.0, 1.0]).reshape(-1, 3)
             for r, z in (self.section.T, across.T)
         )
         self.section_normals = across

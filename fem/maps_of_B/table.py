@@ -134,15 +134,11 @@ def _way_out(likely: Sequence[tuple[str, str]], read_as: tuple[str, str]) -> str
     guess, title, key = "{name} in {unit}, but read as {read}", "{title}_{unit}", 'rotor.map_{key}_unit = "{plain}"'
 
     def said(form: str) -> str:
-        ways = [
-            [
-                form.format(**word, unit=unit, read=read, plain=unit.replace("µ", "u"))
-                for word, unit, read in zip(words, units, read_as, strict=True)
-                if unit != read
-            ]
-            for units in likely
-        ]
-        return ", or ".join(" and ".join(changed) for changed in ways)
+        ways = []
+        for units in likely:
+            changed = [row for row in zip(words, units, read_as, strict=True) if row[1] != row[2]]
+            ways += [[form.format(**w, unit=u, read=r, plain=u.replace("µ", "u")) for w, u, r in changed]]
+        return ", or ".join(map(" and ".join, ways))
 
     return (
         f": probably {said(guess)}. Correct the unit in the file (a title such as {said(title)}), or set {said(key)}."

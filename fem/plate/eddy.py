@@ -79,14 +79,8 @@ class EddySpace:
         """The finite elements; real and complex ones have the same numbering."""
         mesh = self.conductors.mesh
         inside = [int(name in self.conductors.conductivity) for name in mesh.GetMaterials()]
-        return ngsolve.HCurl(
-            mesh,
-            order=self.order,
-            complex=complex_valued,
-            gradientdomains=inside,
-            gradientboundaries=[0] * len(mesh.GetBoundaries()),
-            dirichlet="far",
-        )
+        gradients = {"gradientdomains": inside, "gradientboundaries": [0] * len(mesh.GetBoundaries())}
+        return ngsolve.HCurl(mesh, order=self.order, complex=complex_valued, dirichlet="far", **gradients)
 
     def class_images(self, sources: Sequence[Source]) -> NDArray[np.float64]:
         """(classes, sources, n, 3) parity parts of the sources' potentials at the quadrature points, T m."""

@@ -267,14 +267,9 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
     body = plate.box.to_body(places)
     changes = []
     for seen, shift in ((body[:1], LOW), *([(body, frequency)] if frequency else [])):
-        with_edges, endless = (
-            solve_shifted(
-                EddySpace(plate_mesh(plate.body, plate.metal, seen, shift, RULE, without), ORDER),
-                2 * np.pi * shift,
-                unit_dipoles(seen),
-            ).couplings[:3]
-            for without in (False, True)
-        )
+        meshes = (plate_mesh(plate.body, plate.metal, seen, shift, RULE, without) for without in (False, True))
+        solved = (solve_shifted(EddySpace(mesh, ORDER), 2 * np.pi * shift, unit_dipoles(seen)) for mesh in meshes)
+        with_edges, endless = (one.couplings[:3] for one in solved)
         parts = [part.reshape(3, -1, 3) for part in (with_edges - endless, endless)]
         missed, sizes = (np.linalg.norm(part, axis=(0, 2)) for part in parts)
         changes.append(float(np.max(missed / sizes)))
