@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .common import Array
 from .magnets import Conductor, Magnet
 from .shapes import Box, Cylinder, Sphere, rotation_matrix
-from .solids import Part, Solid, Solids, carried, moved
+from .solids import Part, Solid, Solids, moved, with_frame
 
 # Bodies that overlap by less than this (m) only touch: it is far above round-off and far below any tolerance.
 TOUCHING = 1e-9
@@ -143,7 +143,7 @@ def deepest_overlap_in_a_turn(rotating: Solid, fixed: Solid) -> float:
         return -clear
 
     def gap(angle: float) -> float:
-        body = carried(rotating, rotation_matrix((0.0, 0.0, np.degrees(angle))))
+        body = with_frame(rotating, rotation_matrix((0.0, 0.0, np.degrees(angle))))
         clear = float(fixed.distance(body.center)) - body.circumradius
         return clear if clear > 0 else -body_overlap(body, fixed)  # where the sphere about the body is clear, its gap
 

@@ -193,7 +193,7 @@ class Compound(Body):
 
     @property
     def placed(self) -> "tuple[Solid, ...]":
-        return tuple(carried(body, self.rotation, self.center) for body in self.bodies)
+        return tuple(with_frame(body, self.rotation, self.center) for body in self.bodies)
 
     @cached_property
     def size(self) -> Array:
@@ -285,7 +285,7 @@ def moved(body: Some, center: Array, rotation: Array | None = None) -> Some:
     return replace(body, center=center, rotation=body.rotation if rotation is None else rotation)  # type: ignore[type-var]
 
 
-def carried(body: Some, axes: Array, place: Array | float = 0.0) -> Some:
+def with_frame(body: Some, axes: Array, place: Array | float = 0.0) -> Some:
     """The `body` of a frame that comes to be at a `place` (3,) m with `axes`, columns of (3, 3)."""
     return moved(body, place + axes @ body.center, axes @ body.rotation)
 
@@ -296,7 +296,7 @@ def known_shape(part: Part) -> Solid | None:
         distances = np.abs(local.distance(part.triangles.reshape(-1, 3)))
         alike = np.allclose([local.volume, local.area], [part.volume, part.area], rtol=SAME_SHAPE, atol=0.0)
         if alike and distances.max() < SAME_SHAPE * part.circumradius:
-            return carried(local, part.rotation, part.center)
+            return with_frame(local, part.rotation, part.center)
     return None
 
 

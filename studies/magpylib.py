@@ -16,7 +16,7 @@ from ..fem.rotor.table import RotorTable
 from ..geometry.common import MU_0, Array, InputError
 from ..geometry.files import write_whole
 from ..geometry.meshes.solids import faceted, joined, lies_within, segment, shifted, solid_of, step_text
-from ..geometry.scene.files import pose_keys, shape_keys
+from ..geometry.scene.files import body_keys
 from ..geometry.scene.making import magnets
 from ..geometry.shapes import Box, Cylinder, Sphere
 from ..geometry.solids import Part, Solid, known_shape
@@ -110,8 +110,7 @@ def _table(magnet: _Magnet, recoil_permeability: float, folder: Path) -> dict[st
         except OSError as error:
             raise InputError(f"Input folder must be one that files can be written to; instead: {error}.") from None
     return {
-        **shape_keys(body),
-        **pose_keys(body),
+        **body_keys(body),
         "polarization_T": (polarization + 0.0).tolist(),
         "recoil_permeability": recoil_permeability,
     }

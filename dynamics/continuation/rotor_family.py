@@ -22,7 +22,7 @@ from ...geometry.common import Array, InputError
 from ...geometry.magnets import Magnet
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import rotation_matrix
-from ...geometry.solids import carried, moved
+from ...geometry.solids import moved, with_frame
 from ..motion.effect import Added, Effect, Interaction, Motion, Placeable, Poses
 from ..motion.effects import mean_over_turns, mutual_choice, with_effects
 from ..motion.equations import parameters
@@ -44,7 +44,7 @@ class Move:
     def moved(self, magnet: Magnet, measure: float) -> Magnet:
         """The magnet, from where it is at measure zero."""
         turn = rotation_matrix((0.0, -np.degrees(measure) if self.turning else 0.0, 0.0))
-        return replace(magnet, body=carried(magnet.body, turn, measure * np.array(self.way)))
+        return replace(magnet, body=with_frame(magnet.body, turn, measure * np.array(self.way)))
 
     def place(self, position: Numbers, measure: Any) -> list[Any]:
         """A position (3) m in the part's own frame."""

@@ -78,13 +78,15 @@ class CurrentSpace:
         return [np.concatenate(rows) for rows in found]
 
 
-def space_couplings(b: Sequence[Array], inductances: Sequence[Array], shift: complex) -> ComplexArray:
-    """(sources, sources) -s b (1 + sL)⁻¹ bᵀ of `inductances` L, summed over classes; `shift` s is iω or real, rad/s."""
-    parts = [
-        b_class @ np.linalg.solve(np.eye(len(induct)) + shift * induct, b_class.T)
-        for b_class, induct in zip(b, inductances, strict=True)
-    ]
-    return np.asarray(-shift * sum(parts))
+def space_couplings(
+    b: Sequence[Array], inductances: Sequence[Array], shift: complex, others: Sequence[Array] | None = None
+) -> ComplexArray:
+    """(sources, others) -s b (1 + sL)⁻¹ oᵀ, summed over classes; o is b where it is left out.
+
+    `b`, `others`: couplings of sources; `inductances`: L; `shift`: s is iω or real, rad/s.
+    """
+    rows = zip(b, inductances, others or b, strict=True)
+    return np.asarray(-shift * sum(d @ np.linalg.solve(np.eye(len(one)) + shift * one, o.T) for d, one, o in rows))
 
 
 def grid_counts(region: Region, body: Solids) -> tuple[int, int, int]:
@@ -425,12 +427,9 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     worst = 0.0
     for omega, residuals in zip(solution.angular_frequencies, solution.residuals, strict=True):
         left = np.sqrt(np.sum(amplitudes @ residuals[np.ix_(stands, stands)].real * amplitudes, axis=1)) + rest
-        fields = sum(
-            d @ np.linalg.solve(np.eye(len(induct)) + 1j * omega * induct, t.T)
-            for d, t, induct in zip(driving, testing, space.inductances, strict=True)
-        )
+        fields = space_couplings(driving, space.inductances, 1j * omega, testing)
         power = np.trace(residuals[np.ix_(tested, tested)]).real
-        worst = max(worst, float(np.max(left * np.sqrt(power) / np.linalg.norm(np.asarray(fields), axis=1))))
+        worst = max(worst, float(np.max(left * omega * np.sqrt(power) / np.linalg.norm(fields, axis=1))))
     return worst
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from ...geometry.common import MU_0, Array
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import rotation_matrix
-from ...geometry.solids import carried
+from ...geometry.solids import with_frame
 from ..closed_forms.moments import carrier
 from ..closed_forms.uniform import remanent_field
 from .near_field import NearElements, NearField, near_field
@@ -107,7 +107,7 @@ class EasyField:
         """
         if self.floater is None:
             return np.zeros(len(points))
-        there = replace(self.floater, body=carried(self.floater.body, rotation_matrix((0.0, 0.0, turn_deg))))
+        there = replace(self.floater, body=with_frame(self.floater.body, rotation_matrix((0.0, 0.0, turn_deg))))
         return np.asarray(remanent_field([carrier(there)], points) @ easy_axis(self.magnets[number]))
 
 

@@ -26,7 +26,7 @@ from ..files import LostError, call_apart
 from ..magnets import Magnet
 from ..overlap import overlapping_magnets
 from ..shapes import Box, Cylinder, Sphere
-from ..solids import Part, Solid, carried, moved
+from ..solids import Part, Solid, moved, with_frame
 from .solids import LONGEST, SIMPLER, SMALLEST, SolidMesh, occ_solid, unmeshed
 
 if TYPE_CHECKING:
@@ -253,7 +253,7 @@ class Symmetry:
 
     def to_frame(self, magnet: Magnet) -> Magnet:
         """The magnet as seen in the mirrors' frame: planes are coordinate planes through the origin."""
-        return replace(magnet, body=carried(moved(magnet.body, magnet.body.center - self.center), self.axes.T))
+        return replace(magnet, body=with_frame(moved(magnet.body, magnet.body.center - self.center), self.axes.T))
 
 
 def find_symmetry(magnets: Sequence[Magnet]) -> Symmetry:

@@ -19,7 +19,7 @@ from ..magnets import Magnet
 from ..shapes import rotation_angles
 from ..solids import Part, Solid
 from . import schema
-from .contents import Coil, Drag, OffsetStart, Scene
+from .contents import Drag, OffsetStart, Scene
 from .making import WITH_TOLERANCE, assemble, content_digest
 from .messages import SceneError, unusual
 
@@ -391,15 +391,13 @@ def _rotor(scene: Scene) -> dict[str, Any] | None:
         return None
     keys: dict[str, Any] = {"magnets": [_magnet(magnet) for magnet in scene.rotor]}
     keys |= {"field_map": str(scene.field_map)} if scene.field_map else {}
-    conductors = [
-        {"shape": "cuboid", **shape_keys(c.body), **pose_keys(c.body), **_said(schema.ConductorTable, c)}
-        for c in scene.conductors
-    ]
+    pieces = [{"shape": "cuboid"} | body_keys(c.body) for c in scene.conductors]
+    conductors = [keys | _said(schema.ConductorTable, c) for keys, c in zip(pieces, scene.conductors, strict=True)]
     return keys | _said(schema.AnyRotor, scene.map_reading) | ({"conductors": conductors} if conductors else {})
 
 
 def _magnet(magnet: Magnet) -> dict[str, Any]:
-    keys = {**shape_keys(magnet.body), **pose_keys(magnet.body), **_said(schema.MagnetTable, magnet)}
+    keys = body_keys(magnet.body) | _said(schema.MagnetTable, magnet)
     both = [magnet.recoil_permeability, magnet.transverse_permeability]
     return keys if magnet.isotropic else keys | {"recoil_permeability": both}
 
@@ -416,7 +414,7 @@ def _floater(scene: Scene) -> dict[str, Any]:
         return _said(schema.FloaterTable, floater) | shape_keys(floater.bodies[0]) | given
     magnets, bodies = list[dict[str, Any]](), list[dict[str, Any]]()
     for part in floater.pieces:
-        keys = {**shape_keys(part.magnet.body), **pose_keys(part.magnet.body), "density_kg_m3": part.density}
+        keys = body_keys(part.magnet.body) | {"density_kg_m3": part.density}
         bare = not (part.magnet.polarization.any() or part.magnet.contrast)
         table, form = (bodies, schema.BallastTable) if bare else (magnets, schema.FloaterMagnetTable)
         table.append(keys | _said(form, part.magnet))
@@ -427,10 +425,8 @@ def _plate(scene: Scene) -> dict[str, Any] | list[dict[str, Any]] | None:
     if (plate := scene.plate) is None:
         return None
     down = {"lowering": _said(schema.LoweringTable, plate.lowering)} if plate.lowering else {}
-    each = [
-        {**shape_keys(body), **pose_keys(body), "conductivity_S_m": _rounded(metal), **down}
-        for body, metal in zip(plate.body.placed, plate.each or [plate.conductivity], strict=True)
-    ]
+    pairs = zip(plate.body.placed, plate.each or [plate.conductivity], strict=True)
+    each = [body_keys(body) | {"conductivity_S_m": _rounded(metal)} | down for body, metal in pairs]
     return each[0] if len(each) == 1 else each
 
 
@@ -451,15 +447,12 @@ def _drive(scene: Scene) -> list[dict[str, Any]] | None:
 
 
 def _coils(scene: Scene) -> list[dict[str, Any]] | None:
-    def current(coil: Coil) -> Any:
-        return coil.current.tolist() if isinstance(coil.current, np.ndarray) else float(coil.current)
-
-    phases = [{"phase_deg": _rounded(np.degrees(coil.phase))} for coil in scene.coils]
-    said = [_said(schema.CoilTable, coil) for coil in scene.coils]
-    return [
-        keys | phase | {"current_A": current(coil), "frequency_hz": float(coil.frequency)}
-        for keys, phase, coil in zip(said, phases, scene.coils, strict=True)
-    ] or None
+    found = list[dict[str, Any]]()
+    for coil in scene.coils:
+        keys = _said(schema.CoilTable, coil) | {"phase_deg": _rounded(np.degrees(coil.phase))}
+        current = coil.current.tolist() if isinstance(coil.current, np.ndarray) else float(coil.current)
+        found.append(keys | {"current_A": current, "frequency_hz": float(coil.frequency)})
+    return found or None
 
 
 def _start(scene: Scene) -> dict[str, Any] | None:
@@ -475,10 +468,11 @@ def shape_keys(body: Solid) -> dict[str, Any]:
     }
 
 
-def pose_keys(body: Solid) -> dict[str, Any]:
-    """The keys of a body's place and axes; of a part, where the origin of its file lies."""
+def body_keys(body: Solid) -> dict[str, Any]:
+    """The keys of a body's shape, place and axes; of a part, where the origin of its file lies."""
     center = body.center + body.rotation @ body.origin if isinstance(body, Part) else body.center
-    return {"center_mm": _all_rounded(1e3 * center), "rotation_deg": _all_rounded(rotation_angles(body.rotation))}
+    pose = {"center_mm": 1e3 * center, "rotation_deg": rotation_angles(body.rotation)}
+    return shape_keys(body) | {key: _all_rounded(value) for key, value in pose.items()}
 
 
 def _rounded(value: float) -> float:

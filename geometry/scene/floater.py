@@ -15,7 +15,7 @@ import numpy as np
 from ..common import Array, InputError, frozen_array
 from ..magnets import Magnet, polarizability
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix, unturned
-from ..solids import Part, Solid, carried, moved
+from ..solids import Part, Solid, moved, with_frame
 from ..step_file import second_moments_of_part
 
 ROUND = 1e-9  # of sizes, moments of inertia and directions: what deviates less is round-off of a file
@@ -79,7 +79,7 @@ class Floater:
         bodies = [piece.magnet.body for piece in pieces]
         metals = [piece.magnet.conductivity for piece in pieces if piece.magnet.conductivity is not None]
         if center.any() or not np.array_equal(turn, np.eye(3)):
-            bodies = [carried(moved(body, body.center - center), turn.T) for body in bodies]
+            bodies = [with_frame(moved(body, body.center - center), turn.T) for body in bodies]
         return cls(
             radius=max(body.farthest(np.zeros(3)) for body in bodies),
             remanence=max(float(np.linalg.norm(piece.magnet.polarization)) for piece in pieces),
@@ -181,7 +181,7 @@ class Floater:
         """Its mean over turns about its moment, which is round."""
         turn, along = _frame_about(self.pointing), float(self.principal_inertia @ self.pointing**2)
         across = (float(self.principal_inertia.sum()) - along) / 2
-        magnets = [replace(part.magnet, body=carried(part.magnet.body, turn.T)) for part in self.parts]
+        magnets = [replace(part.magnet, body=with_frame(part.magnet.body, turn.T)) for part in self.parts]
         pieces = tuple(FloaterPart(one, part.density) for one, part in zip(magnets, self.parts, strict=True))
         return replace(self, body=None, pieces=pieces, moments_of_inertia=(across, across, along), mean=True)
 
@@ -237,12 +237,12 @@ class Floater:
         if self.is_sphere:
             return (Sphere(self.radius, position),)
         axes = self.axes(orientation)
-        return tuple(carried(body, axes, position) for body in self.bodies)
+        return tuple(with_frame(body, axes, position) for body in self.bodies)
 
     def magnets_at(self, position: Array, orientation: Array) -> tuple[Magnet, ...]:
         """Its magnets in their places, see `placed`."""
         axes = self.axes(orientation)
-        return tuple(replace(magnet, body=carried(magnet.body, axes, position)) for magnet in self.magnets)
+        return tuple(replace(magnet, body=with_frame(magnet.body, axes, position)) for magnet in self.magnets)
 
     def must_be(self, *shapes: str, where: str, instead: str) -> None:
         """Raises InputError for a floater of another shape than `where` needs; `instead` is a way out."""
