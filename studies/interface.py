@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics.flights.batch import ensemble as simulated
 from ..dynamics.motion.plate import PlateMemory
 from ..fem.cache import owned
 from ..fem.rotor.near_field import NEAR_RTOL, complete
@@ -32,18 +31,15 @@ from .figures.run import scene_figure
 from .figures.style import FigureWidth, figures_across
 from .levitation import Levitation
 from .plan import SceneLike, given_scene
-from .processes import mapped
 from .question import Question
 from .result import AXIS, Result, found_dataset, state_columns, variable
 from .several import several, several_dataset
-from .starts import drawn_starts, given_starts
+from .starts import drawn_starts, endings, given_starts
 from .study import Point, Study
 from .sweep import forget, swept
 
 if TYPE_CHECKING:
     from .page.server import LivePage
-
-TOGETHER = 512  # trajectories that a worker gets at once, at most
 
 
 @documented
@@ -320,12 +316,14 @@ def ensemble(
     seed: int = 0,
     spread: Mapping[str, Any] | None = None,
     model: FieldModel = "auto",
+    plate_model: PlateModel = "auto",
     rtol: float = Models.rtol,
+    plate_rtol: float = Models.plate_rtol,
     interaction: InteractionModel = "auto",
     workers: int | None = 1,
     progress: bool | None = None,
 ) -> xr.Dataset:
-    """Endings of very many trajectories of one scene, in SIMD batches; a plate is an obstacle without eddy currents.
+    """Endings of very many trajectories of one scene, in SIMD batches.
 
     Parameters
     ----------
@@ -347,7 +345,8 @@ def ensemble(
     xarray.Dataset
         Over `flight` and `axis`, SI units: `levitated`, `ended_by` ("duration", "contact", "lost"), the state at
         the end and, as ``start_...``, at the beginning, in the laboratory frame as in `simulate`;
-        `position_rotor_frame` is where the end is in the frame that turns with the rotor.
+        `position_rotor_frame` is where the end is in the frame that turns with the rotor; beside a plate
+        `left_plate_table` says which ended, as "lost", where its currents are not known farther on.
         Accuracy: the field errs by 1e-6 of its gradient, steps by round-off; of a body that is not round the field
         errs by 1e-5, about an equilibrium by 1e-4.
 
@@ -372,15 +371,14 @@ def ensemble(
     if (starts is None) == (n is None):
         raise InputError("Input starts must be given, or n with spread; instead received both or neither.")
     number = Workers(workers).checked().workers or os.cpu_count() or 1
-    levitation = Levitation(scene, Models(model, "none", rtol, interaction=interaction))
+    models = Models(model, plate_model, rtol, plate_rtol=plate_rtol, interaction=interaction).checked()
+    levitation = Levitation(scene, models)
     if starts is not None:
-        (begun, offset), drawn = given_starts(levitation, starts), dict[str, Any]()
+        (near, begun, offset), drawn = given_starts(levitation, starts), dict[str, Any]()
     else:
-        begun, offset = drawn_starts(levitation, n, seed, spread or {}), None
+        near, begun, offset = levitation, drawn_starts(levitation, n, seed, spread or {}), None
         drawn = {"seed": seed, "spread": repr(spread)}
-    together = min(TOGETHER, -(-len(begun.position) // number))
-    requested = levitation.scene, levitation.interaction, begun, duration_s
-    found = simulated(*requested, map if number == 1 else mapped(number), together, offset)
+    found, known = endings(near, begun, offset, duration_s, number)
     over = ("flight", "axis")
     last = found.last.to_lab(levitation.scene.angle(found.levitated_s))
     data = {
@@ -390,8 +388,11 @@ def ensemble(
         **state_columns(last, "flight", ", at the end"),
         **state_columns(begun, "flight", ", at t = 0", "start_"),  # where the rotor's axes are the laboratory's
     }
+    if known.plate is not None:
+        text = "whether it left the plate's table"
+        data["left_plate_table"] = variable(("flight",), found.left_plate_table, "1", text)
     said = {"study": "ensemble", "scene": scene_text(levitation.scene), "duration_s": duration_s}
-    return xr.Dataset(data, {"axis": list(AXIS)}, {**said, **levitation.labels, **drawn})
+    return xr.Dataset(data, {"axis": list(AXIS)}, {**said, **known.labels, **drawn})
 
 
 @documented

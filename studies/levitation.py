@@ -412,7 +412,7 @@ class Levitation:
         return rotor_nearby(table, scene.rotor, tuple(place.tolist()), scene.floater.radius, self.models.rtol)
 
     @property
-    def _known_for_flight(self) -> Sequence[Equilibrium]:
+    def known_for_flight(self) -> Sequence[Equilibrium]:
         """The equilibria at which a trajectory may begin, with the currents of its own table."""
         if self.absolute:
             return ()
@@ -444,13 +444,13 @@ class Levitation:
             if not np.array_equal(kept["region"], [bounds.lower, bounds.upper]):
                 self._widen(Region(*kept["region"]))
         while True:
-            table, plate, known = self._with_effects(self.flight_table), self.flight_plate, self._known_for_flight
+            table, plate, known = self._with_effects(self.flight_table), self.flight_plate, self.known_for_flight
             note("Motion ...")
             with progress("Motion") as bar:
                 how: dict[str, Any] = {"progress": bar, "memory": plate, "checkpoint": checkpoint}
                 simulated = simulate(self.scene, table, duration, known, **how)
             left = simulated.left_plate_table
-            beyond = left and self._followed(simulated.lab.position[-1], simulated.levitated_s)
+            beyond = left and self.follow(simulated.lab.position[-1:], simulated.time[-1:])
             if not beyond and (left or not self._plate_matters(simulated)):
                 break
             if checkpoint:
@@ -465,20 +465,22 @@ class Levitation:
     def live_flight(self) -> LiveFlight:
         """A live simulation, from where the scene says. Raises what `flight` raises."""
         if (memory := self.plate) is not None:
-            begins = initial_state(self.scene, self.table, self._known_for_flight, memory)[0].position
+            begins = initial_state(self.scene, self.table, self.known_for_flight, memory)[0].position
             if not memory.table.in_range(memory.plate.box.to_body(begins))[0]:
-                self._followed(begins, 0.0)
-        return LiveFlight(self.scene, self._with_effects(self.flight_table), self._known_for_flight, self.flight_plate)
+                self.follow(begins[None], np.zeros(1))
+        return LiveFlight(self.scene, self._with_effects(self.flight_table), self.known_for_flight, self.flight_plate)
 
-    def _followed(self, place: Array, time: float) -> bool:
-        """Make a table for a floater that left the last one at a place (3,) m and time, s; False where none can be."""
+    def follow(self, places: Array, times: Array) -> bool:
+        """Make a table for floaters that left the last one at places (n, 3) m and times (n,) s; False: none can be."""
         memory = self.flight_plate
         assert memory is not None
-        body = memory.plate.box.to_body(place + plate_depth(memory.plate, np.array([time])) * np.eye(3)[2])
+        down = plate_depth(memory.plate, times)[:, None] * np.eye(3)[2]
+        region = memory.table.region
         try:
-            region = wider_region(memory.plate, memory.table.region, self.scene.floater.radius, body)
+            for body in memory.plate.box.to_body(places + down):
+                region = wider_region(memory.plate, region, self.scene.floater.radius, body)
             where = "leaves the range of the plate's table: again from the start, with a larger one."
-            note(f"After {time:.4g} s the floater {where}")
+            note(f"After {times.min():.4g} s the floater {where}")
             self._widen(region)
         except SpinlevError as error:
             self.no_wider = str(error)

@@ -1,16 +1,23 @@
-"""Initial states of an ensemble: given, or drawn at random about that of the scene."""
+"""Many trajectories of one scene: initial states that are given, or drawn at random about its own, and their ends."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..dynamics.flights.batch import Endings, ensemble
 from ..dynamics.flights.flight import displaced, initial_state
+from ..dynamics.motion.events import clearance
 from ..dynamics.motion.state import State
 from ..geometry.common import Array, InputError
-from ..geometry.scene.contents import OffsetStart
+from ..geometry.scene.contents import AbsoluteStart, OffsetStart
 from .levitation import Levitation
+from .processes import mapped
+
+TOGETHER = 512  # Trajectories that a worker gets at once
+WIDER = 4  # Times at most that a plate's table is made larger for trajectories that leave it
 
 # SI units of the keys of `[start]`.
 UNITS = {
@@ -24,11 +31,46 @@ UNITS = {
 SPREADS = {"offset_mm": 1e-3, "velocity_mm_s": 1e-3, "moment_deg": np.pi / 180, "spin_hz": 2 * np.pi}
 
 
-def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[State, Array | None]:
+def endings(
+    levitation: Levitation, starts: State, offset: Array | None, duration: float, workers: int
+) -> tuple[Endings, Levitation]:
+    """Ends of trajectories of `duration` (s) from (n,) starts, in so many processes, and what has their models.
+
+    `offset` (n, 3) m is that of the starts from the equilibrium, where they are given by it. Trajectories that leave
+    the range of the table of a plate begin anew with a larger one, as `Levitation.flight` has it.
+    """
+    scene, count = levitation.scene, len(starts.position)
+    free = np.flatnonzero(clearance(scene, np.zeros(count), starts.position, starts.orientation) > 0)
+    if offset is None and scene.plate is not None and len(free):
+        # the nearest to the plate tells whether its currents matter
+        nearest = starts[free[np.argmin(scene.plate.body.distance(starts.position[free]))]]
+        begins = AbsoluteStart(nearest.position, nearest.velocity, nearest.moment, nearest.spin)
+        levitation = levitation.elsewhere(start=begins)
+
+    def found(some: NDArray[np.intp]) -> Endings:
+        together, plate, currents = min(TOGETHER, -(-len(some) // workers)), levitation.flight_plate, None
+        if plate is not None and offset is not None:
+            currents = initial_state(scene, levitation.interaction, levitation.known_for_flight, plate)[1]
+        begun = starts[some], duration, map if workers == 1 else mapped(workers), together
+        away = None if offset is None else offset[some]
+        return ensemble(scene, levitation.interaction, *begun, away, plate, currents)
+
+    whole = found(np.arange(count))
+    for _ in range(WIDER):
+        left = np.flatnonzero(whole.left_plate_table)
+        lab = whole.last.to_lab(scene.angle(whole.levitated_s)).position
+        if not len(left) or not levitation.follow(lab[left], whole.levitated_s[left]):
+            break
+        whole = whole.replaced(left, found(left))
+    return whole, levitation
+
+
+def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Levitation, State, Array | None]:
     """States (n, 3) at t = 0 from the keys of a scene's `[start]`, each three numbers a trajectory, or three for all.
 
-    With their offsets (n, 3) m from the equilibrium where these are given. Raises InputError for a key, a shape or a
-    number that is not allowed, with the way out; EquilibriumError where offsets are given, and there is no equilibrium.
+    With the levitation about which they are, and their offsets (n, 3) m from the equilibrium where these are given.
+    Raises InputError for a key, a shape or a number that is not allowed, with the way out; EquilibriumError where
+    offsets are given, and there is no equilibrium.
     """
     columns = {str(key): _rows("starts", str(key), values, UNITS) for key, values in starts.items()}
     if ("offset_mm" in columns) == ("position_mm" in columns):
@@ -40,9 +82,9 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Sta
         raise InputError(f"Input starts must have as many rows in each key; instead received {lengths}.")
     count = next(iter(lengths.values()), 1)
     if "offset_mm" in columns:
-        scene = levitation.elsewhere(start=OffsetStart(np.zeros(3)))
-        begun, _ = initial_state(scene.scene, levitation.interaction, levitation.quiet.equilibria)
-        return displaced(begun, columns["offset_mm"], levitation.scene.angular_velocity), columns["offset_mm"]
+        about, offset = levitation.elsewhere(start=OffsetStart(np.zeros(3))), columns["offset_mm"]
+        begun, _ = initial_state(about.scene, about.interaction, about.known_for_flight)
+        return about, displaced(begun, offset, about.scene.angular_velocity), offset
     near, floater = columns.pop("body_x", None), levitation.scene.floater
     if near is not None and floater.round:
         raise InputError(
@@ -60,7 +102,7 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Sta
         sides = [None] * count if near is None else np.broadcast_to(near, (count, 3))
         axes = np.array([floater.axes(m, x) for m, x in zip(found.moment, sides, strict=True)])
         found = replace(found, axes=axes)
-    return found, None
+    return levitation, found, None
 
 
 def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: Mapping[str, Any]) -> State:
@@ -79,8 +121,7 @@ def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: M
         )
     draws = np.random.default_rng(int(seed)).normal(size=(int(count or 0), len(SPREADS), 3))
     offset, velocity, moment, spin = (draws[:, k] * sizes.get(key, np.zeros(3)) for k, key in enumerate(SPREADS))
-    known = () if levitation.absolute else levitation.quiet.equilibria
-    begun, _ = initial_state(levitation.scene, levitation.interaction, known)
+    begun, _ = initial_state(levitation.scene, levitation.interaction, levitation.known_for_flight)
     begun = displaced(begun, offset, levitation.scene.angular_velocity)
     turned = begun.moment + moment
     turned = turned / np.linalg.norm(turned, axis=1)[:, None]

@@ -24,6 +24,7 @@ from ..motion.equations import Equations
 from ..motion.events import (
     BEYOND,
     CONTACT,
+    LOST,
     Events,
     Leg,
     clearance,
@@ -34,7 +35,7 @@ from ..motion.events import (
 )
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory
 from ..motion.state import DRIVEN, STEADY, Parameter, State, Vector
-from .flight import LEFT, MOST_SAMPLES, Course, Flight
+from .flight import LEFT, MOST_SAMPLES, Course, Flight, in_plate_range, settled_currents
 from .trajectory import DIVISIONS, DURATION, PARTS, IntegrationError, Recorder, Trajectory
 
 BATCH = 8  # Measured: a trajectory in a batch of 8 takes a quarter of the time of one alone, of 4 a half, of 16 a third
@@ -45,7 +46,10 @@ Begun = tuple[State, Array | None]  # starts, and their offsets from an equilibr
 
 
 class _Passenger(Course):
-    """A trajectory on a slot for balls of one kind, free of the plate; each leg of its drive is one for itself."""
+    """A trajectory on a slot for balls of one kind; each leg of drive and plate is one for itself.
+
+    A plate whose currents are not modelled is only in its way.
+    """
 
     over = watched = False  # whether it is; whether its samples are looked at for contact
     end = 0.0  # Scaled time at which "duration" interrupts it
@@ -58,7 +62,8 @@ class _Passenger(Course):
 
     @property
     def legs(self) -> Iterator[Leg]:
-        return iter(motion_legs(replace(self.flight.scene, plate=None), self.duration))
+        scene = self.flight.scene if self.flight.memory else replace(self.flight.scene, plate=None)
+        return iter(motion_legs(scene, self.duration))
 
     def onward(self) -> bool:
         """Begin the next leg; False where there is none."""
@@ -79,6 +84,9 @@ class _Passenger(Course):
             if self.recorder:
                 self.record(now, self.state[None])
             return not last and self.onward()
+        if meaning == BEYOND:
+            self.ended_by, self.left, self.over = BEYOND, True, True
+            return False
         degree = self.flight.degree(self.values)
         self.change_ball()
         return self.flight.degree(self.values) == degree
@@ -90,7 +98,7 @@ class _Passenger(Course):
             self.recorder = recorder.doubled(self.time[0])
         self.fly()
         self.time, self.state = (float(self.recorder.times[-1]), 0.0), self.recorder.states[-1]
-        self.over = True
+        self.left, self.over = self.ended_by == BEYOND, True
 
 
 class _Launch(_Passenger):
@@ -104,10 +112,6 @@ class _Launch(_Passenger):
         self.ended_by = CONTACT
         if not self.flight.scene.floater.is_sphere:
             self.recorder, self.watched = Recorder(np.zeros(0), self.flight.interval(self.duration), 1), True
-
-    @property
-    def legs(self) -> Iterator[Leg]:
-        return iter(motion_legs(self.flight.scene, self.duration))
 
     def record(self, times: Array, states: Array) -> None:
         """Nothing: it is not of interest where it was."""
@@ -254,6 +258,14 @@ class Endings:
         last = State(*map(np.concatenate, vectors))
         return cls(last=replace(last, axes=np.concatenate(axes) if axes else None), **whole)
 
+    def replaced(self, some: NDArray[np.intp], others: "Endings") -> "Endings":
+        """These with `some` (k,) of them as they are in `others`."""
+        order = np.arange(len(self.ended_by))
+        order[some] = len(order) + np.arange(len(some))
+        both = Endings.joined([self, others])
+        names = ("ended_by", "levitated_s", "last", "changes", "left_plate_table")
+        return Endings(**{name: getattr(both, name)[order] for name in names})
+
     def __repr__(self) -> str:
         counts = ", ".join(f"{np.sum(self.ended_by == end)} by {end}" for end in np.unique(self.ended_by))
         left = int(np.sum(self.left_plate_table))
@@ -269,6 +281,8 @@ def ensemble(
     mapped: Callable[[Callable[[Begun], Endings], Iterable[Begun]], Iterable[Any]] = map,
     together: int = 512,
     offset: Array | None = None,
+    memory: PlateMemory | None = None,
+    currents: Array | None = None,
 ) -> Endings:
     """Simulate a scene's floater from many starts for `duration` (s) each, or until contact or loss.
 
@@ -282,6 +296,8 @@ def ensemble(
     mapped : as the built-in `map`; `concurrent.futures.ProcessPoolExecutor(2).map` uses two cores
     together : trajectories that a worker gets at once
     offset : (n, 3) m of the starts from an equilibrium, if it is known: bodies that are not round are faster about it
+    memory : the plate's currents; left out, the plate is only an obstacle
+    currents : (k,) √J, states of the plate at all starts; left out, those of a floater that had long turned at each
 
     Accuracy: that of a trajectory in balls, whose field errs by 1e-6 of its gradient; see `ERROR_OF_BODIES` for those
     of a body that is not round.
@@ -290,7 +306,7 @@ def ensemble(
     starts = _whole(scene, starts)
     pieces = [slice(first, first + together) for first in range(0, len(starts.moment), together)]
     given = [(starts[piece], None if offset is None else offset[piece]) for piece in pieces]
-    return Endings.joined(list(mapped(partial(_ended, scene, table, duration), given)))
+    return Endings.joined(list(mapped(partial(_ended, scene, table, duration, memory, currents), given)))
 
 
 def _check(scene: Scene, starts: State, duration: float) -> None:
@@ -311,12 +327,19 @@ def _whole(scene: Scene, starts: State) -> State:
     return replace(starts, axes=np.array([scene.floater.axes(moment) for moment in unit]))
 
 
-def _ended(scene: Scene, table: FieldTable, duration: float, given: Begun) -> Endings:
-    flight, (starts, offset) = _flight(scene, table, duration), given
-    passengers = [
-        _begun(flight, starts[k], duration, False, None if offset is None else offset[k])
-        for k in range(len(starts.position))
-    ]
+def _ended(
+    scene: Scene,
+    table: FieldTable,
+    duration: float,
+    memory: PlateMemory | None,
+    currents: Array | None,
+    given: Begun,
+) -> Endings:
+    flight, (starts, offset) = _flight(scene, table, duration, memory=memory), given
+    passengers = list[_Passenger]()
+    for k in range(len(starts.position)):
+        left = settled_currents(scene, memory, starts[k]) if memory and currents is None else currents
+        passengers.append(_begun(flight, starts[k], duration, False, None if offset is None else offset[k], left))
     _fly(passengers)
     return _endings(passengers)
 
@@ -324,7 +347,7 @@ def _ended(scene: Scene, table: FieldTable, duration: float, given: Begun) -> En
 def _endings(passengers: Sequence[_Passenger]) -> Endings:
     flight = passengers[0].flight
     return Endings(
-        np.array([f.ended_by for f in passengers], dtype="<U8"),
+        np.array([LOST if f.ended_by == BEYOND else f.ended_by for f in passengers], dtype="<U8"),
         np.minimum([f.seconds for f in passengers], passengers[0].duration),
         flight.scales.unpack(np.array([f.state[: flight.scales.size] for f in passengers])),
         np.array([f.changes.count for f in passengers]),
@@ -354,17 +377,23 @@ def simulate_together(
     return [f.trajectory(speed) if f.recorder else None for f in passengers]
 
 
-def _flight(scene: Scene, table: FieldTable, duration: float, shared: bool = False) -> Flight:
-    return Flight(scene, table, duration, compact=True, in_balls=True, shared=shared)
+def _flight(
+    scene: Scene, table: FieldTable, duration: float, shared: bool = False, memory: PlateMemory | None = None
+) -> Flight:
+    return Flight(scene, table, duration, compact=True, memory=memory, in_balls=True, shared=shared)
 
 
-def _begun(flight: Flight, start: State, duration: float, recorded: bool, offset: Array | None) -> _Passenger:
+def _begun(
+    flight: Flight, start: State, duration: float, recorded: bool, offset: Array | None, currents: Array | None = None
+) -> _Passenger:
     start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
     free = clearance(flight.scene, np.zeros(1), start.position[None], start.orientation[None])[0] >= 0
-    course = flight.begin(start, duration, None, flight.interval(duration) if recorded and free else None, offset)
+    course = flight.begin(start, duration, currents, flight.interval(duration) if recorded and free else None, offset)
     found = _Passenger(course)
     if not free:
         found.ended_by, found.over = CONTACT, True
+    elif not in_plate_range(flight.memory, start):
+        found.follow(BEYOND)
     return found
 
 

@@ -93,7 +93,7 @@ class Flight:
     ----------
     scene, table : the problem
     duration : how long it shall last, s: it decides how much compilation is worth
-    tolerance : relative error of a step
+    tolerance : relative error of a step; None: `TOLERANCE`, or `PLATE_TOLERANCE` with a plate's currents
     compact : compile loops instead of straight code: sooner ready, up to twice as slow; None to choose
     memory : the plate's currents, if they are modelled; else the plate is only an obstacle
     in_balls : whether the rotor's field is expanded in balls about the floater; None: where its expressions are long
@@ -106,7 +106,7 @@ class Flight:
         scene: Scene,
         table: FieldTable,
         duration: float,
-        tolerance: float = TOLERANCE,
+        tolerance: float | None = None,
         compact: bool | None = None,
         memory: PlateMemory | None = None,
         in_balls: bool | None = None,
@@ -123,7 +123,8 @@ class Flight:
         """Runtime parameters, in no ball: those of the equations, of a ball, and of the plate."""
         self.parts: dict[int, Part] = {}
         """By the `number` of the ball's kind, 0: in none."""
-        self.compile_seconds, self._tolerance, self._turns = 0.0, tolerance, scene.fastest * duration
+        self.compile_seconds, self._turns = 0.0, scene.fastest * duration
+        self._tolerance = tolerance or (PLATE_TOLERANCE if memory else TOLERANCE)
         long = memory is None and self._turns > STRAIGHT_TURNS  # straight code of a plate takes minutes to compile
         self._straight = long if compact is None else not compact
 
@@ -445,11 +446,9 @@ def integrate(
     flight : the compiled problem
     progress : called with the finished part, 0 to 1, a few times a second
     currents : states of the plate at the start, √J; zero if not given
-    checkpoint : where the course is kept while it lasts; it goes on from there if there is something. Remove it when
-        the trajectory is safe.
+    checkpoint : where the course is kept while it lasts; from there it goes on
 
-    Accuracy: without a plate's currents a step errs by round-off, so that energy and |m̂| drift by about 1e-14 in a
-    thousand turns; over a plate see `PLATE_TOLERANCE`. see `Trajectory.energy_error`.
+    Accuracy: energy and |m̂| drift by about 1e-14 in a thousand turns; over a plate see `PLATE_TOLERANCE`.
     """
     began, known = perf_counter(), flight.compile_seconds
     course = flight.begin(start, duration, currents, flight.interval(duration), flight.offset)
@@ -493,7 +492,7 @@ def simulate(
     Parameters
     ----------
     equilibria : of this scene, if they are already known
-    tolerance, compact : see `Flight`; None: `TOLERANCE`, or `PLATE_TOLERANCE` with a plate's currents
+    tolerance, compact : see `Flight`
     progress : called with the finished part, 0 to 1, a few times a second
     memory : the plate's currents; left out, the plate is only an obstacle
     checkpoint : where the trajectory is kept while it lasts; it goes on from there if there is something
@@ -501,8 +500,6 @@ def simulate(
     if not duration > 0:
         raise StartError(f"Input duration must be positive; instead received {duration} s.")
     start, currents = initial_state(scene, table, equilibria, memory)
-    if tolerance is None:
-        tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
     flight = Flight(scene, table, duration, tolerance, compact, memory)
     return integrate(flight, start, duration, progress, currents, checkpoint)
 
@@ -533,9 +530,7 @@ def initial_state(
             axes = scene.floater.axes(moment, start.body_x)
         state = State(start.position, start.velocity, moment, start.spin, axes)
         if memory is not None:
-            scales = Scales.of(scene)
-            plate = PlateForce(memory, parameters(scene, scales))
-            currents = plate.settled(scales.pack(state)) / plate.values[Parameter.PLATE_SHARE]
+            currents = settled_currents(scene, memory, state)
     else:
         known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
         chosen = starting_point(known)
@@ -550,13 +545,19 @@ def initial_state(
     return state, currents
 
 
+def settled_currents(scene: Scene, memory: PlateMemory, state: State) -> Array:
+    """States (k,), √J, of the plate of `memory` if the floater had long turned with the rotor where `state` has it."""
+    plate = PlateForce(memory, parameters(scene, Scales.of(scene)))
+    return np.asarray(plate.settled(Scales.of(scene).pack(state)) / plate.values[Parameter.PLATE_SHARE])
+
+
 def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, orientation: Array | None = None) -> None:
     """Raises StartError where a floater at `position` (3,) m, rotor's frame, overlaps a body of `scene` at `time` (s).
 
     `name` is what the message calls its place; see `clearance` for `orientation`.
     """
-    pointing = None if orientation is None else orientation[None]
-    gap = float(clearance(scene, np.array([time]), position[None], pointing)[0])
+    turned = None if orientation is None else orientation[None]
+    gap = float(clearance(scene, np.array([time]), position[None], turned)[0])
     if gap < 0:
         where = ", ".join(f"{1e3 * c:.6g}" for c in position)
         raise StartError(
@@ -579,8 +580,7 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
     """Where a trajectory begins, or, where none may, the equilibrium whose modes grow least; None without any.
 
-    Of those below the rotor that are stable along the axis, if there are some: others attract the floater or let it
-    fall, and belong to other branches. A brake destabilises those near the rotor the most.
+    Of those below the rotor that are stable along the axis, if there are some: others are on other branches.
     """
     below = [e for e in equilibria if np.hypot(*e.position[:2]) < abs(e.position[2])]
     along = [e for e in below if any(m.name == AXIAL and m.growth_per_s <= SLOWLY for m in e.modes)]

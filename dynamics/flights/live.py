@@ -11,7 +11,7 @@ from ...geometry.scene.contents import Scene
 from ..equilibria.equilibrium import Equilibrium
 from ..motion.plate import PlateMemory
 from ..motion.state import State, turned_about_z
-from .flight import PLATE_TOLERANCE, TOLERANCE, Flight, StartError, check_free, in_plate_range, initial_state
+from .flight import Flight, StartError, check_free, in_plate_range, initial_state
 from .trajectory import DURATION, Recorder
 
 FEWEST, MOST, A_SECOND = 8, 256, 400  # Samples of a piece at least and at most, and between that so many a second
@@ -49,9 +49,8 @@ class LiveFlight:
         if scene.moving:
             raise InputError("Input drive must have no center_mm and no axis in live motion; instead it has.")
         start, currents = initial_state(scene, table, equilibria, memory)
-        tolerance = TOLERANCE if memory is None else PLATE_TOLERANCE
         self.scene = scene
-        flight = Flight(scene, table, np.inf, tolerance, True, memory)
+        flight = Flight(scene, table, np.inf, compact=True, memory=memory)
         self._course = flight.begin(start, np.inf, currents, offset=flight.offset)
         flight.part(flight.degree(self._course.values))  # compiled now, so that the first piece is not late
         self._check_range(self.now.position)
