@@ -258,7 +258,14 @@ class RotorTable:
         """The table of a rotor from that of `alike(rotor)`: the same field and errors, moved, but for round-off."""
         if len(rotor) != 1:
             return replace(self, magnets=rotor)
-        return self.transformed(canonical(rotor)[0].body, rotor[0])
+        found = self.transformed(canonical(rotor)[0].body, rotor[0])
+
+        def quiet(parts: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+            """Without what symmetry forbids and round-off makes, which costs time."""
+            return tuple(replace(e, coefficients=without_noise(e.coefficients, 1e-15)) for e in parts)
+
+        doubts = {cause: quiet(parts) for cause, parts in found.doubts.items()}
+        return replace(found, expansions=quiet(found.expansions), doubts=doubts)
 
     def transformed(self, before: Solid, after: Magnet, size: float = 1.0, strength: float = 1.0) -> "RotorTable":
         """The field of a lone magnet from that of one with the body `before`.
@@ -268,25 +275,17 @@ class RotorTable:
         body = after.body
         turn = body.rotation @ before.rotation.T
 
-        def there(parts: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
-            found = []
-            for part in parts:
-                turned = rotated_harmonics(part.coefficients, turn)
-                if turned is not part.coefficients:  # what symmetry forbids and round-off makes costs time
-                    turned = without_noise(turned, 1e-15)
-                center = body.center + size * turn @ (part.center - before.center)
-                axes = turn @ part.axes
-                found.append(
-                    replace(part, center=center, radius=size * part.radius, coefficients=strength * turned, axes=axes)
-                )
-            return tuple(found)
+        def there(part: MultipoleExpansion) -> MultipoleExpansion:
+            center = body.center + size * turn @ (part.center - before.center)
+            coefficients = strength * rotated_harmonics(part.coefficients, turn)
+            return MultipoleExpansion(center, size * part.radius, coefficients, turn @ part.axes)
 
         return replace(
             self,
             magnets=(after,),
             uniform=tuple(replace(form, body=body, polarization=strength * form.polarization) for form in self.uniform),
-            expansions=there(self.expansions),
-            doubts={cause: there(parts) for cause, parts in self.doubts.items()},
+            expansions=tuple(map(there, self.expansions)),
+            doubts={cause: tuple(map(there, parts)) for cause, parts in self.doubts.items()},
         )
 
     @keeps_shape
