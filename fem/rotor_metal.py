@@ -106,7 +106,7 @@ def flat(values: Array) -> Array:
 
 
 def metal_of(bodies: Sequence[Solid] | SolidMesh, conductivity: float, order: int) -> Metal:
-    """Mesh and factorise metal (S/m) of `bodies` that touch, elements of degree `order`. Raises TooLargeError."""
+    """Mesh and factorise `bodies` that touch, by `conductivity` (S/m) and degree `order`. Raises TooLargeError."""
     mesh = bodies if isinstance(bodies, SolidMesh) else mesh_metal(bodies)
     space = ng.H1(mesh.mesh, order=order)
     free = space.FreeDofs()
@@ -178,7 +178,7 @@ class CurrentPatterns:
 def current_patterns(
     metals: Sequence[Metal], positions: Array, left_out: float, watch: Watch = unwatched
 ) -> CurrentPatterns:
-    """Patterns that dipoles at `positions` (n, 3) m drive in `metals`, but for a part `left_out` of any loss."""
+    """Patterns that dipoles at `positions` (n, 3) m drive in `metals`, but for `left_out` of any loss; for `watch`."""
     grams, loads, blocks = [], [], range(0, len(positions), TOGETHER)
     for metal in metals:
         parts = [metal.loads(of_places(positions[k : k + TOGETHER])) for k in watched(blocks, watch, "patterns")]

@@ -63,7 +63,7 @@ def regular_file(path: str | Path, most_bytes: int, name: str, kind: str) -> Bin
 
 
 def file_content(path: str | Path, most_bytes: int, name: str, kind: str) -> bytes:
-    """All of a file that a user named, as of `regular_file`. Raises InputError, also where reading fails."""
+    """All of a file; `path`, `most_bytes`, `name`, `kind`: as of `regular_file`. Raises InputError, also by reading."""
     with regular_file(path, most_bytes, name, kind) as stream:
         try:
             return stream.read(most_bytes)
@@ -237,7 +237,7 @@ def sealed(path: Path) -> bool | None:
 
 
 def unsealed(path: Path, mine: bool = False, name: str = "file") -> bytes | None:
-    """What was sealed, if the file is as it was then, else None. Raises InputError, see `regular_file`, and OSError.
+    """What was sealed, if the file `path` is as then, else None. Raises InputError, see `regular_file`, and OSError.
 
     With `mine` it is None too where another user than this one and root may have written it; messages call it `name`.
     """

@@ -114,7 +114,7 @@ def body_overlap(first: Solid, second: Solid) -> float:
 
 
 def parting(first: Solid, second: Solid, way: Array | None = None) -> Array | None:
-    """A direction (3,) that parts two bodies, which may touch; None where they overlap.
+    """A direction (3,) that parts `first` and `second`, which may touch; None where they overlap.
 
     A `way` that has parted them in poses nearby does it here in most cases, and spares the search for another. Of a
     sphere it is any, as its gap is no search.

@@ -303,7 +303,7 @@ class Cylinder(Body):
 
 
 def ring(radius: float, inner_radius: float, height: float, *pose: ArrayLike) -> Cylinder:
-    """A cylinder with a hole, sizes in m; its `pose` is centre (3,) m and rotation (3, 3), or less."""
+    """A cylinder with a hole: `radius`, `inner_radius`, `height` m; `pose` is centre (3,) m and rotation, or less."""
     return Cylinder(radius, height, *pose, inner_radius=inner_radius)  # type: ignore[arg-type, misc]
 
 

@@ -65,7 +65,7 @@ class Branch:
 
 
 def by_frequency(scene: Scene, rates: Rates, spin: float = 0.0) -> Family:
-    """A scene's equilibria with a body spin against the frequency of the rotor."""
+    """Equilibria of a `scene` with `rates` and a body `spin` against the frequency of the rotor."""
     return Family(rates, frequencies(scene, spin), UNIT, scene.floater.spin_ratio)
 
 

@@ -195,7 +195,7 @@ class _Lateral(AtRest):
 
 
 def fixed_points(balance: Balance, where: SearchRange, watch: Watch = unwatched) -> tuple[list[Curve], Array]:
-    """Curves of lateral balance in the range `where`, and scaled positions and moments (k, 6) of the equilibria."""
+    """Curves of lateral balance in a range `where`, and scaled poses (k, 6) of equilibria; `watch` gets progress."""
     seeds = from_starts(balance, where, LATERAL, watch=watch)
     curves, count = list[Curve](), len(seeds)
     while len(seeds):

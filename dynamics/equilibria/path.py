@@ -164,7 +164,7 @@ def stepped(
 
 
 def directions(equations: Equations, points: Array, before: Array, which: Indices = ONE) -> Array:
-    """Unit tangents (n, k + 1) at `points` that go on as `before` (n, k + 1); not a number where there is none."""
+    """Unit tangents (n, k + 1) of `which` `equations` at `points` that go on as `before`; NaN where there is none."""
     return _along(equations.linear(points, which)[1], before)
 
 

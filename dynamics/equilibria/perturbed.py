@@ -114,7 +114,7 @@ def plate_action(scene: Scene, memory: PlateMemory, equilibrium: Equilibrium) ->
 
 
 def shift_by_mutual(scene: Scene, table: FieldTable, equilibrium: Equilibrium, answers: MutualTable | None) -> float:
-    """Shift of an equilibrium by mutual magnetisation, m: to first order, without `answers` to a factor of two."""
+    """Shift (m) of an `equilibrium` of `scene` in `table` by mutual magnetisation; no `answers`: to a factor of 2."""
     fixed = equilibrium.without or equilibrium
     place, moment, scales = fixed.position[None], fixed.state.moment[None], Scales.of(scene)
     if answers is None:

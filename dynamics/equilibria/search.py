@@ -295,7 +295,7 @@ def _by_whole_body(
 
 
 def of_whole_body(scene: Scene, rates: Rates, known: Equilibrium) -> bool:
-    """Whether an equilibrium is one of dipoles all over the floater, without the plate's currents.
+    """Whether a `known` equilibrium of a `scene` is one of dipoles all over the floater, without the plate's currents.
 
     So it is of a floater's mean over turns, and of a round floater where those on its axis, of whose motion the `rates`
     are, will not do: they do not balance there.

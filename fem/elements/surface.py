@@ -502,7 +502,7 @@ class SurfaceCharges:
         return body.center + places @ body.rotation.T, amounts
 
     def field_beside(self, number: int, charges: Array, points: Array) -> Array:
-        """B (k, 3) T at points (k, 3) m beside one of `magnets`, of charges (n,) T on it: as exact as `refined` is."""
+        """B (k, 3) T at points (k, 3) m beside magnet `number`, of charges (n,) T on it: as exact as `refined` is."""
         places, amounts = self.refined(number, charges)
         areas = self.refined(number, np.ones_like(charges))[1]
         amounts -= amounts.sum() / areas.sum() * areas  # a magnet has no charge

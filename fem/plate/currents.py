@@ -452,6 +452,6 @@ CURRENTS = TableKind("plate-currents", PlateSolution, "Currents of a plate by fi
 
 
 def cached_currents(plate: Plate, *given: Any, report: Report, watch: Watch = unwatched) -> PlateSolution:
-    """`solve_currents` of all up to the others, `given`, from the cache if it is there; `report` gets messages."""
+    """`solve_currents` of a `plate` and all `given` up to the others, cached; for `report` and `watch`."""
     inputs, solve = (plate.body.shape_numbers, plate.metal, *given), partial(solve_currents, watch=watch)
     return CURRENTS.cached(inputs, partial(solve, plate, *given), report)[0]

@@ -60,7 +60,7 @@ class AxialPotential:
 
     @classmethod
     def of(cls, field: CoilField, radius: float, heights: tuple[float, float]) -> "AxialPotential":
-        """Potential of coils about z in a cylinder of a `radius`, from the lowest to the highest of `heights` (m)."""
+        """Potential of a `field` of coils about z within a `radius`, from the lowest to the highest of `heights`, m."""
         low, high = heights
         squares = (1 + _nodes(RADII)) / 2 * radius**2
         places = np.stack(np.meshgrid(np.sqrt(squares), (low + high) / 2 + (high - low) / 2 * _nodes(HEIGHTS)), -1)
@@ -170,7 +170,7 @@ class FloatingModes:
         return flux, slope
 
     def driven(self, height: float, now: Array, change: Array) -> tuple[Array, Array, Array]:
-        """G I, (dG/dz) I and G dI/dt (states,) at a height (m), of currents (sources,) A and their rates, A/s."""
+        """G I, (dG/dz) I and G dI/dt (states,) at a height (m), of currents `now` (sources,) A that `change`, A/s."""
         flux, slope = self.flux(height)
         return flux @ now, slope @ now, flux @ change
 
@@ -215,7 +215,7 @@ class Levitated:
     frequency: float  # of the currents, Hz
 
     def mesh(self, place: Array, end: float, rule: MeshRule) -> ConductorMesh:
-        """The conductor's at a place (3,) m; the nearest that drive it are the windings' edges up to an angle (rad)."""
+        """That at a place (3,) m, by a `rule`, for sources at the windings' edges from 0 to an `end` (rad)."""
         top = max(coil.center[2] + coil.height / 2 for coil in self.coils)
         edges = [(coil.center, coil.radius + side * coil.width / 2) for coil in self.coils for side in (-1, 1)]
         turns = [(np.cos(angle), np.sin(angle)) for angle in np.linspace(0.0, end, 13)]
@@ -336,7 +336,7 @@ class FreeModes:
 
 
 def sampled_poses(body: Solid, room: Room, count: int, seed: int) -> list[tuple[Array, Array]]:
-    """Places (3,) m and rotations (3, 3) of a body in a room, at random."""
+    """Places (3,) m and rotations (3, 3) of a `body` in a `room`: a `count` of them, at random by a `seed`."""
     box, floor = room
     draw, found = np.random.default_rng(seed), list[tuple[Array, Array]]()
     while len(found) < count:

@@ -140,10 +140,10 @@ class PlateAround:
         return table, share, cached
 
     def changed_shares(self, known: Both, others: Sequence[tuple[Plate, RotorTable]], report: Report) -> Array:
-        """Series (k, 2H+1, states) √J in the angle of k other rotors and poses of a plate that has not gone down.
+        """Series (k, 2H+1, states) √J in the angle of k `others`, rotors and poses of a plate that has not gone down.
 
-        Of the network and harmonics of what was made, `known`, from the cache if they are there. Raises
-        ComputationError: the network comes out otherwise than when the table was made.
+        Of the network and harmonics of what was made, `known`, from the cache if they are there; `report` gets
+        messages. Raises ComputationError: the network comes out otherwise than when the table was made.
         """
         more = tuple((plate.body, rotor.uniform, rotor.expansions) for plate, rotor in others)
         return CHANGED.cached((self.key, more), lambda: (self._changed(known, others, report), 0.0), report)[0][0]
@@ -194,7 +194,7 @@ def _reduced_table(reduced: Reduction, rtol: float, conductor: str, watch: Watch
 
 
 def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> PlateTable:
-    """Field functions of a network as multipoles, whose errors may add up to more than `rtol`."""
+    """Field functions of a network as multipoles, whose errors may pass `rtol`; `watch` gets progress."""
     start = time.perf_counter()
     watch("field functions of the plate", 0.0)
     multipoles, weights, error = network.field_functions(network, rtol, watch)
@@ -209,6 +209,6 @@ def tabulate(network: PassiveNetwork, rtol: float, watch: Watch = unwatched) -> 
 def cached_plate_table(
     plate: Plate, region: Region, frequencies: tuple[float, float], rtol: float, report: Report
 ) -> tuple[PlateTable, bool]:
-    """`plate_table`, from the cache if it is there, and whether it was; `report` gets messages."""
+    """`plate_table` of `plate`, `region`, `frequencies`, `rtol`, and whether it was cached; `report` gets messages."""
     inputs = plate.body.shape_numbers, plate.metal, region, frequencies, rtol
     return PLATE.cached(inputs, lambda: plate_table(plate, region, frequencies, rtol), report)

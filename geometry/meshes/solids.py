@@ -191,7 +191,7 @@ def solid_of(body: Solid) -> Any:
 
 
 def segment(inner_radius: float, radius: float, height: float, start: float, end: float) -> Any:
-    """Part of a ring about z, its middle at the origin, from a `start` to an `end` angle, degrees."""
+    """Part of a ring (`inner_radius`, `radius`, `height`) about the origin and z, from `start` to `end`, degrees."""
     inner, outer, high = (length / MILLIMETRE for length in (inner_radius, radius, height))
     section = occ.WorkPlane(occ.Axes((inner, 0.0, -high / 2), n=occ.gp_Dir(0, -1, 0), h=occ.X))
     axis = occ.Axis(occ.Pnt(0, 0, 0), occ.Z)
