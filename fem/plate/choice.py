@@ -39,8 +39,6 @@ PLUMB = 1e-9  # Cosine of the angle between a slab's normal and the vertical bel
 
 
 class PlateChoice(NamedTuple):
-    """Model of a plate, the reason in words, and the relative error by edges that the model leaves out."""
-
     """Model of a plate."""
 
     model: str

@@ -163,9 +163,8 @@ class PlateAround:
 
         first, stored = series(self.plate, self.rotor), share.series @ share.by_depth(0.0)
         same = first.shape == stored.shape
-        signs = (
-            np.where(np.sum(first * stored, axis=0) < 0, -1.0, 1.0) if same else 1.0
-        )  # of states nothing decides them
+        # of states nothing decides them
+        signs = np.where(np.sum(first * stored, axis=0) < 0, -1.0, 1.0) if same else 1.0
         if not same or np.abs(signs * first - stored).max() > self.rtol * np.abs(stored).max():
             raise ComputationError(
                 "The network of the plate's currents comes out otherwise than when its table was made."
