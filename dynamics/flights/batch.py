@@ -129,11 +129,8 @@ class _Launch(_Passenger):
 class SimdBatch:
     """An integrator for many trajectories whose equations are the same but for runtime parameters.
 
-    Parameters
-    ----------
-    equations, events : of the motion, and what interrupts it
-    tolerance : relative error of a step
-    with_work : whether the energy's work is integrated as the last state
+    `equations` and `events` are the motion's and what interrupts it, `tolerance` is the relative error of a step;
+    `with_work`: the energy's work is integrated as the last state.
     """
 
     def __init__(self, equations: Equations, events: Events, tolerance: float, with_work: bool) -> None:
@@ -422,19 +419,12 @@ def launched(
     """Simulate a scene's floater over its plate from many starts, for `duration` (s) each, or until contact or loss.
 
     Contact with the rotor is that of `flight_events`; where a step misses an edge, contact is noticed at the latest
-    where the sphere meets the largest one inside the magnet.  The plate is an obstacle without edges.  Of a floater
-    that is no sphere samples tell of contact, as in a trajectory alone.  The field is the table's own expressions, so
-    that a short one (dipoles, closed forms) is fast. Raises InputError: `duration` is not positive, there is no start,
-    or the plate does not lie flat.
-
-    Parameters
-    ----------
-    scene : has the plate of `memory`, which may be lowered
-    table : the rotor's field, with effects if it is an `Interaction`
-    memory : the plate's currents
-    starts : states (n, 3) at t = 0, SI units
-    step_error : relative, of a Taylor step
-    currents : (n, k) the plate's states then, √J; if not given, those under a floater long at rest
+    where the sphere meets the largest one inside the magnet. The plate is an obstacle without edges. Of a floater that
+    is no sphere samples tell of contact, as in a trajectory alone. The field is the table's own expressions, so that a
+    short one (dipoles, closed forms) is fast. Raises InputError: `duration` is not positive, there is no start, or the
+    plate does not lie flat. The `scene` has the plate of `memory`, which may be lowered; `table` may be an
+    `Interaction`; `starts` are states (n, 3) at t = 0, SI units; `step_error` is relative, of a Taylor step; `currents`
+    are (n, k) the plate's states then, √J (left out, those under a floater long at rest).
 
     Accuracy: that of the tables; beyond the range of the plate's the currents' field is continued as it is, and
     `Endings.left_plate_table` says which trajectories went there.

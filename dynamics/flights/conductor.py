@@ -164,11 +164,7 @@ def heights_over(scene: Scene) -> tuple[float, float]:
 def levitation_height(modes: FloatingModes, supply: Supply, weight: float) -> float:
     """Height (m) of the centre where the mean force carries a weight and falls with height; NaN where there is none.
 
-    Parameters
-    ----------
-    modes : of the conductor over the coils
-    supply : of the coils, whose currents are sinusoidal
-    weight : N
+    The `modes` are of the conductor over the coils, `supply` is that of sinusoidal currents, `weight` is in N.
     """
     leaders = supply.leaders
     phasors = np.array([coil.current * np.exp(1j * (coil.phase - np.pi / 2)) for coil in leaders])
@@ -186,11 +182,8 @@ def levitation_height(modes: FloatingModes, supply: Supply, weight: float) -> fl
 def conductor_motion(scene: Scene, modes: FloatingModes, duration: float) -> ConductorMotion:
     """Simulate a conductor over the coils of a scene, from its start until contact, loss or the end.
 
-    Parameters
-    ----------
-    scene : with an absolute start, within the heights of the modes
-    modes : of its floater over its coils
-    duration : s
+    The `scene` has an absolute start within the heights of `modes`, those of its floater over its coils; it lasts for a
+    `duration` (s).
     """
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)
@@ -287,11 +280,8 @@ def _turn(quaternion: Array) -> Array:
 def free_motion(scene: Scene, modes: FreeModes, duration: float) -> ConductorMotion:
     """Simulate a conductor over the coils of a scene in six degrees of freedom, until contact, loss or the end.
 
-    Parameters
-    ----------
-    scene : with an absolute start
-    modes : of its floater over its coils, in the room of `room_over`
-    duration : s
+    The `scene` has an absolute start, `modes` are of its floater over its coils, in the room of `room_over`; it lasts
+    for a `duration` (s).
     """
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)

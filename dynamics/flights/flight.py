@@ -439,14 +439,9 @@ def integrate(
     """Integrate from `start` (rotor's frame, t = 0) until `duration` (s), contact or loss.
 
     Raises FlightStopped: by a keyboard interrupt; it has what is finished, and so has the checkpoint; IntegrationError:
-    the state became infinite.
-
-    Parameters
-    ----------
-    flight : the compiled problem
-    progress : called with the finished part, 0 to 1, a few times a second
-    currents : states of the plate at the start, √J; zero if not given
-    checkpoint : where the course is kept while it lasts; from there it goes on
+    the state became infinite. `progress` is called with the finished part, 0 to 1, a few times a second. `currents` are
+    the plate's states at the start, √J; zero if not given. At `checkpoint` the course is kept while it lasts, and goes
+    on from there.
 
     Accuracy: energy and |m̂| drift by about 1e-14 in a thousand turns; over a plate see `PLATE_TOLERANCE`.
     """
@@ -488,14 +483,10 @@ def simulate(
 
     Raises EquilibriumError: the trajectory is to begin near a stable equilibrium and there is none; StartError: it
     begins in contact, or `duration` is not positive; FlightStopped: by a keyboard interrupt; it has what is finished.
-
-    Parameters
-    ----------
-    equilibria : of this scene, if they are already known
-    tolerance, compact : see `Flight`
-    progress : called with the finished part, 0 to 1, a few times a second
-    memory : the plate's currents; left out, the plate is only an obstacle
-    checkpoint : where the trajectory is kept while it lasts; it goes on from there if there is something
+    `equilibria` are those of the scene, if already known; `tolerance` and `compact` are as of `Flight`; `progress` is
+    called with the finished part, 0 to 1, a few times a second; `memory` is of the plate's currents (left out, the
+    plate is only an obstacle). At `checkpoint` the trajectory is kept while it lasts; it goes on from there if there is
+    something.
     """
     if not duration > 0:
         raise StartError(f"Input duration must be positive; instead received {duration} s.")

@@ -31,16 +31,9 @@ class Piece:
 class LiveFlight:
     """A trajectory of a scene's floater, with the plate's currents if they are modelled.
 
-    Parameters
-    ----------
-    scene, table : the problem
-    equilibria : of this scene
-    memory : the plate's currents; None where the plate is only an obstacle
-
-    Raises
-    ------
-    EquilibriumError : it shall begin near a stable equilibrium and there is none
-    StartError : it would begin in contact, or where the plate's table does not reach
+    `equilibria` are those of the scene, and `memory` is None where the plate is only an obstacle. Raises
+    EquilibriumError: it shall begin near a stable equilibrium and there is none; StartError: it would begin in contact,
+    or where the plate's table does not reach.
     """
 
     def __init__(

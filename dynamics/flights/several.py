@@ -159,15 +159,8 @@ class Together:
 class JointFlight:
     """The motion of a scene's floaters.
 
-    Parameters
-    ----------
-    scene : with an absolute start of each
-    tables : the rotor's field for each, with its effects
-    duration : how long it shall last, s
-
-    Raises
-    ------
-    StartError : `duration` is not positive, or a floater would begin in contact
+    The `scene` has an absolute start of each, `tables` are the rotor's field for each, with its effects; it lasts for a
+    `duration` (s). Raises StartError: that is not positive, or a floater would begin in contact.
     """
 
     def __init__(self, scene: Scene, tables: Sequence[FieldTable], duration: float) -> None:

@@ -241,12 +241,7 @@ class Piece:
 class Recorder:
     """Samples at multiples of an interval, which doubles, dropping every other sample, when there are too many.
 
-    Parameters
-    ----------
-    state : (n,) at the first time
-    interval : first spacing of the samples
-    capacity : most samples kept
-    now : the first time
+    From a `state` (n,) at the time `now` on, with a first `interval`; at most `capacity` samples are kept.
     """
 
     def __init__(self, state: Array, interval: float, capacity: int, now: float = 0.0) -> None:
@@ -274,14 +269,9 @@ class Recorder:
     ) -> Piece:
         """Motion from a `time` and `state` to an event, or to `end` or so far as samples are looked at once.
 
-        Raises IntegrationError: the state became infinite.
-
-        Parameters
-        ----------
-        integrator, values : of the motion, and its runtime parameters
-        time, state : scaled, the first as the sum of two numbers
-        end, unit : scaled, and the seconds of scaled time 1
-        often : scaled interval between looks at the motion
+        Raises IntegrationError: the state became infinite. `integrator` and runtime parameters `values` are the
+        motion's; `time`, the sum of two numbers, and `end` are scaled, with so many seconds (`unit`) a scaled time of
+        1; looks at the motion are so `often`, a scaled interval.
         """
         integrator.pars[:], integrator.state[:] = values[: len(integrator.pars)], state
         integrator.dtime = time
@@ -329,10 +319,8 @@ def crossing(
 ) -> tuple[float, Array]:
     """Time and state (s,) at which a motion crosses a border between `times` (2,), its `states` (2, s) being there.
 
-    Parameters
-    ----------
-    integrator : of the motion, with its runtime parameters
-    first_over : the first of times (n,) at which a state (n, s) is over the border; None: at none of them
+    The `integrator` has the motion's runtime parameters; `first_over` gives the first of times (n,) at which a state
+    (n, s) is over the border; None: at none of them.
     """
     for _ in range(DIVISIONS):
         integrator.time, integrator.state[:] = times[0], states[0]

@@ -299,13 +299,8 @@ class BodyShape:
     def wrench(self, field: DerivedField, position: Array, axes: Array) -> tuple[Array, Array]:
         """Force and torque (n, 6), N and N m, beside the dipole's, and their derivatives (n, 6, 6).
 
-        The latter by a change of place, m, and by a small turn about the rotor's axes.
-
-        Parameters
-        ----------
-        field : the rotor's, with its derivatives
-        position : (n, 3) of the centre, m, rotor's frame
-        axes : (n, 3, 3) whose columns are the body's axes
+        The latter by a change of place, m, and by a small turn about the rotor's axes. In the rotor's `field` at
+        `position` (n, 3) m of the centre, rotor's frame; the columns of `axes` (n, 3, 3) are the body's axes.
         """
         own = slopes_of(FloaterSources.dipole(self.floater.dipole), field, position, axes)
         whole = slopes_of(self.sources, field, position, axes)

@@ -189,14 +189,10 @@ def equations_of_motion(
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
-    Parameters
-    ----------
-    table : the rotor's field, with effects if it is an `Interaction`
-    tilted_gravity : whether gravity has a part across the axis; it turns in this frame, so that time enters
-    memory, first : the plate's currents, if they are modelled, and the first of their runtime parameters
-    driven : whether the rotor's rate changes in time
-    moving : whether it is moved, too
-    given : the runtime parameters
+    The `table` is the rotor's field, with effects if it is an `Interaction`. `tilted_gravity`: gravity has a part
+    across the axis; it turns in this frame, so that time enters. `memory` is of the plate's currents, if they are
+    modelled, and `first` the number of the first of their runtime parameters, which are `given`. The rotor's rate
+    changes in time if it is `driven`, and it is moved, too, if it is `moving`.
     """
     whole, rotor = interaction_of(table), moved() if moving else DRIVEN if driven else STEADY
     variables = list(hy.make_vars(*CENTRE, *(TURNING_NAMES if whole.turning else ROUND_NAMES)))

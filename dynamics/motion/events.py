@@ -28,11 +28,8 @@ Events = list[tuple[hy.expression, str]]
 def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events:
     """Contact with the bodies of a scene, and loss.
 
-    Parameters
-    ----------
-    scene : the rotor's magnets, plates, coils, and the floater
-    position : three scaled expressions, rotor's frame
-    turn : of the rotor; of a drive `DRIVEN`
+    The bodies are the rotor's magnets, plates and coils. `position` is three scaled expressions, rotor's frame, and
+    `turn` that of the rotor; of a drive `DRIVEN`.
     """
     length = hy.par[Parameter.LENGTH]
     metres = [length * p for p in position]
@@ -49,10 +46,7 @@ def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events
 def range_events(memory: PlateMemory, position: Vector, turn: Turn = STEADY) -> Events:
     """Where the floater leaves the range of a plate's table, by the six faces of it in pairs.
 
-    Parameters
-    ----------
-    memory : of the plate
-    position, turn : as of `flight_events`
+    The table is that of `memory`; `position` and `turn` are as of `flight_events`.
     """
     region = memory.table.region
     away = [x - float(c) for x, c in zip(seen_by_plate(memory.plate, position, turn), region.center, strict=True)]

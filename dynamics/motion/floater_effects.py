@@ -240,15 +240,8 @@ class FloaterShape:
     def missed(self, table: FieldTable, position: Array, moment: Array) -> Array:
         """(n, 2) what the dipoles miss of torque, T, and of force, T/m, by the floater's moment.
 
-        Parameters
-        ----------
-        table : the rotor's field
-        position : (n, 3) of the centre, m, rotor's frame
-        moment : (n, 3) its direction
-
-        Raises
-        ------
-        RangeError : as of `force_and_torque`
+        In the rotor's field of `table` at `position` (n, 3) m of the centre, rotor's frame, in directions `moment` (n,
+        3). Raises RangeError as `force_and_torque` does.
         """
         axes = np.array([self.floater.axes(m) for m in moment])
         force, torque = force_and_torque(self.sources, table, position, axes)

@@ -103,13 +103,8 @@ def plate_numbers(memory: PlateMemory, values: Array, driven: bool = False) -> A
     """Runtime parameters of a plate.
 
     They are -λT of each state, then for each harmonic of the rotor's share what its currents q - r are in each
-    multipole, and, of a plate that goes down, the harmonics of q of each state, or, with a drive, those of r.
-
-    Parameters
-    ----------
-    memory : of the plate
-    values : as of `parameters`
-    driven : whether the scene has a drive
+    multipole, and, of a plate that goes down, the harmonics of q of each state, or, with a drive, those of r. The
+    `values` are as of `parameters`; `driven`: the scene has a drive.
     """
     table = memory.table
     velocity = ENDLESS if driven else float(values[Parameter.RATE]) / float(values[Parameter.TIME])
@@ -132,14 +127,9 @@ def memory_terms(
     """The plate's part of the equations of motion, and the scaled rates of its states.
 
     Its energy is that of the floater's currents, and of the floater in the field of the rotor's; power is what both
-    gain from heat, from what turns the rotor and from what lowers the plate.
-
-    Parameters
-    ----------
-    memory, first : the plate, whose numbers are the runtime parameters from number `first` on
-    position, moment : of the floater, scaled
-    states : p - q of the plate
-    driven : whether the rotor's rate changes in time
+    gain from heat, from what turns the rotor and from what lowers the plate. The numbers of `memory` are the runtime
+    parameters from number `first` on; `position` and `moment` are the floater's, scaled; `states` are p - q of the
+    plate; the rotor's rate changes in time if it is `driven`.
     """
     plate, table, lowered = memory.plate, memory.table, memory.plate.lowering is not None
     rotor = DRIVEN if driven else STEADY

@@ -28,10 +28,8 @@ NOWHERE = np.zeros((0, 3)), np.zeros((0, 0))
 class Rates:
     """Right-hand side and Jacobian of the autonomous equations of motion (gravity along the axis).
 
-    Parameters
-    ----------
-    table : the rotor's field, with effects if it is an `Interaction`
-    optimised : for very many states: faster, and compiled in twice the time
+    The `table` is the rotor's field, with effects if it is an `Interaction`. Code that is `optimised` is for very many
+    states: faster, and compiled in twice the time.
     """
 
     def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
@@ -110,13 +108,9 @@ class Rates:
     ) -> tuple[Array, Array]:
         """What has to vanish at rest in the rotor's frame (n, 5), and its derivatives (n, 5, 5), see `balances`.
 
-        Parameters
-        ----------
-        position, moment : (n, 3), scaled, and the direction of the moment
-        tangents : (n, 2, 3) of the moment, along which it is turned
-        spin : (n,) body spins
-        values : of the parameters, (p,) for all or (n, p); (k n, p) for k answers at each pose, one after the other
-        still : whether the body is at rest in the rotor's frame: its spin is then that given times cos θ
+        At scaled `position` (n, 3) with the `moment` in a direction (n, 3), turned along its `tangents` (n, 2, 3), and
+        body spins `spin` (n,): of a body that is `still` in the rotor's frame these times cos θ. `values` of the
+        parameters are (p,) for all or (n, p); (k n, p) for k answers at each pose, one after the other.
         """
         times = max(len(values) // max(len(position), 1), 1) if values.ndim > 1 else 1
         if times > 1:

@@ -27,18 +27,8 @@ COEFFICIENTS = (1 / 15, -2 / 315, 1 / 1575, -2 / 31185)
 def polarizability(radius: float, conductivity: float, frequency: ArrayLike) -> ComplexArray:
     """α of a sphere in a uniform oscillating field.
 
-    Parameters
-    ----------
-    radius, conductivity : m, S/m
-    frequency : (...,) Hz, of either sign
-
-    Returns
-    -------
-    (...,) A m²/T; 0 at 0 Hz. To 3e-11.
-
-    Raises
-    ------
-    ValueError : radius or conductivity not positive
+    (...,) A m²/T to 3e-11, 0 at 0 Hz, for a `radius` (m), `conductivity` (S/m) and `frequency` (...,) Hz of either
+    sign. Raises ValueError: radius or conductivity not positive.
     """
     for name, value in (("radius_m", radius), ("conductivity_S_m", conductivity)):
         if not (np.isfinite(value) and value > 0):
@@ -69,11 +59,7 @@ def sphere_reaction(radius: float, conductivity: float, frequency: float, distan
     """G_rr, T/(A m²), of a sphere at a dipole that points at its centre.
 
     Of each harmonic r^l the part l/(l+1) R^(2l+1) I_(l+3/2)(x)/I_(l-1/2)(x) comes back as r^-(l+1), whose first is α.
-
-    Parameters
-    ----------
-    radius, conductivity, frequency : m, S/m and Hz
-    distance : of the dipole from the centre, m
+    `radius` and `distance` of the dipole from the centre are in m, `conductivity` in S/m, `frequency` in Hz.
     """
     degrees = np.arange(1, 1 + int(np.ceil(40 / np.log(distance / radius))))
     x = np.sqrt(2j * np.pi * frequency * MU_0 * conductivity) * radius
@@ -85,11 +71,7 @@ def sphere_reaction(radius: float, conductivity: float, frequency: float, distan
 def tube_reaction(inner: float, outer: float, conductivity: float, frequency: float) -> complex:
     """G_zz, T/(A m²), of an infinite tube at its axis.
 
-    Parameters
-    ----------
-    inner, outer : radii, m
-    conductivity : S/m
-    frequency : Hz
+    The radii `inner` and `outer` are in m, `conductivity` is in S/m, `frequency` in Hz.
     """
     k, dk, back = _tube_harmonics(inner, outer, conductivity, lambda k: 2 * np.pi * frequency + 0 * k)
     return complex(MU_0 / (2 * np.pi**2) * np.sum(dk * k**2 * back))
@@ -101,13 +83,8 @@ def tube_drag(
     """Drag on a dipole of 1 A m² along an infinite tube, in which it moves on the axis, N/(A m²)².
 
     Each harmonic e^{ik(z-vt)} is one of the frequency kv in the tube; a cylinder that is magnetised along the axis has
-    2 I₁(ka)/ka · sin(kh/2)/(kh/2) of the dipole's.
-
-    Parameters
-    ----------
-    inner, outer, conductivity : as of `tube_reaction`
-    speed : m/s
-    magnet : radius a and height h of such a cylinder, m; None for a dipole
+    2 I₁(ka)/ka · sin(kh/2)/(kh/2) of the dipole's. `inner`, `outer` and `conductivity` are as of `tube_reaction`,
+    `speed` is in m/s, and `magnet` is radius a and height h of such a cylinder, m; None for a dipole.
     """
     k, dk, back = _tube_harmonics(inner, outer, conductivity, lambda k: k * speed)
     share = np.ones_like(k)

@@ -97,11 +97,7 @@ def face_rule(box: Box, others: Sequence[Solid], nodes: int) -> tuple[Array, Arr
 def volume_rule(body: Solid, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
     """Points (n, 3) m inside a body and weights (n,) m³, graded towards faces and edges.
 
-    Parameters
-    ----------
-    body : that is integrated over
-    others : that make the field: where their faces lie across a box, panels end
-    nodes : of each panel
+    The `others` make the field: where their faces lie across a box, panels end, with so many `nodes` each.
     """
     if isinstance(body, Box):
         return box_rule(body, [graded_rule(breaks, nodes) for breaks in panel_breaks(body, others)])
@@ -145,14 +141,9 @@ def carrier(magnet: Magnet) -> Magnet:
 def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes: int | None = None) -> Coefficients:
     """Coefficients (T) of (μ - 1) H0 in a body, about its centre with radius its circumradius.
 
-    Because the harmonics have no Laplacian, faces and H0's potential suffice for boxes.
-
-    Parameters
-    ----------
-    body : in which H0 induces a magnetisation
-    sources : magnets with μr = 1 that make H0
-    degree : highest of the coefficients
-    nodes : of each panel of the rule; None: enough for the degree
+    Because the harmonics have no Laplacian, faces and H0's potential suffice for boxes. H0 is that of `sources`,
+    magnets with μr = 1. The coefficients are up to a `degree`; `nodes` are of each panel of the rule (None: enough for
+    the degree).
 
     Accuracy with the default number of nodes: round-off for boxes whose axes are parallel or that do not touch, and for
     bodies that do not touch.
@@ -178,11 +169,8 @@ def cell_moments(
 ) -> list[Coefficients]:
     """Coefficients (T) of (μ - 1) H0 and of a uniform rest, of every cell of any body, by integrals over the volume.
 
-    Parameters
-    ----------
-    body, sources, degree, nodes : as of `induced_moments`
-    rest : (3,) T, in body axes
-    cells : of the body
+    `body`, `sources`, `degree` and `nodes` are as of `induced_moments`; `rest` is (3,) T, in body axes; `cells` are of
+    the body.
     """
     others = [source.body for source in sources]
     enough = enough_nodes(degree) if len(cells.radii) == 1 else CELL_NODES
@@ -195,11 +183,8 @@ def cell_moments(
 def by_cells(points: Array, weights: Array, field: Array, cells: Cells, degree: int) -> list[Coefficients]:
     """Coefficients (T) of a magnetisation, cell by cell.
 
-    Parameters
-    ----------
-    points, weights, field : (n, 3) m, (n,) m³ and μ0 M (n, 3) T
-    cells : to the nearest of which each point belongs
-    degree : highest of the coefficients
+    It is `field`, μ0 M (n, 3) T, at `points` (n, 3) m with `weights` (n,) m³, each of the nearest of the `cells`; up to
+    a `degree`.
     """
     owner = cells.which(points)
     return [
@@ -228,12 +213,8 @@ def uniform_cells(magnet: Magnet, nearest: float) -> list[MultipoleExpansion]:
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
     """Coefficients (T) of what a permeability adds, to a few per cent: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1.
 
-    Parameters
-    ----------
-    body : whose permeability counts
-    sources : whose remanence makes H0; a part, which has no closed form, counts as the cuboid of its volume with the
-        proportions of the box about it
-    degree : highest of the coefficients
+    The permeability is that of `body`; the remanence of `sources` makes H0, where a part, which has no closed form,
+    counts as the cuboid of its volume with the proportions of the box about it. Up to a `degree`.
     """
     closed = list(sources)
     for k, magnet in enumerate(sources):
@@ -254,12 +235,8 @@ def added_by_closed_form(
 ) -> list[Coefficients]:
     """Moments (T) of every cell of every piece that need no elements: (μ - 1) H0 + J - J' of the carriers' H0.
 
-    Parameters
-    ----------
-    cut : pieces of every magnet
-    magnets, carriers : with J and permeability; and with J', whose H0 is split off, see `carrier`
-    degree, nodes : as of `induced_moments`
-    cells : of every piece; None: every piece is one
+    `cut` are the pieces of every one of `magnets`, with J and permeability; `carriers` have J', and their H0 is split
+    off, see `carrier`. `degree` and `nodes` are as of `induced_moments`; `cells` are of every piece (None: it is one).
     """
     rests = [whole.polarization - carrier.polarization for whole, carrier in zip(magnets, carriers, strict=True)]
     pieces = [(piece, rest) for whole, rest in zip(cut, rests, strict=True) for piece in whole]

@@ -189,15 +189,8 @@ def segments_field(
 ) -> tuple[list[Expression], list[list[Expression]]]:
     """B and its gradient in the body's own axes, to 1e-10 from where the segments do on.
 
-    Parameters
-    ----------
-    position : three expressions, m, from the centre along the body axes
-    polarization : (3,) T
-
-    Returns
-    -------
-    field : three values, T
-    gradient : 3 × 3 values, [i][j] = ∂B_i/∂x_j, T/m; symmetric and traceless
+    B (3) T and [i][j] = ∂B_i/∂x_j (3 × 3) T/m, symmetric and traceless, at a `position` (three expressions, m, from the
+    centre along the body axes) for a `polarization` (3,) T.
     """
     parts = [_straight_segment(position, row) for row in _segments(body, polarization).tolist()]
     return [hy.sum([part[i] for part in parts]) for i in range(3)], whole_gradient(
@@ -208,13 +201,8 @@ def segments_field(
 def outside_derivatives(points: Array, body: Cylinder, polarization: Array, order: int) -> Array:
     """B and its derivatives up to `order` - 1, by their `entries` (n, k), in the body's own axes, outside it.
 
-    B and its slope to 1e-9 of the largest from `BESIDE` radii off.
-
-    Parameters
-    ----------
-    points : (n, 3) m, from the centre along the body axes
-    body, polarization : as of `segments_field`
-    order : 1 for B alone
+    B and its slope to 1e-9 of the largest from `BESIDE` radii off. At `points` (n, 3) m from the centre along the body
+    axes; `body` and `polarization` are as of `segments_field`; the `order` 1 is B alone.
     """
     turn, rho = np.arctan2(points[:, 1], points[:, 0])[:, None], np.hypot(points[:, 0], points[:, 1])
     found = np.zeros((len(points), order * (order + 2)))

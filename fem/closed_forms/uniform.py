@@ -123,16 +123,9 @@ def cuboid_field(
 ) -> tuple[list[Expression], list[list[Expression]]]:
     """B and its gradient of a uniformly polarised cuboid, in the cuboid's own axes.
 
-    Parameters
-    ----------
-    position : three expressions, m, from the centre along the body axes
-    half_edges : (3,) m
-    polarization : (3,) T; only its non-zero components cost anything
-
-    Returns
-    -------
-    field : three values, T
-    gradient : 3 × 3 values, [i][j] = ∂B_i/∂x_j, T/m; symmetric and traceless
+    B (3) T and [i][j] = ∂B_i/∂x_j (3 × 3) T/m, symmetric and traceless, at a `position` (three expressions, m, from the
+    centre along the body axes) for `half_edges` (3,) m and a `polarization` (3,) T, of which only non-zero components
+    cost anything.
 
     Accuracy: round-off of the largest terms. The terms cancel as the distance grows, so that it is 1e-15 of B beside
     the cuboid and grows as (distance/size)²: 1e-12 at a hundred sizes.
@@ -413,11 +406,7 @@ def closed_form_error(magnets: Sequence[Magnet]) -> float:
 def fields_of_sphere(moment: Array, center: Array, radius: float, points: Array) -> Fields:
     """H and M of a sphere magnetised uniformly: a dipole's outside, H = -M/3 inside; exact.
 
-    Parameters
-    ----------
-    moment : (3,) A m²
-    center, radius : m
-    points : (n, 3) m
+    Its `moment` is (3,) A m², `center` and `radius` are in m; at `points` (n, 3) m.
     """
     away = points - center
     distance = np.linalg.norm(away, axis=1)[:, None]

@@ -75,11 +75,8 @@ def round_rule(
 ) -> tuple[Array, Array]:
     """Points (n, 3) m and weights (n,) m³ in a body of revolution.
 
-    Parameters
-    ----------
-    radial : places and weights (m) of the distance from the axis, or from a sphere's centre
-    other : the same of the height (m), or of a sphere's cosine of the polar angle
-    count : places around the axis
+    The rules (places and weights) are `radial`, of the distance (m) from the axis or from a sphere's centre, and
+    `other`, of the height (m) or of a sphere's cosine of the polar angle; `count` places are around the axis of `body`.
     """
     (r, wide), (t, tall) = radial, other
     if isinstance(body, Sphere):
@@ -100,19 +97,12 @@ TURNED = 1e-14  # of the largest term: what turning there and back leaves at mos
 
 @dataclass(frozen=True, eq=False)
 class MultipoleExpansion:
-    """B = -∇̃ Σ c_lm Θ_lm(r̃), with r̃ = (r - center)/radius and ∇̃ its derivative.
+    """B = -∇̃ Σ c_lm Θ_lm(r̃), with r̃ = (r - center)/radius and ∇̃ its derivative."""
 
-    Parameters
-    ----------
-    center : (3,) m, rotor's frame
-    radius : radius of a sphere about the centre that holds all sources, m; the series converges outside it
-    coefficients : c_lm (T), complex (L+1, L+1), m ≥ 0, along the rotor's axes
-    axes : (3, 3) along whose columns its expressions are written, because fewer terms are left there
-    """
-
-    center: Array = field(metadata={"units": "m"})
-    radius: float = field(metadata={"units": "m"})
-    coefficients: Coefficients = field(metadata={"units": "T"})
+    center: Array = field(metadata={"units": "m"})  # (3,), rotor's frame
+    radius: float = field(metadata={"units": "m"})  # of a sphere that holds all sources: the series converges outside
+    coefficients: Coefficients = field(metadata={"units": "T"})  # (L+1, L+1), m ≥ 0, along the rotor's axes
+    # (3, 3) along whose columns its expressions are written, because fewer terms are left there
     axes: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
@@ -233,11 +223,8 @@ def moments_of_magnetization(
 ) -> Coefficients:
     """Coefficients (T) of a magnetisation given at quadrature points, ∫ M · ∇ conj Υ_lm dV: exact volume functionals.
 
-    Parameters
-    ----------
-    points, weights, magnetization : (n, 3) m, (n,) m³ and μ0 M (n, 3) T
-    center, radius : m, of the sphere about which the field is expanded
-    degree : highest l
+    At `points` (n, 3) m with `weights` (n,) m³ and the `magnetization` μ0 M (n, 3) T, about the sphere of a `center`
+    and `radius`, m, up to a `degree`.
     """
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
     potentials = weighted_sums(degree, (points - center) / radius, weighted)
@@ -249,12 +236,8 @@ def curvature_moments(
 ) -> Coefficients:
     """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm: what a potential in an anisotropic body adds to its faces' moments.
 
-    Parameters
-    ----------
-    points, weights : (n, 3) m and w (n,) T m⁴
-    matrix : A (3, 3), symmetric
-    center, radius : m, of the sphere about which the field is expanded
-    degree : highest l
+    At `points` (n, 3) m with `weights` w (n,) T m⁴ and the symmetric `matrix` A (3, 3), about the sphere of a `center`
+    and `radius`, m, up to a `degree`.
     """
     (sums,) = weighted_sums(degree, (points - center) / radius, weights[:, None] / (FOUR_PI * radius**4))
     second = [[regular_derivative(regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
@@ -296,11 +279,8 @@ def trimmed_expansions(
 ) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
     """The coefficients that matter, and what they leave out.
 
-    Parameters
-    ----------
-    expansions : whose fields add up
-    points, allowed : (n, 3) m, and (n,) T of the whole field that may be left out there
-    most : coefficients up to which they are fitted
+    The fields of `expansions` add up, of which `allowed` (n,) T may be left out at `points` (n, 3) m; up to `most`
+    coefficients are fitted.
 
     The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
     stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.
@@ -414,11 +394,8 @@ HELD = 1e-11  # what a squared weight of a fit costs, so that those of pieces be
 class FittedExpansions:
     """Expansions about several places with the field of sources between them, fitted to it all around these.
 
-    Parameters
-    ----------
-    centers, radii : (k, 3) m and (k,) m of the expansions
-    degree : of each, 2 at least
-    points, allowed : (n, 3) m on a surface about the sources, and (n,) T by which errors count there
+    `centers` (k, 3) m, `radii` (k,) m and the `degree`, 2 at least, are those of the expansions; errors count by
+    `allowed` (n,) T at `points` (n, 3) m on a surface about the sources.
     """
 
     def __init__(self, centers: Array, radii: Array, degree: int, points: Array, allowed: Array) -> None:

@@ -40,11 +40,8 @@ def whole_gradient(entries: Sequence[hy.expression]) -> list[list[hy.expression]
 def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], monic: bool = False) -> list[hy.expression]:
     """Σ weight Re Θ_lm or Im Θ_lm, one expression for each of `sums`.
 
-    Parameters
-    ----------
-    position : three expressions, in the units of the harmonics
-    sums : weights of each
-    monic : harmonics without their factors (-1)^m (2l-1)!!, each with the weight 1
+    At a `position` (three expressions, in the units of the harmonics); `monic`: harmonics without their factors (-1)^m
+    (2l-1)!!, each with the weight 1.
     """
     x, y, z = position
     inverse = 1.0 / (x * x + y * y + z * z)
@@ -146,11 +143,8 @@ class CompiledField:
     """B and its derivatives at points from expressions, compiled when they are first asked for.
 
     The compiler may contract and reorder sums, which is twice as fast and moves closed forms by no more than their own
-    round-off, 5e-14 of B. An integrator compiles the same expressions without that.
-
-    Parameters
-    ----------
-    build : takes three heyoka expressions (position, m) and returns `FieldExpressions`
+    round-off, 5e-14 of B. An integrator compiles the same expressions without that. `build` takes three heyoka
+    expressions (position, m) and returns `FieldExpressions`.
     """
 
     def __init__(self, build: Callable[[Sequence[hy.expression]], FieldExpressions]) -> None:
@@ -177,11 +171,7 @@ def differentiated(
 ) -> list[hy.expression]:
     """Derivatives of a harmonic function by their `entries`, of all degrees beyond the known ones.
 
-    Parameters
-    ----------
-    known : derivatives of one degree, by their entries
-    variables : x, y and z
-    last : highest degree
+    From those of one degree (`known`, by their entries) by the `variables` x, y and z, up to the `last` degree.
     """
     found: list[hy.expression] = []
     for degree in range(len(next(iter(known))) + 1, last + 1):

@@ -72,14 +72,8 @@ def sphere(degree: int, more: int = 6) -> tuple[Array, Array]:
 def interior_coefficients(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coefficients:
     """Coefficients a_lm (T) of a field without sources in a ball, by its normal component on the surface.
 
-    Parameters
-    ----------
-    field : points (n, 3) m -> B (n, 3) T
-    ball : about whose centre it is expanded
-    degree : highest l
-
-    Aliasing is a part ρ^(degree + 10) of the field, ρ the radius over the
-    distance of the centre from the nearest singularity.
+    The `field` takes points (n, 3) m to B (n, 3) T; up to a `degree` about the centre of `ball`. Aliasing is a part
+    ρ^(degree + 10) of it, ρ the radius over the distance of the centre from the nearest singularity.
     """
     normals, _ = sphere(degree)
     return _by_normal_field(np.sum(field(ball.center + ball.radius * normals) * normals, axis=1), degree)
@@ -107,11 +101,7 @@ def _by_height(degree: int, more: int) -> Array:
 def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -> Coefficients:
     """Coefficients a_lm (T) of dipoles outside a ball: (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
 
-    Parameters
-    ----------
-    points, moments : (n, 3) m and μ0 M dV (n, 3) T m³
-    ball : about whose centre the field is expanded
-    degree : highest l
+    Dipoles are `moments` μ0 M dV (n, 3) T m³ at `points` (n, 3) m; up to a `degree` about the centre of `ball`.
     """
     sums = np.zeros((3, degree + 2, degree + 2), complex)
     for start in range(0, len(points), CHUNK):
@@ -131,11 +121,7 @@ def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -
 def from_charges(points: Array, charges: Array, ball: Ball, degree: int) -> Coefficients:
     """Coefficients a_lm (T) of magnetic charges outside a ball: (4π radius²)⁻¹ Σ q Θ_lm, exact for these charges.
 
-    Parameters
-    ----------
-    points, charges : (n, 3) m and q (n,) T m²
-    ball : about whose centre the field is expanded
-    degree : highest l
+    At `points` (n, 3) m are `charges` q (n,) T m²; up to a `degree` about the centre of `ball`.
     """
     away = (points - ball.center) / ball.radius
     square = np.sum(away**2, axis=1)[:, None]
@@ -149,12 +135,8 @@ def from_outer(sums: Sequence[Coefficients], radii: Array, centers: Array, ball:
     """Coefficients a_lm (T) of outer expansions about other centres, whose sources lie outside the ball.
 
     (ρ/R)^(1-l) (-1)^l Σ c_l'm' Θ_(l+l')(m+m')(d/ρ), d from their centre to the ball's: Θ_l'm' are derivatives of 1/r.
-
-    Parameters
-    ----------
-    sums, radii, centers : c_lm (T) of k expansions, ρ (k,) m and (k, 3) m
-    ball : of radius R, about whose centre the field is expanded
-    degree : highest l
+    `sums` c_lm (T), `radii` ρ (k,) m and `centers` (k, 3) m are those of k expansions; R is that of `ball`; up to a
+    `degree`.
     """
     away, own = (ball.center - centers) / radii[:, None], max(len(each) for each in sums) - 1
     square = np.sum(away**2, axis=1)
@@ -452,12 +434,8 @@ def field_coefficients(
 ) -> Array:
     """Coefficients A (K,) T m of a field, lengths in a unit.
 
-    Parameters
-    ----------
-    evaluate : B (n, 3) T at points (n, 3) m
-    center, reach : (3,) m and m, of the ball in which the field is known
-    degree : highest
-    unit : of lengths, m
+    `evaluate` takes points (n, 3) m to B (n, 3) T, known in the ball of `center` (3,) m and `reach` (m); up to a
+    `degree`, in a `unit` of lengths, m.
     """
     found = real_weights(interior_coefficients(evaluate, Ball(center, reach), degree))
     return np.asarray(found * reach * (unit / reach) ** shells(degree))

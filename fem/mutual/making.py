@@ -75,11 +75,8 @@ def mutual_errors(
 ) -> tuple[Array, Array]:
     """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque found at poses with these gaps.
 
-    Parameters
-    ----------
-    table, floater : that are compared with both bodies
-    coarse, rotor : with two numbers of nodes, which tell the table's error and their own
-    watch : called with the progress
+    `table` and `floater` are compared with both bodies; `coarse` and `rotor` have two numbers of nodes, which tell the
+    table's error and their own. `watch` is called with the progress.
     """
     generator = np.random.default_rng(4)
     apart = max(float(np.ptp(np.linalg.eigvalsh(m.permeability_in_rotor))) for m in rotor.magnets)
@@ -144,16 +141,9 @@ def mutual_table(
 ) -> MutualTable:
     """Mutual magnetisation of a rotor and a spherical floater.
 
-    Parameters
-    ----------
-    magnets : of the rotor
-    floater : whose radius, remanence and recoil permeability count
-    watch : called with the progress
-    points : along the edges of each magnet, at which it responds; left out, as many as the accuracy needs
-
-    Raises
-    ------
-    InputError : a magnet's permeability has other axes than its body, or it is a part from a file
+    Of the `floater` radius, remanence and recoil permeability count. `watch` is called with the progress. `points` are
+    those along the edges of each of the `magnets`, at which it responds; left out, as many as the accuracy needs.
+    Raises InputError: a magnet's permeability has other axes than its body, or it is a part from a file.
     """
     started, magnets, grids = time.perf_counter(), united(magnets), list[ResponseGrid]()
     for k, magnet in enumerate(magnets):
@@ -293,12 +283,8 @@ def cached_mutual_table(
 ) -> tuple[MutualTable, bool]:
     """A mutual table from the cache if it is there, and whether it was.
 
-    A lone magnet responds in its own axes: one table serves it wherever it stands and however it is turned.
-
-    Parameters
-    ----------
-    magnets, floater, watch : see `mutual_table`
-    report : called with a message where the cache is damaged
+    A lone magnet responds in its own axes: one table serves it wherever it stands and however it is turned. `magnets`,
+    `floater` and `watch` are as of `mutual_table`; `report` is called with a message where the cache is damaged.
     """
     magnets = united(magnets)
     upright = alike(magnets)
@@ -331,12 +317,9 @@ def sphere_fit(
 ) -> tuple[list[ResponseGrid], Array]:
     """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
 
-    Parameters
-    ----------
-    grids : whose `degrees` are sought
-    single : whether each point has a weight of its own, and not its class alone
-    images : weights of the sphere's images
-    places, samples : (n, 3) m, and what `sphere_samples` gives there
+    `grids` are those whose `degrees` are sought; `single`: whether each point has a weight of its own, and not its
+    class alone; `images` are the weights of the sphere's images, `samples` what `sphere_samples` gives at `places` (n,
+    3) m.
     """
     energy, force, energy_size, force_size = samples
 
@@ -364,12 +347,9 @@ def returned_fit(
 ) -> tuple[list[ResponseGrid], Array]:
     """Weights of the points' powers, and of pairs, that give V and its slopes.
 
-    Parameters
-    ----------
-    grids, single : whose `returned` are sought, and as for `sphere_fit`
-    inner : (k, 3) m of each magnet, points that respond for the whole of it
-    images : weights of the sphere's images
-    places, samples : (n, 3) m, and what `returned_samples` gives there
+    `grids` are those whose `returned` are sought; `single` and `images` are as of `sphere_fit`; `inner` (k, 3) m of
+    each magnet are points that respond for the whole of it, `samples` what `returned_samples` gives at `places` (n, 3)
+    m.
     """
     field, change = samples
     sizes = np.linalg.norm(field, axis=1)[:, None], np.linalg.norm(change, axis=(1, 2))[:, None, None]
@@ -440,10 +420,8 @@ def classes(grid: ResponseGrid, mirrored: bool) -> Array:
 def least_squares(columns: Array, values: Array, small: Array, cost: float = PENALTY) -> Array:
     """Weights (k,) of columns (n, k) of any sizes that give values (n,).
 
-    Parameters
-    ----------
-    small : (k,) which weights are kept small: by themselves they are hardly determined
-    cost : of one that is, by an error of the size of all values
+    By themselves those that are `small` (k,) are hardly determined: they are kept so, at a `cost` by an error of the
+    size of all values.
     """
     if not small.any() and len(small) <= FEW_WEIGHTS:
         size = np.linalg.norm(columns, axis=0)

@@ -101,10 +101,7 @@ class RotorResponse(Protocol):
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
         """Response field of the magnets: its coefficients a_lm (T) about the ball's centre.
 
-        Parameters
-        ----------
-        sources, ball : c_lm (T) of what is in the ball
-        degree : highest of the coefficients
+        `sources` c_lm (T) are in the `ball`; `degree` is the highest of the coefficients.
         """
 
 
@@ -118,12 +115,9 @@ class ChargeResponse:
 
     To a field b every magnet responds first as a half-space would, by μ0 M = c b with c = χ/(1 + χ/2), whose field and
     energy are integrals over the volume; the charges are what is left, 3e-3 of the response of a cube with μr = 1.05.
-    Of two permeabilities the first part is exact, with a tensor, and the charges are those of their mean.
-
-    Parameters
-    ----------
-    magnets : of the rotor; cuboids, cylinders, rings or spheres
-    count, own : nodes along an edge of a face, and of those for the rotor's own field; None: as many
+    Of two permeabilities the first part is exact, with a tensor, and the charges are those of their mean. `magnets` are
+    cuboids, cylinders, rings or spheres; `count` and `own` are the nodes along an edge of a face, and of those for the
+    rotor's own field (None: as many).
     """
 
     def __init__(self, magnets: tuple[Magnet, ...], count: int, own: int | None = None) -> None:
@@ -215,11 +209,8 @@ class ChargeResponse:
 def direct_rule(magnets: Sequence[Magnet], nearest: ArrayLike, shares: ArrayLike = 1.0) -> tuple[Array, Array]:
     """Points (n, 3) m and (μ - 1) dV (n, 3, 3) m³ in magnets, for integrals of fields over them.
 
-    Parameters
-    ----------
-    magnets : k of them
-    nearest : (k,) or one for all, distance of the fields' sources from each magnet at least, m
-    shares : (k,) or one for all, part of each magnet's μ - 1 that is taken
+    Of k `magnets`, for fields whose sources are `nearest` (k,) m from each or more, and `shares` (k,) of each magnet's
+    μ - 1; one number for all will do.
     """
     points, tensors = [], []
     each = (np.broadcast_to(part, len(magnets)).tolist() for part in (nearest, shares))
@@ -240,13 +231,8 @@ def closed_dipoles(
 ) -> tuple[Array, Array]:
     """Positions (n, 3) m and μ0 M dV (n, 3) T m³ of the magnetisation χ H0 of the remanence's closed form H0.
 
-    The points are graded towards the edges, where H0 has a logarithm.
-
-    Parameters
-    ----------
-    magnets : whose remanence makes H0
-    susceptibilities : χ (3, 3) of each
-    nodes : of the rule in a magnet, along an axis
+    The points are graded towards the edges, where H0 has a logarithm. H0 is that of `magnets`, χ (3, 3) of each are the
+    `susceptibilities`, and `nodes` is of the rule in a magnet, along an axis.
     """
     bodies = [magnet.body for magnet in magnets]
     points, moments = [np.zeros((0, 3))], [np.zeros((0, 3))]
@@ -303,19 +289,12 @@ def two_body(
 ) -> TwoBody:
     """Magnetostatics of both bodies for one pose.
 
-    Parameters
-    ----------
-    rotor, floater : the bodies; of the floater radius, remanence and recoil permeability count
-    position : (3,) floater's centre, m, rotor's frame
-    direction : (3,) unit vector of its remanent polarisation
-    degree : highest degree about the floater's centre; None: from the distance of the nearest edge
-    rtol : where the series ends, relative to its first term
+    The floater's centre is at `position` (3,) m, rotor's frame, and its remanent polarisation along `direction` (3,);
+    its radius, remanence and recoil permeability count. `degree` is the highest about its centre; None: from the
+    distance of the nearest edge. The series ends at `rtol` of its first term. Raises TwoBodyError: the bodies overlap,
+    or the series does not converge.
 
     Accuracy: that of the rotor's response (see `two_body_ladder`) and `tail`.
-
-    Raises
-    ------
-    TwoBodyError : the bodies overlap, or the series does not converge
     """
     ball = Ball(np.asarray(position, float), floater.radius)
     degree = degree or enough_degree(rotor.magnets, ball)
@@ -356,10 +335,7 @@ def two_body_ladder(
 ) -> tuple[TwoBody, Wrench]:
     """Both bodies with the finest elements, and how far the two finest are apart: an error estimate of the total.
 
-    Parameters
-    ----------
-    rotors : with elements of growing degree
-    floater, position, direction : as of `two_body`
+    `rotors` have elements of growing degree; `floater`, `position` and `direction` are as of `two_body`.
     """
     coarse, fine = (two_body(rotor, floater, position, direction) for rotor in rotors[-2:])
     apart = fine.total - coarse.total
@@ -377,11 +353,8 @@ def _wrench(incident: Coefficients, sources: Coefficients, ball: Ball) -> Wrench
 def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float], number: int, seed: int) -> Array:
     """Centres (n, 3) m of floaters beside magnets, where they fit.
 
-    Parameters
-    ----------
-    radius : of the floater, m
-    gaps : from a magnet, in radii
-    number, seed : of random directions for each gap and magnet
+    At `gaps` from a magnet, in floater radii (`radius`, m), in a `number` of random directions for each gap and magnet,
+    by a `seed`.
     """
     generator, found = np.random.default_rng(seed), []
     for magnet in magnets:
@@ -395,10 +368,8 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
 def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float]) -> Array:
     """Centres (n, 3) m of floaters before the middles of faces and edges and the corners of magnets, where they fit.
 
-    Parameters
-    ----------
-    magnets : of a lone one, places on one side; of many, before the faces' middles alone
-    radius, gaps : of the floater, m, and from a magnet, in radii
+    At `gaps` from a magnet, in floater radii (`radius`, m). Beside a lone one of `magnets` on one side, and of many
+    before the faces' middles alone.
     """
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     if len(magnets) == 1:
@@ -419,14 +390,8 @@ def _clear(magnets: Sequence[Magnet], places: Array, distance: float) -> Array:
 def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Array]:
     """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric.
 
-    Parameters
-    ----------
-    rotor : that responds
-    places : no nearer to the magnets than the floater's centre can be
-
-    Returns
-    -------
-    The part of `ChargeResponse.direct`, and that of the charges beyond it.
+    The part of `ChargeResponse.direct`, and that of the charges beyond it; no place may be nearer to the magnets than
+    the floater's centre can be.
     """
     nearest = min(float(np.min(magnet.body.distance(places))) for magnet in rotor.magnets)
     points, tensors = rotor.direct(nearest)
@@ -448,15 +413,8 @@ def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Arra
 def sphere_samples(rotor: ChargeResponse, floater: Floater, places: Array, watch: Watch) -> list[Array]:
     """The sphere's response, degree by degree, to the rotor's own field.
 
-    Parameters
-    ----------
-    rotor, floater : each alone
-    places : (n, 3) m of the floater's centre
-    watch : called with the progress
-
-    Returns
-    -------
-    Energy (n,) J and force (n, 3) N of the response of degree 2 and more, and the sizes (n,) of those of the whole
+    Energy (n,) J and force (n, 3) N of the response of degree 2 and more, and the sizes (n,) of those of the whole, at
+    `places` (n, 3) m of the centre of `floater` beside `rotor`; `watch` is called with the progress.
     """
     rows = []
     for place in watched(places, watch, "induced magnetisation of the floater"):
@@ -489,18 +447,10 @@ def returned_samples(
     By the points that respond for the rotor: to 2e-3 what it gives itself from 1 mm off contact.
 
     The energy is -M·V of the moment M. A unit moment and the sphere's response to B0 are sources, the rotor responds to
-    both, and the sphere to its response to the moment: the forces of the three are the derivatives of V.
-
-    Parameters
-    ----------
-    rotor, floater : each alone
-    grids, inner, coupling : points (n, 3) m and weights that respond for the rotor, see `MutualTable`
-    places : (n, 3) m of the floater's centre
-    watch : called with the progress
-
-    Returns
-    -------
-    (n, 3) T at the sphere's centre, and (n, 3, 3) T/m: its change as the sphere moves along x, y, z
+    both, and the sphere to its response to the moment: the forces of the three are the derivatives of V. Field (n, 3) T
+    at the sphere's centre, and (n, 3, 3) T/m: its change as the sphere moves along x, y, z; at `places` (n, 3) m of the
+    centre of `floater`. `grids`, `inner` (k, 3) m and `coupling` are points and weights that respond for `rotor`, see
+    `MutualTable`. `watch` is called with the progress.
     """
     fields, slopes = [], []
 
@@ -529,11 +479,8 @@ def point_response(
 ) -> Coefficients:
     """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball.
 
-    Parameters
-    ----------
-    grids : of the magnets
-    inner, coupling : (k, 3) m and (3k, 3k) A m²/T, for the magnets as a whole
-    sources, ball : c_lm (T) and the ball in which they are
+    `sources` are c_lm (T) in the `ball`. `grids` are of the magnets; `inner` (k, 3) m and `coupling` (3k, 3k) A m²/T
+    are for the magnets as a whole.
     """
     places = np.concatenate([*(grid.places for grid in grids), inner])
     fields = outer_sums([-derivative(sources, axis) for axis in range(3)], (places - ball.center) / ball.radius)

@@ -98,10 +98,8 @@ def image_weights(permeability: float) -> Array:
 def response_to_charge(a: Sequence[Any], b: Sequence[Any], weights: Sequence[Any]) -> hy.expression:
     """Energy of a charge in a sphere's response to another: Σ_{l≥2} (t_l/t) P_l(cos) (ab)^-(l+1).
 
-    Parameters
-    ----------
-    a, b : places of the charges from the sphere's centre, in radii (three expressions each)
-    weights : of the images, see `image_weights`; t = (μr - 1)/(μr + 1)
+    `a` and `b` are places of the charges from the sphere's centre, in radii (three expressions each); `weights` are
+    those of `image_weights`, and t = (μr - 1)/(μr + 1).
     """
     square = hy.sum([x * x for x in a]) * hy.sum([x * x for x in b])
     along = hy.sum([x * y for x, y in zip(a, b, strict=True)])
@@ -118,14 +116,9 @@ def response_to_charge(a: Sequence[Any], b: Sequence[Any], weights: Sequence[Any
 def point_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
     """A magnet's point: -½ Σ λ b² of the moment's field b, less its part in u(x) + V(x)·M, see `MutualTable`.
 
-    With d from the point and ĵ along the remanence the parts are (R/d)^2p (v + w (ĵ·d)²/d²) of u, and
-    (R/d)^2q (s ĵ + t (ĵ·d) d/d²) of V.
-
-    Parameters
-    ----------
-    place, moment : m and A m² times share, along the body's axes
-    row : the point (3, m), its 13 `numbers`, ĵ (3) and R (m)
-    share : of the units, by which v, w, s and t become those of the energy, J times share²
+    With d from the point and ĵ along the remanence the parts are (R/d)^2p (v + w (ĵ·d)²/d²) of u, and (R/d)^2q (s ĵ + t
+    (ĵ·d) d/d²) of V. `place` (m) and `moment` (A m² times share) are along the body's axes; `row` is the point (3, m),
+    its 13 `numbers`, ĵ (3) and R (m). By `share` of the units v, w, s and t become those of the energy, J times share².
     """
     strengths, axis, radius = row[3:6], row[16:19], row[19]
     v4, w4, v5, w5, v6, w6 = (share * share * v for v in row[6:12])
@@ -147,11 +140,8 @@ def point_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any]
 def coupled_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
     """Two points that respond together: -b·(C b') of the moment's fields b, b' at them.
 
-    Parameters
-    ----------
-    place, moment : m and A m² times share
-    row : the points (3 + 3, m) and C (9, A m²/T)
-    share : of the units; the moment has it already
+    For a `place` (m) and `moment` (A m² times `share`, which is in it already); `row` is the points (3 + 3, m) and C
+    (9, A m²/T).
     """
     one, other = (point_field([x - t for x, t in zip(place, p, strict=True)], moment) for p in (row[:3], row[3:6]))
     return -hy.sum([row[6 + 3 * i + j] * (one[i] * other[j]) for i, j in np.ndindex(3, 3)])
@@ -160,11 +150,8 @@ def coupled_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[An
 def pair_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
     """Two magnets' charges by the sphere's response to one of them.
 
-    Parameters
-    ----------
-    place, moment : m and A m² times share; the moment does not count
-    row : places of the charges (3 + 3, m), the energy's factor (J), 1/R (1/m) and the weights of the images (3)
-    share : of the units
+    For a `place` (m), whatever the `moment`, in units by `share`; `row` is places of the charges (3 + 3, m), the
+    energy's factor (J), 1/R (1/m) and the weights of the images (3).
     """
     a, b = (_scaled(place, p, row[7]) for p in (row[:3], row[3:6]))
     return share * share * (row[6] * response_to_charge(a, b, row[8:]))
@@ -173,11 +160,8 @@ def pair_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any],
 def mixed_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
     """The moment in the field of a point that the sphere's response to a charge elsewhere magnetises.
 
-    Parameters
-    ----------
-    place, moment : m and A m² times share
-    row : places of charge and point (3 + 3, m), the factor (T), 1/R (1/m) and the weights of the images (3)
-    share : of the units
+    For a `place` (m) and `moment` (A m² times `share`); `row` is places of charge and point (3 + 3, m), the factor (T),
+    1/R (1/m) and the weights of the images (3).
     """
     a, b = (_scaled(place, p, row[7]) for p in (row[:3], row[3:6]))
     given = hy.make_vars("b_x", "b_y", "b_z")
@@ -228,15 +212,8 @@ class EnergySum:
     ) -> tuple[Array, Array, Array]:
         """The energy and its first and second derivatives by place (m) and moment (A m²), in this order.
 
-        Parameters
-        ----------
-        places, moments : (m, 3) m and A m², rotor's frame
-        order : of the derivatives; with 1 the second ones are zero
-        apart : of every row by itself
-
-        Returns
-        -------
-        J and its derivatives (m,), (m, 6) and (m, 6, 6); of rows `apart` (n, m), (n, m, 6) and (n, m, 6, 6)
+        J and its derivatives (m,), (m, 6) and (m, 6, 6) at `places` (m, 3) m of `moments` (m, 3) A m², rotor's frame;
+        of every row `apart` (n, m), (n, m, 6) and (n, m, 6, 6). With the `order` 1 the second ones are zero.
         """
         free = np.concatenate([(places - self.origin) @ self.axes, moments @ self.axes], axis=1)
         kernel, (count, width) = _kernel(self.formula, self.rows.shape[1], order), self.rows.shape
@@ -340,12 +317,8 @@ def charge_sum(
 ) -> EnergySum:
     """`pair_energy` or `mixed_energy` of each of one magnet's charges with each of another's charges or points.
 
-    Parameters
-    ----------
-    formula : one of both
-    charges, others : places (k, 3) m and amounts (k,), whose products are the factors of minus the energy
-    radius : of the sphere, m
-    images : (3,) weights of its images
+    The `formula` is one of both. `charges` and `others` are places (k, 3) m and amounts (k,), whose products are the
+    factors of minus the energy; `radius` (m) is the sphere's and `images` (3,) the weights of its images.
     """
     (here, q), (there, p) = charges, others
     count = len(q) * len(p)
@@ -425,11 +398,9 @@ class MutualTable:
     ) -> hy.expression:
         """The energy U as an expression.
 
-        Parameters
-        ----------
-        position : of the floater's centre (3 expressions, m), rotor's frame
-        moment, flux : rigid moment (A m²) and the rotor's field B0 (T), times `share`
-        share : lets the energy come in units of its own, J times share²: it is one over their root
+        The floater's centre is at `position` (3 expressions, m), rotor's frame; `moment` (A m²) is the rigid one and
+        `flux` (T) the rotor's field B0, both times `share`, which lets the energy come in units of its own, J times
+        share²: it is one over their root.
         """
         whole = [m + self.polarizability * b for m, b in zip(moment, flux, strict=True)]
         parts = [-0.5 * self.polarizability * hy.sum([b * b for b in flux])]
@@ -450,10 +421,8 @@ class MutualTable:
     def added(self, places: Array, moments: Array, field: Array, gradient: Array) -> tuple[Array, Array, Array]:
         """Energy (n,) J, force (n, 3) N and torque (n, 3) N m added by mutual magnetisation.
 
-        Parameters
-        ----------
-        places, moments : (n, 3) m of the floater's centre, and (n, 3) A m² of its rigid moment, rotor's frame
-        field, gradient : B0 (n, 3) T and ∂B0_i/∂x_j (n, 3, 3) T/m of the rotor there
+        At `places` (n, 3) m of the floater's centre with rigid `moments` (n, 3) A m², rotor's frame, where the rotor's
+        B0 is `field` (n, 3) T and ∂B0_i/∂x_j `gradient` (n, 3, 3) T/m.
         """
         alpha = self.polarizability
         energy, slope, _ = self.derivatives(places, moments + alpha * field)

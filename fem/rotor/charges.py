@@ -56,11 +56,7 @@ BESIDE_EACH_OTHER, NEARER = 16, 0.9
 def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
     """Why charges on their surfaces do not describe the magnets; empty where they do.
 
-    Parameters
-    ----------
-    magnets : of the rotor
-    accuracy : asked of the table
-    points : (n, 3) m at which it is to hold, as of `error_points`
+    At `points` (n, 3) m, as of `error_points`, their table is to hold with an `accuracy`.
     """
     permeable = [magnet for magnet in magnets if magnet.contrast]
     if any(isinstance(magnet.body, Part) for magnet in permeable):
@@ -157,17 +153,10 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     """Field of magnets of one recoil permeability each: closed forms, and expansions of the charges on their surfaces.
 
     Nodes are added until the estimated error meets the accuracy. If no number of `NODES` that memory allows does so, as
-    where faces that nearly touch lie across each other, the last table is returned with an `AccuracyWarning`.
-
-    Parameters
-    ----------
-    magnets : cuboids, cylinders, rings and spheres, m and T in the rotor's frame
-    accuracy : asked for
-    watch : called with the progress
-
-    Raises
-    ------
-    InputError : a magnet has two permeabilities, is a part from a file, or is far too large; or round ones touch
+    where faces that nearly touch lie across each other, the last table is returned with an `AccuracyWarning`. The
+    `magnets` are cuboids, cylinders, rings and spheres, m and T in the rotor's frame; `accuracy` is what is asked for;
+    `watch` is called with the progress. Raises InputError: a magnet has two permeabilities, is a part from a file, or
+    is far too large; or round ones touch.
     """
     start = time.perf_counter()
     points, scale = error_points(magnets, accuracy.clearance(magnets))

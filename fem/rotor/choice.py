@@ -46,15 +46,8 @@ def resolve_model(
 
     `auto` is the cheapest of dipole, moments and closed form that meets the accuracy; where permeability matters,
     finite elements, or charges on the surfaces of `MANY` compact magnets, of two of which one is round, or where no
-    more than `ROUGH` is asked.
-
-    Parameters
-    ----------
-    rotor, model, rtol, nearest : as of `rotor_table`
-
-    Raises
-    ------
-    ValueError : unknown model, or rtol not between 0 and 1
+    more than `ROUGH` is asked. `rotor`, `model`, `rtol` and `nearest` are as of `rotor_table`. Raises ValueError:
+    unknown model, or rtol not between 0 and 1.
     """
     if model in MODELS:
         return model, "as requested"
@@ -108,11 +101,8 @@ def rotor_table(
     μr = 1.05 has 0.984 of it, so that their field is 1.6 % too strong by convention ("fem" has the true one, and the
     floater's own moment always carries its 3/(μr + 2)).
     The table states its own error: `RotorTable.relative_error`. That of "dipole" and "cuboid" is their neglected part,
-    shape and permeability, computed to first order in μr - 1.
-
-    Raises
-    ------
-    ValueError : unknown model, no magnet, or rtol not between 0 and 1
+    shape and permeability, computed to first order in μr - 1. Raises ValueError: unknown model, no magnet, or rtol not
+    between 0 and 1.
     """
     accuracy = Accuracy(rtol, nearest)
     if not rotor:
@@ -155,12 +145,8 @@ def cached_rotor_table(
 ) -> tuple[RotorTable, bool]:
     """A rotor table from the cache if it is there, and whether it was.
 
-    A lone magnet has one, wherever it is in the rotor.
-
-    Parameters
-    ----------
-    rotor, model, rtol, nearest, watch : as of `rotor_table`
-    report : called with a message where the cache is damaged
+    A lone magnet has one, wherever it is in the rotor. `rotor`, `model`, `rtol`, `nearest` and `watch` are as of
+    `rotor_table`; `report` is called with a message where the cache is damaged.
     """
     rotor = _bodies(rotor, model)
     lone = alike(rotor)

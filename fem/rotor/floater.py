@@ -133,14 +133,9 @@ def floater_sources(
     """Sources of a floater of any shape, in its frame.
 
     Exact for μr = 1 up to a `degree` of the rotor's field over the body; with a permeability to 1e-5 of the field
-    beside the floater, from finite elements, which are kept in the user's cache.
-
-    Parameters
-    ----------
-    floater : a sphere is one dipole
-    report : called with a message where the cache is damaged
-    degree : of the polynomials over the body that are integrated exactly
-    near : one of nearly the same numbers, whose finite elements are taken: the sources are smooth functions of them
+    beside the floater, from finite elements, which are kept in the user's cache. A sphere is one dipole. `report` is
+    called with a message where the cache is damaged. `near` is a floater of nearly the same numbers, whose finite
+    elements are taken: the sources are smooth functions of them.
     """
     if floater.is_sphere:
         return FloaterSources.dipole(floater.dipole)
@@ -185,15 +180,9 @@ def _charges(expansion: MultipoleExpansion, radius: float) -> tuple[Array, Array
 def force_and_torque(sources: FloaterSources, table: FieldTable, position: Array, axes: Array) -> tuple[Array, Array]:
     """Force (n, 3) N and torque (n, 3) N m about the centre in the rotor's field.
 
-    Parameters
-    ----------
-    sources, table : the floater's, and the rotor's field
-    position : (n, 3) of the centre, m, rotor's frame
-    axes : (n, 3, 3) whose columns are the body's axes, the third that of its remanence
-
-    Raises
-    ------
-    RangeError : part of the floater is where the table does not know the field, such as in a magnet
+    The `sources` are the floater's, the `table` the rotor's; `position` (n, 3) m of the centre is in the rotor's frame,
+    and the columns of `axes` (n, 3, 3) are the body's axes, the third that of its remanence. Raises RangeError: part of
+    the floater is where the table does not know the field, such as in a magnet.
     """
     force, torque = np.zeros((len(position), 3)), np.zeros((len(position), 3))
     for k, (place, turn) in enumerate(zip(position, axes, strict=True)):
@@ -211,12 +200,7 @@ def shares(floater: Floater, sources: FloaterSources, highest: int) -> Array:
     """(`highest` + 1,) of each degree of multipoles in the force of a dipole one radius off a floater.
 
     By that of its magnets' moments taken together, the mean over directions: what is left out with a degree. The part
-    of degree 1 is what the floater's dipole misses.
-
-    Parameters
-    ----------
-    floater, sources : the floater, and dipoles and charges in its place
-    highest : degree of the multipoles
+    of degree 1 is what the floater's dipole misses. `sources` are the dipoles and charges in place of the floater.
     """
     radius, degrees = floater.radius, multipole_degrees(highest + 1)
     own = np.zeros(len(degrees))
@@ -246,12 +230,8 @@ TOGETHER = 200_000  # points at which a field is looked at at once
 def slopes_of(sources: FloaterSources, field: DerivedField, position: Array, axes: Array) -> tuple[Array, Array]:
     """Force and torque about the centre (n, 6), N and N m, and their derivatives (n, 6, 6).
 
-    The latter by a change of place, m, and by a small turn about the field's axes.
-
-    Parameters
-    ----------
-    sources, field : the floater's, and the rotor's field
-    position, axes : as of `force_and_torque`
+    The latter by a change of place, m, and by a small turn about the field's axes. The `sources` are the floater's, the
+    `field` the rotor's; `position` and `axes` are as of `force_and_torque`.
     """
     count = len(sources.places) + len(sources.corners)
     pieces = np.array_split(np.arange(len(position)), max(1, len(position) * count // TOGETHER))

@@ -218,14 +218,8 @@ def fem_table(
     """Field of magnets with recoil permeability: closed form of the remanence, and expansions of what is added to it.
 
     Orders from 2 to 8 are tried until the estimated error meets the accuracy. If none does, the last table is returned
-    with an `AccuracyWarning`; its error estimate says how far it is off.
-
-    Parameters
-    ----------
-    magnets : of the rotor, m and T in its frame
-    accuracy : asked for; by default 3e-6 from 0.8 edges on
-    settings : of the mesh
-    watch : called with the progress
+    with an `AccuracyWarning`; its error estimate says how far it is off. The `magnets` are in the rotor's frame;
+    `accuracy` is by default 3e-6 from 0.8 edges on; `settings` are of the mesh; `watch` is called with the progress.
     """
     accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
     clearance = accuracy.clearance(magnets)
@@ -282,11 +276,7 @@ def fem_table(
 def moment_error(magnets: Rotor, points: Array, scale: Array) -> float:
     """What leaving out the permeability does to B by the moments alone, the largest over the points.
 
-    Parameters
-    ----------
-    magnets : of the rotor; those from STEP files are left out
-    points : (n, 3) m
-    scale : (n,) T that errors are relative to
+    At `points` (n, 3) m, by a `scale` (n,) T; those of the `magnets` that are from STEP files are left out.
     """
     missing = np.zeros((len(points), 3))
     for magnet in magnets:

@@ -33,9 +33,7 @@ OUTSIDE = 1e-5  # relative accuracy of what lies outside the ball of the element
 class NearElements:
     """Finite elements of magnets, of any order that is asked for.
 
-    Parameters
-    ----------
-    magnets : with closed forms of their `carriers` split off
+    Closed forms of the `carriers` of the `magnets` are split off.
     """
 
     def __init__(self, magnets: Sequence[Magnet]) -> None:
@@ -47,16 +45,9 @@ class NearElements:
     def reaction(self, points: Array, allowed: float, highest: int) -> tuple[Array, Array, Array, Array, int]:
         """-∇ψ, what the permeability adds to the carriers' μ0 H.
 
-        Parameters
-        ----------
-        points : (n, 3) m
-        allowed : error, T, to which two orders must agree for the last of them to be taken
-        highest : order that is not exceeded
-
-        Returns
-        -------
-        Field (n, 3) T, its slope (n, 3, 3) T/m, the estimated errors (n,) of both, and the order of the elements, 0
-        where none were needed
+        The field (n, 3) T, its slope (n, 3, 3) T/m, the estimated errors (n,) of both, and the order of the elements, 0
+        where none were needed, at `points` (n, 3) m. An order is taken that agrees with the one before to `allowed`
+        (T), or the `highest`.
         """
         field, slope = np.zeros_like(points), np.zeros((len(points), 3, 3))
         error, steep, order = np.zeros(len(points)), np.zeros(len(points)), 0
@@ -153,17 +144,10 @@ def near_field(
 ) -> NearField:
     """B, H and M anywhere but on the edges of magnets; on a face, those just outside.
 
-    Parameters
-    ----------
-    magnets : in the rotor's frame
-    points : (n, 3) m
-    rtol : error of B asked for, relative to the largest remanence; the last step of the elements' order gives it
-    highest : order of the elements that is not exceeded, even if `error` is larger then
-    elements : of these magnets, if some are solved already
-
-    Raises
-    ------
-    InputError : a point lies on an edge, where the field is infinite
+    At `points` (n, 3) m; `rtol` is the error of B asked for, relative to the largest remanence, by the last step of the
+    elements' order; an order above the `highest` is not taken even if `error` is larger then. `elements` are those of
+    these `magnets`, if some are solved already. Raises InputError: a point lies on an edge, where the field is
+    infinite.
     """
     places = np.asarray(points, float).reshape(-1, 3)
     refuse_edges(magnets, places)
@@ -221,11 +205,8 @@ class CompleteTable(RotorTable):
 
     Where the table of the outer field does not reach, `near_field` continues it, also where series of finite elements
     converge so slowly that they leave more than is asked for. The elements are solved when they are first asked for,
-    and kept.  The motion's expressions are those of the outer field.
-
-    Parameters
-    ----------
-    near_rtol : error of B asked for there, relative to the largest remanence
+    and kept. The motion's expressions are those of the outer field. Error of B asked for there is `near_rtol`, relative
+    to the largest remanence.
     """
 
     near_rtol: float = NEAR_RTOL
@@ -259,9 +240,7 @@ class CompleteTable(RotorTable):
     def evaluate(self, places: Array) -> tuple[Array, Array]:
         """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m in the rotor's frame, in magnets, too.
 
-        Raises
-        ------
-        InputError : a point lies on an edge of a magnet
+        Raises InputError: a point lies on an edge of a magnet.
         """
         if self._all_reached(places):
             refuse_edges(self.magnets, places)

@@ -93,23 +93,15 @@ class FieldTable(FieldFormula, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RotorTable:
-    """Closed forms of magnets plus multipole expansions: free of divergence and curl by construction.
+    """Closed forms of magnets plus multipole expansions: free of divergence and curl by construction."""
 
-    Parameters
-    ----------
-    model : "dipole", "cuboid", "fem", or of what else it is made: "moments" (a body's response), "map"
-    magnets : the bodies, for the range: the field is known outside them
-    uniform : those whose closed form (μr = 1) is part of the field
-    expansions : what the closed forms leave out
-    doubts : by cause ("shape", "permeability", "truncation", "discretisation"), the estimated error as a field
-    provenance : how the table was made (versions, mesh, order, seconds); texts and numbers
-    """
-
-    model: str
-    magnets: tuple[Magnet, ...]
-    uniform: tuple[Magnet, ...] = ()
-    expansions: tuple[MultipoleExpansion, ...] = ()
+    model: str  # "dipole", "cuboid", "fem", or of what else it is made: "moments" (a body's response), "map"
+    magnets: tuple[Magnet, ...]  # the bodies, for the range: the field is known outside them
+    uniform: tuple[Magnet, ...] = ()  # those whose closed form (μr = 1) is part of the field
+    expansions: tuple[MultipoleExpansion, ...] = ()  # what the closed forms leave out
+    # by cause ("shape", "permeability", "truncation", "discretisation"), the estimated error as a field
     doubts: Mapping[str, tuple[MultipoleExpansion, ...]] = field(default_factory=dict)
+    # how the table was made (versions, mesh, order, seconds); texts and numbers
     provenance: Mapping[str, str | float] = field(default_factory=dict)
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
@@ -173,9 +165,7 @@ class RotorTable:
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m in the rotor's frame.
 
-        Raises
-        ------
-        RangeError : a point lies in a magnet or where an expansion does not converge
+        Raises RangeError: a point lies in a magnet or where an expansion does not converge.
         """
         outside = self.in_range(points)
         if not outside.all():

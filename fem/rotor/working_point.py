@@ -52,10 +52,7 @@ class WorkingPoint:
 class EasyField:
     """μ0 H along the easy axis of each magnet of a rotor, with a permeable floater beside it or none.
 
-    Parameters
-    ----------
-    magnets : the rotor's
-    floater : a magnet in the rotor's frame, or None
+    The `magnets` are the rotor's; `floater` is a magnet in its frame.
     """
 
     def __init__(self, magnets: Sequence[Magnet], floater: Magnet | None = None) -> None:
@@ -74,16 +71,9 @@ class EasyField:
     def section(self, number: int, first: Array, steps: int) -> tuple[Array, Array, Array, Array]:
         """μ0 H · e on a plane through a magnet's centre.
 
-        Parameters
-        ----------
-        number : of the magnet, from 0
-        first : (3,) m, a place through which the plane goes, if it is not on the easy axis
-        steps : n, along both axes of the plane
-
-        Returns
-        -------
         (n, n) T, NaN beside the magnet; coordinates (n,) m of columns, along the easy axis, and of rows; and the rows'
-        axis (3,)
+        axis (3,). The magnet's `number` is from 0; the plane goes through `first` (3,) m, if that is not on the easy
+        axis, with n `steps` along both of its axes.
         """
         body, along = self.magnets[number].body, easy_axis(self.magnets[number])
         away = first - body.center - along * ((first - body.center) @ along)
