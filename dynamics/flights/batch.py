@@ -26,7 +26,6 @@ from ..motion.events import (
     CONTACT,
     LOST,
     Events,
-    Leg,
     clearance,
     flight_events,
     motion_legs,
@@ -57,13 +56,9 @@ class _Passenger(Course):
     def __init__(self, course: Course, left: bool = False) -> None:
         super().__init__(**vars(course))
         self.left = left  # Whether it was ever beyond the range of the plate's table
-        self._legs = self.legs
-        self.onward()
-
-    @property
-    def legs(self) -> Iterator[Leg]:
         scene = self.flight.scene if self.flight.memory else replace(self.flight.scene, plate=None)
-        return iter(motion_legs(scene, self.duration))
+        self._legs = iter(motion_legs(scene, self.duration))
+        self.onward()
 
     def onward(self) -> bool:
         """Begin the next leg; False where there is none."""
@@ -325,14 +320,9 @@ def _whole(scene: Scene, starts: State) -> State:
 
 
 def _ended(
-    scene: Scene,
-    table: FieldTable,
-    duration: float,
-    memory: PlateMemory | None,
-    currents: Array | None,
-    given: Begun,
+    scene: Scene, table: FieldTable, duration: float, memory: PlateMemory | None, currents: Array | None, given: Begun
 ) -> Endings:
-    flight, (starts, offset) = _flight(scene, table, duration, memory=memory), given
+    flight, (starts, offset) = Flight(scene, table, duration, compact=True, memory=memory, in_balls=True), given
     passengers = list[_Passenger]()
     for k in range(len(starts.position)):
         left = settled_currents(scene, memory, starts[k]) if memory and currents is None else currents
@@ -366,18 +356,13 @@ def simulate_together(
     passengers, keys = [], [startless_text(scene) for scene in scenes]
     for scene, start, key in zip(scenes, starts, keys, strict=True):
         if key not in known:
-            known[key] = _flight(scene, table, duration, shared=len(set(keys)) > 1)
+            several = len(set(keys)) > 1
+            known[key] = Flight(scene, table, duration, compact=True, in_balls=True, shared=several)
         offset = scene.start.offset if isinstance(scene.start, OffsetStart) else None
         passengers.append(_begun(known[key], start, duration, True, offset))
     _fly(passengers)
     speed = sum(f.seconds for f in passengers) / (perf_counter() - began)
     return [f.trajectory(speed) if f.recorder else None for f in passengers]
-
-
-def _flight(
-    scene: Scene, table: FieldTable, duration: float, shared: bool = False, memory: PlateMemory | None = None
-) -> Flight:
-    return Flight(scene, table, duration, compact=True, memory=memory, in_balls=True, shared=shared)
 
 
 def _begun(
@@ -457,9 +442,7 @@ def launched(
         passengers.append(_Launch(course, bool(outside[k])))
     free = clearance(scene, np.zeros(count), starts.position, starts.orientation) > 0
     if free.any():
-        SimdBatch(equations, events, step_error, False).fly(
-            [f for f, there in zip(passengers, free, strict=True) if there]
-        )
+        SimdBatch(equations, events, step_error, False).fly([passengers[k] for k in np.flatnonzero(free)])
     return _endings(passengers)
 
 

@@ -42,16 +42,7 @@ from ..motion.events import (
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory, plate_numbers
 from ..motion.state import DRIVEN, STEADY, Given, Parameter, Scales, State
 from .balls import DEGREE, Balls, in_ball, is_long
-from .trajectory import (
-    DURATION,
-    STOPPED,
-    Checkpoint,
-    FieldChanges,
-    FlightStopped,
-    Recorder,
-    Trajectory,
-    crossing,
-)
+from .trajectory import DURATION, STOPPED, Checkpoint, FieldChanges, FlightStopped, Recorder, Trajectory, crossing
 
 LEFT = "left"
 INSIDE = 1 - 1e-9  # Square of the distance from a ball's centre, in radii, from which on the floater has left it

@@ -15,27 +15,10 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...fem.harmonics import interior
 from ...fem.harmonics.expressions import regular_harmonics
-from ...fem.harmonics.interior import (
-    Ball,
-    BallField,
-    field_coefficients,
-    harmonics,
-    matrices,
-    odd_harmonics,
-    shells,
-    shifted,
-    sizes,
-    turns,
-)
-from ...fem.rotor.floater import (
-    FloaterSources,
-    floater_sources,
-    polarizability_tensor,
-    shares,
-    slopes_of,
-    strength,
-)
+from ...fem.harmonics.interior import Ball, BallField
+from ...fem.rotor.floater import FloaterSources, floater_sources, polarizability_tensor, shares, slopes_of, strength
 from ...fem.rotor.table import DerivedField, FieldFormula, RangeError
 from ...geometry.common import Array, even_directions
 from ...geometry.scene.floater import Floater
@@ -93,11 +76,9 @@ class BodyShape:
         return cls(field, floater, tuple(magnets), sources)
 
     def placed(self, first: int) -> "BodyShape":
-        """See `Placeable`."""
         return self._changed(first=first)
 
     def in_ball(self, ball: BallField, first: int) -> "BodyShape":
-        """See `Fittable`."""
         return self._changed(ball=ball, first=first)
 
     def _changed(self, **changes: Any) -> "BodyShape":
@@ -120,7 +101,7 @@ class BodyShape:
     def _known(self) -> NDArray[np.bool_]:
         """(k, (way + 1)²) which of its numbers in a ball are not zero: in a mirrored field half of them are."""
         assert self.ball is not None
-        alike = odd_harmonics(HIGHEST)[self.kept, None] == odd_harmonics(self._way)
+        alike = interior.odd_harmonics(HIGHEST)[self.kept, None] == interior.odd_harmonics(self._way)
         return np.asarray(alike | (not self.ball.mirrored))
 
     # The multipoles
@@ -146,7 +127,7 @@ class BodyShape:
     @cached_property
     def kept(self) -> NDArray[np.intp]:
         """(k,) numbers of the multipoles that are states in trajectories: of degree 2 at least."""
-        degrees = shells(HIGHEST)
+        degrees = interior.shells(HIGHEST)
         return np.flatnonzero((self.shares[degrees] > KEPT) & (degrees > 1))
 
     @cached_property
@@ -155,16 +136,16 @@ class BodyShape:
 
         On pairs of opposite places, so that they have none of even degrees, of all degrees, where the body has none.
         """
-        degree = int(shells(HIGHEST)[self.kept].max(initial=1))
-        degrees = shells(degree)
+        degree = int(interior.shells(HIGHEST)[self.kept].max(initial=1))
+        degrees = interior.shells(degree)
         # three components of each pair have to make the multipoles of odd degrees, or those of even ones
         pairs = max(int(np.sum((degrees % 2 == odd) & (degrees > 0))) for odd in (0, 1)) // 3 + 1
         half = STAND * even_directions(2 * pairs)[:pairs]  # in a half space, so that none is opposite to another
         places = np.concatenate([half, -half])
-        columns = np.moveaxis(harmonics(degree, places)[1], 1, 0).reshape(len(degrees), -1)
-        wanted = np.zeros(len(shells(HIGHEST)))
+        columns = np.moveaxis(interior.harmonics(degree, places)[1], 1, 0).reshape(len(degrees), -1)
+        wanted = np.zeros(len(interior.shells(HIGHEST)))
         wanted[self.kept] = self.moments[self.kept]
-        unit = sizes(degree)[:, None]
+        unit = interior.sizes(degree)[:, None]
         solved = np.linalg.lstsq(columns / unit, wanted[: len(degrees)] / unit[:, 0], rcond=1e-12)[0]
         moments = np.asarray(self.floater.radius * solved.reshape(-1, 3), float)
         return FloaterSources(self.floater.radius * places, moments, np.zeros((0, 3)), np.zeros(0))
@@ -172,7 +153,7 @@ class BodyShape:
     @property
     def truncation(self) -> float:
         """What simulations leave out of the force one radius off the body, by that of the moment."""
-        left = self.shares.sum() - self.shares[1] - self.shares[np.unique(shells(HIGHEST)[self.kept])].sum()
+        left = self.shares.sum() - self.shares[1] - self.shares[np.unique(interior.shells(HIGHEST)[self.kept])].sum()
         ratio = self.shares[-1] / max(self.shares[-3], 1e-300) if self.shares[-3] else 0.0
         return float(left + self.shares[-1] * min(ratio, 1.0) ** 0.5)
 
@@ -182,11 +163,10 @@ class BodyShape:
         return strength(self.floater) / self.floater.radius / LITTLE
 
     def states_at(self, state: State) -> Array:
-        """See `Stateful`."""
         axes = state.axes
         assert axes is not None
         turned = self.sources.turned(axes).multipoles(HIGHEST, self.floater.radius)
-        return np.asarray((turned / sizes(HIGHEST))[self.kept] / self._unit)
+        return np.asarray((turned / interior.sizes(HIGHEST))[self.kept] / self._unit)
 
     # Force and torque
 
@@ -197,7 +177,7 @@ class BodyShape:
         if not len(self.kept):  # it is all of it
             return dipole
         states = [hy.expression(f"multipole_{k}") for k in range(len(self.kept))]
-        own = turns(HIGHEST)[:, self.kept[:, None], self.kept]
+        own = interior.turns(HIGHEST)[:, self.kept[:, None], self.kept]
         turned = [[_combined(row, states) for row in matrix] for matrix in own]  # (3, k) by a unit turn
         rates = [dot(motion.lag, [part[k] for part in turned]) for k in range(len(states))]
         shape = self._by_dipoles(motion) if self.ball is None else self._in_ball(motion, states, turned)
@@ -241,7 +221,7 @@ class BodyShape:
         unit = self._unit * share * share
         sums = [dotted(column, states) for column in zip(*numbers, strict=True)]
         field = [dotted(row, place) for row in numbers]
-        slopes = matrices(self._way)[0]
+        slopes = interior.matrices(self._way)[0]
         reach, inverse = -unit * length, hy.par[self.ball.first + 3]
         force = [inverse * (reach * dotted([_combined(column, sums) for column in slope.T], place)) for slope in slopes]
         return Added(
@@ -284,7 +264,6 @@ class BodyShape:
         return Added(values[:3], values[3:])
 
     def numbers(self, field: DerivedField, poses: Poses) -> Array:
-        """See `Placeable`."""
         length, inertia, share = (poses.values[:, [p]] for p in WHICH)
         if poses.quaternion is None:
             axes, turn = np.array([self.floater.axes(m) for m in poses.moment]), np.pad(poses.moment, ((0, 0), (0, 1)))
@@ -309,10 +288,10 @@ class BodyShape:
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:
         """See `Fittable`; what the place in the ball does beyond `_way` is its error."""
         apart = min((float(body.distance(ball.center)) for body in self.magnets), default=np.inf)
-        degree = int(shells(HIGHEST)[self.kept].max(initial=1)) + self._way + 1
+        degree = int(interior.shells(HIGHEST)[self.kept].max(initial=1)) + self._way + 1
         for share in REACHES:
             try:
-                there = field_coefficients(
+                there = interior.field_coefficients(
                     lambda points: self.field.evaluate(points)[0],  # type: ignore[attr-defined]
                     ball.center, max(share * min(apart, 10 * self.floater.radius), ball.radius), degree,
                     self.floater.radius,
@@ -322,9 +301,9 @@ class BodyShape:
                 continue
         else:
             raise RangeError("Input ball must lie where the field of the rotor is known; instead it does not.")
-        unit = sizes(HIGHEST)[self.kept, None]
-        moved = unit * shifted(there, degree, self._way + 1)[self.kept]
-        way = shells(self._way + 1)
+        unit = interior.sizes(HIGHEST)[self.kept, None]
+        moved = unit * interior.shifted(there, degree, self._way + 1)[self.kept]
+        way = interior.shells(self._way + 1)
         moved = moved * (ball.radius / self.floater.radius) ** way
         found, known = moved[:, way <= self._way], self._known
         left_out = np.concatenate([moved[:, way == self._way + 1], found * ~known], axis=1)
@@ -378,7 +357,6 @@ class InducedShape:
 
     @property
     def compiled_in(self) -> tuple[float, ...]:
-        """Numbers in the code of the equations, see `Rates.elsewhere`."""
         return tuple(self.tensor.ravel().tolist())
 
     def added(self, motion: Motion) -> Added:

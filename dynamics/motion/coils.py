@@ -49,13 +49,11 @@ class BesideCoils:
         return str(self.table.model)
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        """See `FieldTable`."""
         parts = [self.table.expressions(position), self._filaments.expressions(position, self._currents.tolist())]
         (one, steep), (other, steeper) = parts
         return add(one, other), [add(*rows) for rows in zip(steep, steeper, strict=True)]
 
     def derivatives(self, points: Array, order: int) -> Array:
-        """See `RotorTable.derivatives`."""
         found = (self.table if hasattr(self.table, "derivatives") else self._compiled).derivatives(points, order)
         return np.asarray(found + self._filaments.derivatives(points, order, self._currents))
 
@@ -69,7 +67,6 @@ class BesideCoils:
 
     @keeps_shape
     def evaluate(self, points: Array) -> tuple[Array, Array]:
-        """See `FieldTable`."""
         field, gradient = self.table.evaluate(points)
         more, steeper = tensors(self._filaments.derivatives(points, 2, self._currents))
         return field + more, gradient + steeper
@@ -80,7 +77,6 @@ class BesideCoils:
         return errors_of_sum(self.table.relative_error(points), self.table.evaluate(points), self.evaluate(points))
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """See `FieldTable`."""
         return np.asarray(self.table.in_range(points))
 
 
@@ -105,7 +101,6 @@ class CoilForce:
 
     @classmethod
     def of(cls, scene: Scene) -> "CoilForce | None":
-        """See `OF_SCENE`."""
         coils = scene.other_coils
         return cls(coils, scene.floater.inner_radius) if coils else None
 

@@ -14,14 +14,7 @@ from ...geometry.scene.contents import Scene
 from .body_shape import INDUCED_SHAPE, BodyShape, InducedShape
 from .coils import with_coils
 from .effect import Interaction
-from .floater_effects import (
-    FLOATER_CURRENTS,
-    FLOATER_SHAPE,
-    REAL_AIR,
-    FloaterShape,
-    check_floater_metal,
-    scene_effects,
-)
+from .floater_effects import FLOATER_CURRENTS, FLOATER_SHAPE, REAL_AIR, FloaterShape, check_floater_metal, scene_effects
 from .rotor_effects import MUTUAL, ROTOR_CURRENTS, STEP, Mutual, RotorCurrents, rough_force
 
 NOTHING_PERMEABLE = "neither rotor nor floater is permeable"

@@ -286,7 +286,11 @@ def balances(equations: Equations, still: bool = False) -> tuple[list[hy.express
     position, tangents, spin = given[:3], (given[6:9], given[9:12]), given[12]
     moment = [given[3 + i] + tilts[0] * tangents[0][i] + tilts[1] * tangents[1][i] for i in range(3)]
     spin = spin * moment[2] if still else spin
-    rates = hy.subs(list(equations.rates[:12]), dict(zip(NAMES, _state(position, moment, spin), strict=True)))
+    rate = hy.par[Parameter.RATE]
+    along = rate * (spin - moment[2])
+    turning = [along * moment[0], along * moment[1], along * moment[2] + rate]
+    state = [*position, -rate * position[1], rate * position[0], hy.expression(0.0), *moment, *turning]
+    rates = hy.subs(list(equations.rates[:12]), dict(zip(NAMES, state, strict=True)))
     force, torque = rates[3:6], rates[9:12]
     values = [*force, *(dot(tangent, torque) for tangent in tangents)]
     free = [*position, *tilts]
@@ -295,13 +299,6 @@ def balances(equations: Equations, still: bool = False) -> tuple[list[hy.express
         slopes[k, k] = slopes[k, k] - dot(moment, torque)  # the tangents turn with the moment
     untilted = {name: hy.expression(0.0) for name in TILTS}
     return hy.subs([*values, *slopes.ravel()], untilted), given
-
-
-def _state(position: Vector, moment: Vector, spin: hy.expression) -> list[hy.expression]:
-    rate = hy.par[Parameter.RATE]
-    along = rate * (spin - moment[2])
-    velocity = [-rate * position[1], rate * position[0], hy.expression(0.0)]
-    return [*position, *velocity, *moment, along * moment[0], along * moment[1], along * moment[2] + rate]
 
 
 def still_balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
@@ -326,10 +323,8 @@ def locked_balances(equations: Equations) -> tuple[list[hy.expression], list[hy.
     rate = hy.par[Parameter.RATE]
     spin = [rate * part for part in rotation_of(quaternion)[2]]
     velocity = [-rate * position[1], rate * position[0], hy.expression(0.0)]
-    names = (*CENTRE, *TURNING_NAMES)
-    rates = hy.subs(
-        list(equations.rates[:13]), dict(zip(names, [*position, *velocity, *quaternion, *spin], strict=True))
-    )
+    state = dict(zip((*CENTRE, *TURNING_NAMES), [*position, *velocity, *quaternion, *spin], strict=True))
+    rates = hy.subs(list(equations.rates[:13]), state)
     values = [*rates[3:6], *rates[10:13]]
     slopes = hy.diff_tensors(values, diff_args=[*position, *turns], diff_order=1).jacobian
     unturned = {name: hy.expression(0.0) for name in TURNS}

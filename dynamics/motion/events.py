@@ -87,7 +87,8 @@ def clearance(scene: Scene, time: Array, position: Array, orientation: Array | N
     found = np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
     if not scene.floater.is_sphere and orientation is not None:
         for k in np.flatnonzero(found < 0):
-            found[k] = _own_gap(scene, float(time[k]), position[k], orientation[k])
+            pairs = _pairs(scene, float(time[k]), position[k], orientation[k])
+            found[k] = min(-body_overlap(*pair) for pair in pairs)
     return found
 
 
@@ -110,11 +111,6 @@ def first_contact(scene: Scene, time: Array, position: Array, orientation: Array
     return None
 
 
-def _own_gap(scene: Scene, time: float, position: Array, orientation: Array) -> float:
-    """Gap of a floater that is no sphere in one place, m."""
-    return min(-body_overlap(*pair) for pair in _pairs(scene, time, position, orientation))
-
-
 def _pairs(scene: Scene, time: float, position: Array, orientation: Array) -> list[tuple[Solid, Solid]]:
     """Each body of a scene with each part of its floater in one place, always in one order."""
     parts = scene.floater.placed(position, orientation)
@@ -135,9 +131,8 @@ def rotor_gap(scene: Scene, position: Array, orientation: Array | None = None) -
     sphere, whose `orientation` it needs.
     """
     pointing = None if orientation is None else orientation[None]
-    return float(
-        clearance(replace(scene, plate=None, coils=scene.axial_coils), np.zeros(1), position[None], pointing)[0]
-    )
+    alone = replace(scene, plate=None, coils=scene.axial_coils)
+    return float(clearance(alone, np.zeros(1), position[None], pointing)[0])
 
 
 def plate_depth(plate: Plate | None, time: Array) -> Array:

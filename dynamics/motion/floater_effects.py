@@ -115,7 +115,6 @@ class RealAir:
 
     @classmethod
     def of(cls, scene: Scene) -> "RealAir | None":
-        """See `OF_SCENE`."""
         floater = scene.floater
         if not scene.drag.air or floater.is_sphere:
             return cls() if scene.drag.air else None
@@ -125,7 +124,6 @@ class RealAir:
 
     @property
     def compiled_in(self) -> tuple[float, ...]:
-        """Numbers in the code of the equations, see `Rates.elsewhere`."""
         return self.size, self.sphericity or 1.0, self.spin_ratio
 
     def added(self, motion: Motion) -> Added:
@@ -204,16 +202,13 @@ class FloaterShape:
 
     @property
     def compiled_in(self) -> tuple[float, ...]:
-        """Numbers in the code of the equations, see `Rates.elsewhere`."""
         return (*self.heights.tolist(), *self.dipoles.tolist())
 
     def placed(self, first: int) -> "FloaterShape":
-        """See `Placeable`."""
         numbers = range(len(self.heights) - 1)
         return replace(self, fields=tuple(LocalField(first + k * LocalField.count) for k in numbers))
 
     def numbers(self, field: DerivedField, poses: Poses) -> Array:
-        """See `Placeable`."""
         found = []
         for height in self.heights[1:]:
             places = poses.places + height * poses.moment
@@ -366,7 +361,6 @@ class FloaterCurrents:
 
     @classmethod
     def of(cls, scene: Scene) -> "FloaterCurrents | None":
-        """See `OF_SCENE`."""
         if not scene.floater.conductivity:
             return None
         if scene.floater.is_sphere:
@@ -383,7 +377,6 @@ class FloaterCurrents:
 
     @property
     def compiled_in(self) -> Numbers:
-        """Numbers in the code of the equations, see `Rates.elsewhere`."""
         tensors = (number for tensor in self.tensors for number in tensor)
         return (*self.delays, *tensors, *self.gradient, self.gradient_delay, *self.coupling, self.coupling_delay)
 
@@ -400,11 +393,11 @@ class FloaterCurrents:
         sheared = _turned_gradient(lag, gradient, self.gradient_delay)
         bent = [[dot(bend[i][j], drift) for j in range(3)] for i in range(3)]
         changed = [[bent[i][j] - sheared[i][j] for j in range(3)] for i in range(3)]
-        share, coupled = GRADIENT, None
+        share, coupled = GRADIENT, None  # changes of field (3) and gradient (3, 3) with the delay of what joins them
         if self.coupling:
             change = _changed_field(lag, motion.field, moving, self.coupling_delay)
             sheared = _turned_gradient(lag, gradient, self.coupling_delay * DIPOLE / QUADRUPOLE)
-            coupled = _Coupled(change, [[bent[i][j] - sheared[i][j] for j in range(3)] for i in range(3)])
+            coupled = change, [[bent[i][j] - sheared[i][j] for j in range(3)] for i in range(3)]
         if self.gradient:
             share = 1.0
             dipole, changed = self._of_shape(dipole, changed, coupled, motion)
@@ -432,7 +425,7 @@ class FloaterCurrents:
         return [w + less * m for w, m in zip(motion.lag, motion.moment, strict=True)]
 
     def _of_shape(
-        self, dipole: Vector, changes: Matrix, coupled: "_Coupled | None", motion: Motion
+        self, dipole: Vector, changes: Matrix, coupled: tuple[Vector, Matrix] | None, motion: Motion
     ) -> tuple[list[hy.expression], Matrix]:
         """The dipole with what the gradient's change adds, and the quadrupole (3, 3), of the `changes`."""
         loss, mixed = np.reshape(self.gradient, (5, 5)), np.reshape(self.coupling or np.zeros(15), (3, 5))
@@ -448,10 +441,10 @@ class FloaterCurrents:
         parts = along_axes(changes)
         answers = [hy.sum([float(row[k]) * parts[k] for k in range(5)]) for row in loss]
         if coupled:
-            parts = along_axes(coupled.gradient)
+            parts = along_axes(coupled[1])
             more = [hy.sum([float(row[k]) * parts[k] for k in range(5)]) for row in mixed]
             dipole = add(dipole, [dot(row, more) for row in axes])
-            seen = [dot(column, coupled.field) for column in columns]
+            seen = [dot(column, coupled[0]) for column in columns]
             answers = add(answers, [hy.sum([float(row[k]) * seen[k] for k in range(3)]) for row in mixed.T])
         whole = [[hy.sum([float(g[i, j]) * a for g, a in zip(GRADIENTS, answers, strict=True) if g[i, j]])
                   for j in range(3)] for i in range(3)]  # fmt: skip
@@ -459,16 +452,8 @@ class FloaterCurrents:
         return list(dipole), [[dot(halves[j], axes[i]) for j in range(3)] for i in range(3)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Coupled:
-    """Changes of field (3) and gradient (3, 3) with the delay of what joins them."""
-
-    field: Vector
-    gradient: Matrix
-
-
 def _of_round(
-    loss: Array, mixed: Array, dipole: Vector, changes: Matrix, coupled: _Coupled | None, moment: Vector
+    loss: Array, mixed: Array, dipole: Vector, changes: Matrix, coupled: tuple[Vector, Matrix] | None, moment: Vector
 ) -> tuple[list[hy.expression], Matrix]:
     """See `FloaterCurrents._of_shape`, of a body that is round about its moment m̂ with `loss` and coupling `mixed`.
 
@@ -479,12 +464,12 @@ def _of_round(
     lengthwise, sideways = 1.5 * (straight - rest) * along, [(tilted - rest) * a for a in across]
     if coupled:
         one, two = float(mixed[2, 1]), float(mixed[0, 3])
-        along, across = _pointed(coupled.gradient, moment)
+        along, across = _pointed(coupled[1], moment)
         dipole = [d + 1.5**0.5 * one * along * m + 2**0.5 * two * a
                   for d, m, a in zip(dipole, moment, across, strict=True)]  # fmt: skip
-        seen = dot(coupled.field, moment)
+        seen = dot(coupled[0], moment)
         lengthwise = lengthwise + 1.5**0.5 * one * seen
-        sideways = add(sideways, [0.5**0.5 * two * (c - seen * m) for c, m in zip(coupled.field, moment, strict=True)])
+        sideways = add(sideways, [0.5**0.5 * two * (c - seen * m) for c, m in zip(coupled[0], moment, strict=True)])
     whole = [[rest * changes[i][j] + lengthwise * moment[i] * moment[j] + sideways[i] * moment[j]
               + moment[i] * sideways[j] - (lengthwise / 3.0 if i == j else 0.0) for j in range(3)]
              for i in range(3)]  # fmt: skip

@@ -52,6 +52,7 @@ class Rates:
         self._equations = equations_of_motion(Interaction(self._local, tuple(effects), whole.turning))
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._level = 1 if optimised else 0
+        self._known: dict[str, Any] = {}  # machine code by what is written from the equations, shared by copies
 
     def elsewhere(self, table: FieldFormula) -> "Rates":
         """The rates in another table, by the same code where its effects differ by runtime parameters alone."""
@@ -71,13 +72,15 @@ class Rates:
 
     def compile(self) -> None:
         """Compile now what is else compiled when it is first called."""
-        _ = self._function, self._locked if self.turning else self._balances
+        _ = self._code(_with_jacobian), self._code(locked_balances if self.turning else balances)
 
-    def _compiled(self, write: Callable[[Equations], tuple[list[hy.expression], list[hy.expression]]]) -> Any:
-        """Outputs and variables that are written from the equations, compiled."""
-        source = write.__name__, self._equations.variables, self._equations.rates
-        options = {"compact_mode": True, "opt_level": self._level}
-        return compiled_later(hy.cfunc, lambda: write(self._equations), source, **options)
+    def _code(self, write: Callable[[Equations], tuple[list[hy.expression], list[hy.expression]]]) -> Any:
+        """Outputs and variables that are written from the equations, compiled when they are first asked for."""
+        if write.__name__ not in self._known:
+            source = write.__name__, self._equations.variables, self._equations.rates
+            options = {"compact_mode": True, "opt_level": self._level}
+            self._known[write.__name__] = compiled_later(hy.cfunc, lambda: write(self._equations), source, **options)
+        return self._known[write.__name__]
 
     def __call__(self, states: ArrayLike, values: Array) -> tuple[Array, Array]:
         """Rates (n, 12) and their derivatives (n, 12, 12) at scaled `states` (n, 12); 13 for 12 of a turning body.
@@ -86,13 +89,14 @@ class Rates:
         """
         states = np.asarray(states, float)
         size = states.shape[1]
-        found = _called(self._function, states.T, self._about(states[:, :3], states[:, 6 : size - 3], values)).T
+        about = self._about(states[:, :3], states[:, 6 : size - 3], values)
+        found = _called(self._code(_with_jacobian), states.T, about).T
         return found[:, :size], found[:, size:].reshape(-1, size, size)
 
     def jacobi(self, states: Array, values: Array) -> Array:
         """Jacobi integral (n,) at scaled `states` (n, 12) of a round body, in the unit of energy of `values`."""
         given = self._about(states[:, :3], states[:, 6:9], values)
-        return np.asarray(_called(self._energies, states.T, given)[0])
+        return np.asarray(_called(self._code(_jacobi_integral), states.T, given)[0])
 
     def locked_balance(self, position: Array, quaternion: Array, values: Array) -> tuple[Array, Array]:
         """What has to vanish of a turning body at rest in the rotor's frame (n, 6), and its derivatives (n, 6, 6).
@@ -100,7 +104,7 @@ class Rates:
         At scaled positions (n, 3) and unit quaternions (n, 4); see `locked_balances`, and `values` as above.
         """
         given = np.concatenate([position, quaternion], axis=1).T
-        found = _called(self._locked, given, self._about(position, quaternion, values))
+        found = _called(self._code(locked_balances), given, self._about(position, quaternion, values))
         return found[:6].T, found[6:].T.reshape(-1, 6, 6)
 
     def balance(
@@ -118,7 +122,7 @@ class Rates:
         given = np.empty((13, len(position)))
         given[:3], given[3:6], given[12] = position.T, moment.T, spin
         given[6:12] = tangents.reshape(-1, 6).T
-        function = self._still if still else self._balances
+        function = self._code(still_balances if still else balances)
         found = _called(function, given, self._about(position, moment, values, times))
         return found[:5].T, found[5:].T.reshape(-1, 5, 5)
 
@@ -136,7 +140,6 @@ class Rates:
 
         Of mutual magnetisation the moment that the rotor's field induces in the floater stays.
         """
-        self.compile()  # both share it
         found = copy(self)
         found._rough, found._field, found._last = True, self._rough_field, NOWHERE
         return found
@@ -170,26 +173,6 @@ class Rates:
             poses = Poses(position, moment, slopes[:, :3], rows, quaternion)
             parts += [part.numbers(field, poses) for part in self._placed]
         return np.ascontiguousarray(np.concatenate([part.T for part in parts]))
-
-    @cached_property
-    def _function(self) -> Any:
-        return self._compiled(_with_jacobian)
-
-    @cached_property
-    def _energies(self) -> Any:
-        return self._compiled(_jacobi_integral)
-
-    @cached_property
-    def _balances(self) -> Any:
-        return self._compiled(balances)
-
-    @cached_property
-    def _still(self) -> Any:
-        return self._compiled(still_balances)
-
-    @cached_property
-    def _locked(self) -> Any:
-        return self._compiled(locked_balances)
 
 
 def _derived(table: Interaction) -> Any:

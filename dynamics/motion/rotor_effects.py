@@ -177,7 +177,6 @@ class Mutual(_Near):
         return self.table.energy(place, [strength * m for m in moment], [share * b for b in field], share)
 
     def numbers(self, field: DerivedField, poses: Poses) -> Array:
-        """See `Placeable`."""
         length, strength, share = poses.values[:, WHICH].T[:, :, None]
         whole = strength * poses.moment + self.table.polarizability * share * poses.flux
         energy, slope, second = self.table.derivatives(poses.places, whole / share)
@@ -314,7 +313,6 @@ class RotorCurrents(_Near):
         return [dotted([known[min(a, b), max(a, b)] for b in range(NUMBERS)], rates) for a in range(NUMBERS)]
 
     def numbers(self, field: DerivedField, poses: Poses) -> Array:
-        """See `Placeable`."""
         return self.table.products(poses.places).T
 
     def fit(self, ball: Ball, gradient: Array) -> tuple[Array, float]:

@@ -178,12 +178,6 @@ MOST = 64  # segments of a mantle; at a quarter of its radius they still do to 1
 DIGITS = np.log(1e11)
 
 
-def _count(body: Cylinder, radius: float) -> int:
-    """Number of segments of a mantle."""
-    wanted = RESOLVED * body.volume ** (1 / 3)
-    return min(int(np.ceil(DIGITS / np.log1p(wanted / radius))), MOST)
-
-
 def segments_field(
     position: Sequence[Expression], body: Cylinder, polarization: Array
 ) -> tuple[list[Expression], list[list[Expression]]]:
@@ -244,9 +238,9 @@ def _outside_kernel(order: int) -> Any:
 
 def _segments(body: Cylinder, polarization: Array) -> Array:
     """Length, radius, cos and sin of the angle, charge and current (n, 6) of segments; J R dφ/4π is their strength."""
-    found = []
+    found, wanted = [], RESOLVED * body.volume ** (1 / 3)
     for radius, share in mantles(body):
-        count = _count(body, radius)
+        count = min(int(np.ceil(DIGITS / np.log1p(wanted / radius))), MOST)
         angle = 2 * np.pi * (np.arange(count) + 0.5) / count
         x, y, z = share * radius / (2 * count) * np.asarray(polarization)
         cos, sin = np.cos(angle), np.sin(angle)

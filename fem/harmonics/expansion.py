@@ -14,28 +14,10 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part as SolidPart, Solid
+from . import solid
 from .expressions import FieldExpressions, harmonic_sums, whole_gradient
 from .interior import Ball, moment
-from .solid import (
-    FOUR_PI,
-    STEP,
-    Coefficients,
-    Entry,
-    OuterSums,
-    derivative,
-    entries,
-    field_sizes,
-    field_spectrum,
-    gauss_legendre,
-    irregular_gradient,
-    irregular_values,
-    members,
-    real_terms,
-    regular_derivative,
-    rotated_harmonics,
-    tensors,
-    weighted_sums,
-)
+from .solid import FOUR_PI, Coefficients
 
 
 def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
@@ -59,7 +41,7 @@ def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
 
 def gauss(first: float, last: float, count: int) -> tuple[Array, Array]:
     """Places and weights (`count`,) of Gauss's rule from `first` to `last`."""
-    t, weights = gauss_legendre(count)
+    t, weights = solid.gauss_legendre(count)
     return (first + last) / 2 + (last - first) / 2 * t, (last - first) / 2 * weights
 
 
@@ -127,7 +109,7 @@ class MultipoleExpansion:
     @cached_property
     def own_coefficients(self) -> Coefficients:
         """c_lm (T) along its own axes."""
-        turned = rotated_harmonics(self.coefficients, self.axes.T)
+        turned = solid.rotated_harmonics(self.coefficients, self.axes.T)
         return turned if turned is self.coefficients else without_noise(turned, TURNED)
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
@@ -138,7 +120,7 @@ class MultipoleExpansion:
             return turned_field(self.axes, own.expressions(turned_expressions(self.axes.T, place)))
         scaled = [component * (1.0 / self.radius) for component in place]
         parts = _slopes(self.coefficients, self.radius, 2)
-        sums = harmonic_sums(scaled, [real_terms(part) for part in parts])
+        sums = harmonic_sums(scaled, [solid.real_terms(part) for part in parts])
         return sums[:3], whole_gradient(sums[3:])
 
     def derivatives(self, points: Array, order: int) -> Array:
@@ -150,7 +132,7 @@ class MultipoleExpansion:
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m."""
-        field, gradient = tensors(self.derivatives(points, 2))
+        field, gradient = solid.tensors(self.derivatives(points, 2))
         return field, gradient
 
     def root_mean_square(self, points: Array) -> tuple[Array, Array]:
@@ -160,7 +142,7 @@ class MultipoleExpansion:
         """
         degree = np.arange(self.degree + 1)
         distance = np.linalg.norm(points - self.center, axis=1)[:, None]
-        parts = field_spectrum(self.coefficients) * (self.radius / distance) ** (degree + 2)
+        parts = solid.field_spectrum(self.coefficients) * (self.radius / distance) ** (degree + 2)
         slopes = parts * np.sqrt((degree + 2) * (2 * degree + 3)) / distance
         return np.linalg.norm(parts, axis=1), np.linalg.norm(slopes, axis=1)
 
@@ -177,9 +159,9 @@ def summed_derivatives(expansions: Sequence[MultipoleExpansion], points: Array, 
 @lru_cache(maxsize=128)  # a table and each of its magnets are asked for by thousands of calls, of one point often
 def _joined(
     expansions: tuple[MultipoleExpansion, ...], order: int
-) -> list[tuple[OuterSums, Array, Array, NDArray[np.intp]]]:
+) -> list[tuple[solid.OuterSums, Array, Array, NDArray[np.intp]]]:
     """The sums of expansions of so many steps of degrees together, their centres (k, 3) m, radii (k,) m and numbers."""
-    steps = np.array([-(-(one.degree + order) // STEP) for one in expansions])
+    steps = np.array([-(-(one.degree + order) // solid.STEP) for one in expansions])
     found = []
     for count in np.unique(steps):
         numbers = np.flatnonzero(steps == count)
@@ -190,16 +172,16 @@ def _joined(
             coefficients[: one.degree + 1, : one.degree + 1] = one.coefficients
         centers, radii = np.array([one.center for one in some]), np.array([one.radius for one in some])
         slopes = _slopes(whole, radii[:, None, None], order)
-        found.append((OuterSums.of(np.stack(slopes, axis=1)), centers, radii, numbers))
+        found.append((solid.OuterSums.of(np.stack(slopes, axis=1)), centers, radii, numbers))
     return found
 
 
 def _slopes(coefficients: Coefficients, radius: Array | float, order: int) -> list[Coefficients]:
     """Of c_lm (T) [..., l, m] and radii m, the coefficients of what `derivatives` gives, up to `order` degrees more."""
-    found: dict[Entry, Coefficients] = {(i,): -derivative(coefficients, i) for i in range(3)}
+    found: dict[solid.Entry, Coefficients] = {(i,): -solid.derivative(coefficients, i) for i in range(3)}
     for degree in range(2, order + 1):
-        for each in entries(degree):
-            found[each] = derivative(found[each[:-1]], each[-1]) / radius
+        for each in solid.entries(degree):
+            found[each] = solid.derivative(found[each[:-1]], each[-1]) / radius
     size = coefficients.shape[-1] + order
     nothing = [(0, 0)] * (coefficients.ndim - 2)
     return [np.pad(part, [*nothing, *[(0, size - part.shape[-1])] * 2]) for part in found.values()]
@@ -227,8 +209,8 @@ def moments_of_magnetization(
     and `radius`, m, up to a `degree`.
     """
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
-    potentials = weighted_sums(degree, (points - center) / radius, weighted)
-    return np.asarray(sum(np.conj(regular_derivative(p, axis)) for axis, p in enumerate(potentials)))
+    potentials = solid.weighted_sums(degree, (points - center) / radius, weighted)
+    return np.asarray(sum(np.conj(solid.regular_derivative(p, axis)) for axis, p in enumerate(potentials)))
 
 
 def curvature_moments(
@@ -239,8 +221,8 @@ def curvature_moments(
     At `points` (n, 3) m with `weights` w (n,) T m⁴ and the symmetric `matrix` A (3, 3), about the sphere of a `center`
     and `radius`, m, up to a `degree`.
     """
-    (sums,) = weighted_sums(degree, (points - center) / radius, weights[:, None] / (FOUR_PI * radius**4))
-    second = [[regular_derivative(regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
+    (sums,) = solid.weighted_sums(degree, (points - center) / radius, weights[:, None] / (FOUR_PI * radius**4))
+    second = [[solid.regular_derivative(solid.regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
     return np.asarray(sum(np.conj(matrix[i, j] * second[i][j]) for i in range(3) for j in range(3)))
 
 
@@ -254,8 +236,8 @@ def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:
     degree = min(degree, 1) if isinstance(body, Sphere) else degree
     center, radius = body.center, body.circumradius
     points, volume = polynomial_rule(body, degree)
-    (sums,) = weighted_sums(degree, (points - center) / radius, volume[:, None] / (FOUR_PI * radius**3))
-    parts = [along * regular_derivative(sums, axis) for axis, along in enumerate(magnet.polarization_in_rotor)]
+    (sums,) = solid.weighted_sums(degree, (points - center) / radius, volume[:, None] / (FOUR_PI * radius**3))
+    parts = [along * solid.regular_derivative(sums, axis) for axis, along in enumerate(magnet.polarization_in_rotor)]
     return MultipoleExpansion(center, radius, without_noise(np.conj(np.sum(parts, axis=0)), 1e-15))
 
 
@@ -264,7 +246,7 @@ def without_noise(coefficients: Coefficients, level: float) -> Coefficients:
 
     What symmetry forbids comes out as round-off; left out, it costs nothing to evaluate.
     """
-    field = np.abs(coefficients) * field_sizes(len(coefficients) - 1)
+    field = np.abs(coefficients) * solid.field_sizes(len(coefficients) - 1)
     return np.where(field > level * field.max(initial=0.0), coefficients, 0.0)
 
 
@@ -370,10 +352,10 @@ def _fields(expansion: MultipoleExpansion, parts: list[Part], points: Array) -> 
     if not parts:
         return np.zeros((0, len(points), 3))
     places = (points - expansion.center) @ expansion.axes / expansion.radius
-    harmonics = irregular_values(expansion.degree + 1, places)
+    harmonics = solid.irregular_values(expansion.degree + 1, places)
     fields = []
     for _, l, m, value in parts:
-        gradient = irregular_gradient(harmonics, l, m)
+        gradient = solid.irregular_gradient(harmonics, l, m)
         fields.append([-(1 if m == 0 else 2) * np.real(value * component) for component in gradient])
     return np.moveaxis(np.array(fields), 1, 2) @ expansion.axes.T
 
@@ -385,7 +367,7 @@ def _with(expansion: MultipoleExpansion, parts: list[Part], number: int) -> Mult
     coefficients = np.zeros((degree + 1, degree + 1), complex)
     for _, l, m, value in mine:
         coefficients[l, m] += value
-    return replace(expansion, coefficients=rotated_harmonics(coefficients, expansion.axes))
+    return replace(expansion, coefficients=solid.rotated_harmonics(coefficients, expansion.axes))
 
 
 HELD = 1e-11  # what a squared weight of a fit costs, so that those of pieces beside each other do not run wild
@@ -401,7 +383,7 @@ class FittedExpansions:
     def __init__(self, centers: Array, radii: Array, degree: int, points: Array, allowed: Array) -> None:
         nothing, self.points, self._allowed = np.zeros((degree + 1, degree + 1), complex), points, allowed
         self._empty = [MultipoleExpansion(*one, nothing) for one in zip(centers, radii.tolist(), strict=True)]
-        parts = [(l, m, 1j if part else 1.0) for l, m, part in members(degree) if l]
+        parts = [(l, m, 1j if part else 1.0) for l, m, part in solid.members(degree) if l]
         degrees = np.tile([part[0] for part in parts], len(centers))
         # the highest degree last, so that the factor without it is a corner of the whole
         order, self._fewer = np.argsort(degrees, kind="stable"), int(np.sum(degrees < degree))

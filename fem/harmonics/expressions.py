@@ -49,8 +49,11 @@ def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], moni
     for terms in sums:
         for l, m, _ in terms:
             highest[m] = max(highest.get(m, m), l)
-    root = hy.sqrt(inverse), hy.expression(0.0)
-    sectoral = _sectoral((x * inverse, y * inverse), root, max(highest, default=0))
+    right, up = x * inverse, y * inverse
+    sectoral = [(hy.sqrt(inverse), hy.expression(0.0))]  # real and imaginary parts of S_m
+    for _ in range(max(highest, default=0)):
+        re, im = sectoral[-1]
+        sectoral.append((right * re - up * im, right * im + up * re))
     chains = _zonal(z * inverse, inverse, highest)
     found = []
     for terms in sums:
@@ -91,17 +94,6 @@ def _powers_across(x: hy.expression, y: hy.expression, highest: int) -> list[tup
         else:
             first, second = x * re, y * im
             found.append((first - second, (x + y) * (re + im) - (first + second)))
-    return found
-
-
-def _sectoral(
-    across: tuple[hy.expression, hy.expression], first: tuple[hy.expression, hy.expression], highest: int
-) -> list[tuple[hy.expression, hy.expression]]:
-    """Real and imaginary parts of first · (x + iy)^m up to an order."""
-    (x, y), found = across, [first]
-    for _ in range(highest):
-        re, im = found[-1]
-        found.append((x * re - y * im, x * im + y * re))
     return found
 
 

@@ -113,14 +113,6 @@ def _places(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np
     return l, (k + 1) // 2, (k > 0) & (k % 2 == 0)
 
 
-def _complex(values: Array, degree: int) -> Coefficients:
-    """Υ_lm as [..., l, m] from their real parts (..., harmonics)."""
-    found, (l, m, sine) = np.zeros((*values.shape[:-1], degree + 1, degree + 1), complex), _places(degree)
-    found.real[..., l[~sine], m[~sine]] = values[..., ~sine]
-    found.imag[..., l[sine], m[sine]] = values[..., sine]
-    return np.asarray(found * _leading(degree))
-
-
 def regular_values(degree: int, x: Array, y: Array, z: Array) -> dict[tuple[int, int], Any]:
     """Complex regular harmonics Υ_lm (n,) by (l, m), 0 ≤ m ≤ l ≤ `degree`, at coordinates x, y, z (n,)."""
     values, sizes = real_harmonics(degree, np.stack([x, y, z]), 1.0), _leading(degree)
@@ -137,7 +129,10 @@ def weighted_sums(degree: int, points: Array, weights: Array) -> Coefficients:
     for start in range(0, len(points), step):
         some = np.ascontiguousarray(points[start : start + step].T)
         total += real_harmonics(degree, some, 1.0) @ weights[start : start + step]
-    return _complex(total.T, degree)
+    found, (l, m, sine) = np.zeros((weights.shape[1], degree + 1, degree + 1), complex), _places(degree)
+    found.real[:, l[~sine], m[~sine]] = total[~sine].T
+    found.imag[:, l[sine], m[sine]] = total[sine].T
+    return np.asarray(found * _leading(degree))
 
 
 def _block(degree: int) -> int:

@@ -19,20 +19,8 @@ from ..cache import TableKind
 from ..closed_forms.potentials import unit_dipole_fields
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
-from .response import (
-    NEAR_GAPS,
-    OWN,
-    ROTOR_GAPS,
-    SPHERE_GAPS,
-    ChargeResponse,
-    enough_degree,
-    places_around,
-    places_facing,
-    response_products,
-    returned_samples,
-    sphere_samples,
-    two_body,
-)
+from . import response
+from .response import ChargeResponse
 from .table import (
     MANY,
     OF_RETURN,
@@ -83,14 +71,14 @@ def mutual_errors(
     errors, taken = [], effort(len(rotor.magnets))
     for gap in watched(GAPS, watch, "error estimate"):
         worst = np.zeros(2)
-        anywhere = places_around(rotor.magnets, floater.radius, (gap,), taken.poses, 3)
+        anywhere = response.places_around(rotor.magnets, floater.radius, (gap,), taken.poses, 3)
         for place in (*anywhere, *_at_poles(rotor.magnets, (1 + gap) * floater.radius)):
             direction = generator.normal(size=3)
             direction /= np.linalg.norm(direction)
-            degree = enough_degree(rotor.magnets, Ball(place, floater.radius), taken.degrees)
-            both = two_body(rotor, floater, place, direction, degree, taken.series)
+            degree = response.enough_degree(rotor.magnets, Ball(place, floater.radius), taken.degrees)
+            both = response.two_body(rotor, floater, place, direction, degree, taken.series)
             added = both.total - both.rigid
-            rough = two_body(coarse, floater, place, direction, degree, taken.series)
+            rough = response.two_body(coarse, floater, place, direction, degree, taken.series)
             unsure = added - (rough.total - rough.rigid)
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
             _, force, torque = table.added(place[None], floater.moment * direction[None], field[None], gradient[None])
@@ -162,29 +150,30 @@ def mutual_table(
         zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
         grids.append(ResponseGrid(box, axis, floater.radius, counts, *zeros, hole))
     taken = effort(len(magnets))
-    coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, OWN)) for nodes in taken.nodes)
+    coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, response.OWN)) for nodes in taken.nodes)
     images = image_weights(floater.recoil_permeability)
     inner = [grid.inner(taken.inner if len(grids) > 1 else 1) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
     pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.permeable:
-        places = places_around(magnets, floater.radius, ROTOR_GAPS, taken.dipoles, 1)
+        places = response.places_around(magnets, floater.radius, response.ROTOR_GAPS, taken.dipoles, 1)
         places = places[:: max(1, -(-len(places) // MOST_PLACES))]
-        grids, coupling = _rotor_fit(grids, inner, magnets, *response_products(rotor, places), places)
+        grids, coupling = _rotor_fit(grids, inner, magnets, *response.response_products(rotor, places), places)
     if floater.recoil_permeability != 1:
-        facing = places_facing(magnets, floater.radius, SPHERE_GAPS)
+        distances = response.SPHERE_GAPS
+        facing = response.places_facing(magnets, floater.radius, distances)
         cuboids = 1 < len(magnets) < MANY and all(isinstance(magnet.body, Box) for magnet in magnets)
         single = cuboids and sum(len(grid.points) for grid in grids) <= SINGLE
         kind = 0 if len(magnets) == 1 else 1 if single and len(magnets) == 2 else 2
         around, beside = SAMPLES[kind] // len(magnets)
-        places = np.concatenate([facing, places_around(magnets, floater.radius, SPHERE_GAPS, around, 2)])
-        near = places_around(magnets, floater.radius, NEAR_GAPS, beside, 3)
+        places = np.concatenate([facing, response.places_around(magnets, floater.radius, distances, around, 2)])
+        near = response.places_around(magnets, floater.radius, response.NEAR_GAPS, beside, 3)
         both = np.concatenate([places, near])
-        grids, pairs = sphere_fit(grids, single, images, both, sphere_samples(rotor, floater, both, watch))
+        grids, pairs = sphere_fit(grids, single, images, both, response.sphere_samples(rotor, floater, both, watch))
         if rotor.permeable:
             before = facing[:: FACING if len(magnets) > 1 else 1]
             fewer = np.concatenate([before, places[len(facing) :: SPARSE], near[::NEAR_SPARSE]])
-            returned = returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
+            returned = response.returned_samples(rotor, floater, grids, np.concatenate(inner), coupling, fewer, watch)
             grids, mixed = returned_fit(grids, single, inner, images, fewer, returned)
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, floater.polarizability)
     gaps, errors = mutual_errors(table, coarse, rotor, floater, watch)

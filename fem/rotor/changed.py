@@ -12,14 +12,7 @@ from ..closed_forms.moments import carrier
 from ..elements.surface import SurfaceCharges
 from ..harmonics.expansion import MultipoleExpansion, uniform_moments
 from .charges import charged_expansion, converging, without_charges
-from .models import (
-    DEGREE,
-    Accuracy,
-    Rotor,
-    error_points,
-    extrapolated_tail,
-    nonzero,
-)
+from .models import DEGREE, Accuracy, Rotor, error_points, extrapolated_tail, nonzero
 from .table import RotorTable
 
 STEADY_NODES, STEADY_DEGREE = 16, 40  # of charges on surfaces whose fields are smooth functions of the magnets' numbers

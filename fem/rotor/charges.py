@@ -17,20 +17,8 @@ from ..closed_forms.moments import carrier
 from ..elements.surface import SurfaceCharges, bears_charges, gap
 from ..harmonics.expansion import FittedExpansions, MultipoleExpansion, summed_derivatives, without_noise
 from ..harmonics.solid import FOUR_PI, weighted_sums
-from .models import (
-    BETWEEN,
-    NEAR,
-    Accuracy,
-    Rotor,
-    enough_degree,
-    error_points,
-    extrapolated_tail,
-    least_ratio,
-    nonzero,
-    trimmed_table,
-    typical_field,
-    warn_beyond,
-)
+from . import models
+from .models import Accuracy, Rotor
 from .table import CHARGES, PIECES, RotorTable
 
 NODES = (4, 6, 8, 10, 12, 14, 16, 20, 24)  # along an edge of a face, from coarse to fine
@@ -113,7 +101,7 @@ def _fitted_beside(
 
     def at(points: Array) -> tuple[Array, Array]:
         """What is allowed at points, and the field."""
-        scale = typical_field(magnets, points)
+        scale = models.typical_field(magnets, points)
         allowed = accuracy.rtol * np.minimum(scale, 2 * np.median(scale))
         return allowed, surfaces.field_beside(number, charges, points)
 
@@ -126,7 +114,7 @@ def _fitted_beside(
         count = len(centers) * MOMENTS
         if tried and count > MOST_FITTED:
             break
-        points = _spread(around, 0.0, max(int(ROWS * count), NEAR))
+        points = _spread(around, 0.0, max(int(ROWS * count), models.NEAR))
         weights, field = at(points)
         fit = FittedExpansions(centers, np.full(len(centers), clearance / 3), BESIDE_DEGREE, points, weights)
         own, step = (summed_derivatives(parts, elsewhere, 1) for parts in fit.of(field))
@@ -139,7 +127,7 @@ def _fitted_beside(
 
 def converging(magnets: Rotor, accuracy: Accuracy, points: Array) -> list[bool]:
     """Of each permeable magnet, whether its moments converge at all `points` (n, 3) m, as those of compact ones do."""
-    least = least_ratio(magnets, accuracy.rtol)
+    least = models.least_ratio(magnets, accuracy.rtol)
     return [ratio >= least for ratio in _ratios([magnet for magnet in magnets if magnet.contrast], points)]
 
 
@@ -159,7 +147,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     is far too large; or round ones touch.
     """
     start = time.perf_counter()
-    points, scale = error_points(magnets, accuracy.clearance(magnets))
+    points, scale = models.error_points(magnets, accuracy.clearance(magnets))
     if reason := without_charges(magnets, accuracy, points):
         raise InputError(
             f'Input rotor must have magnets that charges on their surfaces describe, for the model "surface"; instead '
@@ -169,7 +157,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     converge = converging(magnets, accuracy, points)
     compact = [magnet for magnet, converges in zip(permeable, converge, strict=True) if converges]
     ratios = _ratios(compact, points)
-    degree = enough_degree(compact, ratios, accuracy.rtol / 10)
+    degree = models.enough_degree(compact, ratios, accuracy.rtol / 10)
 
     whole, steps, tail, pieces, before, count = *(list[MultipoleExpansion]() for _ in range(4)), np.inf, 0
     surfaces, fits = None, list[tuple[FittedExpansions, float] | None]()
@@ -184,7 +172,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
             for number, converges in enumerate(converge)
         ]
         single = [charged_expansion(surfaces, i, charges, degree) for i, one in enumerate(fits) if not one]
-        tail = extrapolated_tail(single, min(ratios, default=CONVERGENCE))
+        tail = models.extrapolated_tail(single, min(ratios, default=CONVERGENCE))
         coarse, whole, pieces = whole, single, []
         for number, beside in enumerate(fits):
             if beside:
@@ -205,13 +193,13 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     fitted, beside, alone = any(fits), None, len(tail)
     fits.clear()  # hundreds of megabytes, of which `beside` would keep a part
     causes = {"discretisation": steps[:alone], "tail": tail, PIECES: pieces, CHARGES: steps[alone:]}
-    known = {cause: parts for cause, some in causes.items() if (parts := nonzero(some))}
+    known = {cause: parts for cause, some in causes.items() if (parts := models.nonzero(some))}
     polarized = tuple(one for one in carriers if one.polarization.any())
     table = RotorTable("surface", magnets, polarized, tuple(whole), known)
     # of hundreds of expansions it takes seconds to find what may be left out, where hardly anything may
     if not fitted or np.max(table.absolute_error(points)[0] / scale) < accuracy.rtol / 2:
-        table = trimmed_table(table, accuracy, (points, scale), BETWEEN / 20, 1.0, FITTED)
-    warn_beyond(table, accuracy, points, scale)
+        table = models.trimmed_table(table, accuracy, (points, scale), models.BETWEEN / 20, 1.0, FITTED)
+    models.warn_beyond(table, accuracy, points, scale)
     return replace(table, provenance={"nodes": count, "seconds": time.perf_counter() - start})
 
 

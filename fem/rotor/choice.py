@@ -12,15 +12,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box
 from ..elements.surface import smooth
 from .charges import surface_table, without_charges
-from .models import (
-    Accuracy,
-    cuboid_table,
-    dipole_table,
-    error_points,
-    fem_table,
-    moment_error,
-    moments_table,
-)
+from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moment_error, moments_table
 from .table import ROTOR, RotorTable, alike
 
 # From the cheapest to the dearest in evaluation

@@ -18,13 +18,7 @@ from ...geometry.shapes import Sphere
 from ...geometry.solids import Part, places_off
 from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
-from ..harmonics.expansion import (
-    MOST,
-    MultipoleExpansion,
-    trimmed_expansions,
-    uniform_moments,
-    without_noise,
-)
+from ..harmonics.expansion import MOST, MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
 from .table import KNOWN, RotorTable
 
 # Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor

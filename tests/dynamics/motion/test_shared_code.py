@@ -6,8 +6,8 @@ import pytest
 from article import PERMEABLE
 
 from spinlev.dynamics.motion.effect import Interaction
-from spinlev.dynamics.motion.equations import equations_of_motion, parameters
-from spinlev.dynamics.motion.rates import Rates
+from spinlev.dynamics.motion.equations import balances, equations_of_motion, parameters
+from spinlev.dynamics.motion.rates import Rates, _with_jacobian
 from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.table import MutualTable, ResponseGrid, response_box
@@ -38,7 +38,7 @@ class WrittenOut:
 @pytest.mark.parametrize("model", ["dipole", "cuboid"])
 def test_all_rotors_share_their_code_and_each_has_its_own_rates(model):
     rates = [Rates(rotor_table(rotor, model)) for rotor in ROTORS]
-    assert len({id(each._function) for each in rates}) == len({id(each._balances) for each in rates}) == 1
+    assert len({(id(each._code(_with_jacobian)), id(each._code(balances))) for each in rates}) == 1
     rng = np.random.default_rng(3)
     states = 0.1 * rng.normal(size=(40, 12)) + np.array([0, 0, -3.5, 0, 0, 0, 0, 0, 1, 0, 0, 0])
     for rotor, found in zip(ROTORS[:3], rates, strict=False):  # a ring's own code takes seconds to compile
@@ -64,7 +64,7 @@ def test_floaters_that_answer_share_their_code_and_each_has_its_own_answer(float
     """A rotor that does not answer: what is added to the force is α ∇B²/2."""
     rotor = horizontal(2e-3, 10e-3, 1.305, 1.0)
     rates = [Rates(_answering(horizontal(2e-3, 9e-3, 1.305, 1.0), PERMEABLE)), Rates(_answering(rotor, floater))]
-    assert rates[0]._function is rates[1]._function
+    assert rates[0]._code(_with_jacobian) is rates[1]._code(_with_jacobian)
     scene = Scene(110.0, rotor, floater, Drag(0.0, 0.0), gravity=np.zeros(3))
     scales = Scales.of(scene)
     values = parameters(scene, scales)
