@@ -93,20 +93,19 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
     """
     whole = with_coils(scene, table)
     check_floater_metal(scene)
-    effects = scene_effects(scene)
-    if not scene.floater.is_sphere and FLOATER_SHAPE not in {effect.name for effect in whole.effects}:
+    effects, known = scene_effects(scene), {effect.name for effect in whole.effects}
+    if not scene.floater.is_sphere and FLOATER_SHAPE not in known:
         if scene.floater.round and not scene.floater.mean:
             effects.append(FloaterShape.of(scene.floater, floater_sources(scene.floater), whole.field))
         else:
             bodies = [magnet.body for magnet in scene.rotor]
             effects.append(BodyShape.of(scene.floater, whole.field, bodies))
-    known = {effect.name for effect in whole.effects}
     if MUTUAL in known and INDUCED_SHAPE not in known and not scene.floater.is_sphere:
         mutual = next((effect for effect in whole.effects if isinstance(effect, Mutual)), None)
         effects.append(InducedShape.of(scene.floater, mutual))
     if pieces := pieces_of(scene.rotor, scene.conductors):
         check_metal(pieces, scene.fastest, scene.floater.radius)
-    if pieces and ROTOR_CURRENTS not in {effect.name for effect in whole.effects}:
+    if pieces and ROTOR_CURRENTS not in known:
         effects.append(RotorCurrents(cached_rotor_losses(scene, lambda _: None)[0]))
     return replace(whole.joined(*effects), turning=not scene.floater.round)
 

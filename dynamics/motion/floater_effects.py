@@ -235,8 +235,8 @@ class FloaterShape:
     def missed(self, table: FieldTable, position: Array, moment: Array) -> Array:
         """(n, 2) what the dipoles miss of torque, T, and of force, T/m, by the floater's moment.
 
-        In the rotor's field of `table` at `position` (n, 3) m of the centre, rotor's frame, in directions `moment` (n,
-        3). Raises RangeError as `force_and_torque` does.
+        In the rotor's field of `table` at `position` (n, 3) m of the centre, rotor's frame, in directions `moment`
+        (n, 3). Raises RangeError as `force_and_torque` does.
         """
         axes = np.array([self.floater.axes(m) for m in moment])
         force, torque = force_and_torque(self.sources, table, position, axes)

@@ -12,15 +12,8 @@ from ...geometry.meshes.solids import part_rule
 from ...geometry.overlap import separation
 from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Part, Solid, moved
-from ..harmonics.expansion import (
-    MultipoleExpansion,
-    box_rule,
-    curvature_moments,
-    gauss,
-    moments_of_magnetization,
-    round_rule,
-    uniform_moments,
-)
+from ..harmonics import expansion
+from ..harmonics.expansion import MultipoleExpansion, uniform_moments
 from ..harmonics.solid import Coefficients, gauss_legendre
 from .uniform import demagnetizing_tensor, remanent_field, remanent_potential
 
@@ -100,15 +93,15 @@ def volume_rule(body: Solid, others: Sequence[Solid], nodes: int) -> tuple[Array
     The `others` make the field: where their faces lie across a box, panels end, with so many `nodes` each.
     """
     if isinstance(body, Box):
-        return box_rule(body, [graded_rule(breaks, nodes) for breaks in panel_breaks(body, others)])
+        return expansion.box_rule(body, [graded_rule(breaks, nodes) for breaks in panel_breaks(body, others)])
     if isinstance(body, Part):
         return part_rule(body, PART_ORDER)
     if isinstance(body, Sphere):
-        radial, other = graded_rule(np.array([0.0, body.radius]), nodes), gauss(-1.0, 1.0, nodes)
+        radial, other = graded_rule(np.array([0.0, body.radius]), nodes), expansion.gauss(-1.0, 1.0, nodes)
     else:
         radial = graded_rule(np.array([body.inner_radius, body.radius]), nodes)
         other = graded_rule(np.array([-0.5, 0.5]) * body.height, nodes)
-    return round_rule(body, radial, other, 2 * nodes)
+    return expansion.round_rule(body, radial, other, 2 * nodes)
 
 
 NODES = 6  # of the rule for N, which need not be exact: elements and moments make up for it
@@ -156,11 +149,11 @@ def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes:
     flux = -remanent_potential(sources, points)[:, None] * areas
     susceptibility = body.permeability_in_rotor - np.eye(3)
     sphere = (box.center, box.circumradius)
-    result = moments_of_magnetization(points, np.ones(len(points)), flux @ susceptibility, *sphere, degree)
+    result = expansion.moments_of_magnetization(points, np.ones(len(points)), flux @ susceptibility, *sphere, degree)
     if not body.isotropic:
         points, weights = volume_rule(box, others, nodes)
         source = weights * remanent_potential(sources, points)
-        result += curvature_moments(points, source, susceptibility, *sphere, degree)
+        result += expansion.curvature_moments(points, source, susceptibility, *sphere, degree)
     return result
 
 
@@ -188,7 +181,7 @@ def by_cells(points: Array, weights: Array, field: Array, cells: Cells, degree: 
     """
     owner = cells.which(points)
     return [
-        moments_of_magnetization(points[mine], weights[mine], field[mine], center, float(radius), degree)
+        expansion.moments_of_magnetization(points[mine], weights[mine], field[mine], center, float(radius), degree)
         for k, (center, radius) in enumerate(zip(cells.centers, cells.radii, strict=True))
         for mine in (owner == k,)
     ]

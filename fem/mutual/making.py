@@ -307,8 +307,8 @@ def sphere_fit(
     """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
 
     `grids` are those whose `degrees` are sought; `single`: whether each point has a weight of its own, and not its
-    class alone; `images` are the weights of the sphere's images, `samples` what `sphere_samples` gives at `places` (n,
-    3) m.
+    class alone; `images` are the weights of the sphere's images, `samples` what `sphere_samples` gives at `places`
+    (n, 3) m.
     """
     energy, force, energy_size, force_size = samples
 

@@ -22,18 +22,9 @@ from ..closed_forms.moments import carrier, volume_rule
 from ..closed_forms.potentials import unit_dipole_fields, unit_dipole_potentials
 from ..closed_forms.uniform import UniformField, remanent_field
 from ..elements.surface import SurfaceCharges
+from ..harmonics import interior
 from ..harmonics.expansion import box_rule, gauss, uniform_moments
-from ..harmonics.interior import (
-    Ball,
-    dipole_sources,
-    field_at_center,
-    from_charges,
-    from_magnetization,
-    from_outer,
-    interior_coefficients,
-    multipole_force,
-    multipole_torque,
-)
+from ..harmonics.interior import Ball
 from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums, weighted_sums
 from .table import ResponseGrid, effort, induced_sources, point_counts, reflection
 
@@ -172,14 +163,14 @@ class ChargeResponse:
                 most = max(most, few)
                 continue
             if form.magnet.polarization.any():
-                found[: few + 1, : few + 1] += interior_coefficients(form.field, ball, few)
+                found[: few + 1, : few + 1] += interior.interior_coefficients(form.field, ball, few)
             if len(places):  # so small a part needs fewer degrees for the same error
                 few = _degrees(share - np.log(self._part), decay, degree)
-                found[: few + 1, : few + 1] += from_charges(places, amounts, ball, few)
+                found[: few + 1, : few + 1] += interior.from_charges(places, amounts, ball, few)
         if most:
             sums = [self._moments[k][: int(ends[k]) + 1, : int(ends[k]) + 1] for k in far]
-            found[: most + 1, : most + 1] += from_outer(sums, radii[far], centers[far], ball, most)
-        return found + from_magnetization(*self._across, ball, degree) if self.permeable else found
+            found[: most + 1, : most + 1] += interior.from_outer(sums, radii[far], centers[far], ball, most)
+        return found + interior.from_magnetization(*self._across, ball, degree) if self.permeable else found
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""
@@ -193,8 +184,8 @@ class ChargeResponse:
         )
         beyond = self.beyond(np.sum(field * self.charges.normals, axis=1)[:, None])[:, 0]
         induced = np.einsum("na,nab->nb", direct, tensors)
-        found = from_charges(self.charges.places, self.charges.areas * beyond, ball, degree)
-        return found + from_magnetization(points, induced, ball, degree)
+        found = interior.from_charges(self.charges.places, self.charges.areas * beyond, ball, degree)
+        return found + interior.from_magnetization(points, induced, ball, degree)
 
     def direct(self, nearest: ArrayLike) -> tuple[Array, Array]:
         """Points (n, 3) m and μ0 M dV by b (n, 3, 3) m³ of the first part, see `direct_rule`."""
@@ -304,7 +295,7 @@ def two_body(
                 f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
             )
     own = rotor.own_field(ball, degree)
-    permanent = dipole_sources(floater.moment * np.asarray(direction, float), ball, degree)
+    permanent = interior.dipole_sources(floater.moment * np.asarray(direction, float), ball, degree)
     reflected = rotor.answer(permanent, ball, degree)
     incident, sources, terms = own + reflected, permanent, 1
     change = induced_sources(incident, floater.recoil_permeability)
@@ -347,7 +338,7 @@ def two_body_ladder(
 
 
 def _wrench(incident: Coefficients, sources: Coefficients, ball: Ball) -> Wrench:
-    return Wrench(multipole_force(incident, sources, ball), multipole_torque(incident, sources, ball))
+    return Wrench(interior.multipole_force(incident, sources, ball), interior.multipole_torque(incident, sources, ball))
 
 
 def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float], number: int, seed: int) -> Array:
@@ -423,7 +414,7 @@ def sphere_samples(rotor: ChargeResponse, floater: Floater, places: Array, watch
         degree, sources = len(own) - 1, induced_sources(own, floater.recoil_permeability)
         first = sources.copy()
         first[2:] = 0.0
-        whole, uniform = multipole_force(own, sources, ball), multipole_force(own, first, ball)
+        whole, uniform = interior.multipole_force(own, sources, ball), interior.multipole_force(own, first, ball)
         # minus the energy of each degree: half of (4π R³/μ0) t_l Σ_m |a_lm|²/((l-m)! (l+m)!), m of both signs
         twice = np.where(np.arange(degree + 1), 2.0, 1.0)
         square = (np.abs(own) ** 2 / factorials(degree) * twice).sum(axis=1)
@@ -465,11 +456,11 @@ def returned_samples(
         own = rotor.own_field(ball, degree)
         back, slope = point_response(grids, inner, coupling, high(own), ball), []
         for unit in np.eye(3):
-            moment = dipole_sources(unit, ball, degree)
+            moment = interior.dipole_sources(unit, ball, degree)
             answer = point_response(grids, inner, coupling, moment, ball)
             pairs = (answer, high(own)), (back, moment), (own, high(answer))
-            slope.append(np.sum([multipole_force(*pair, ball) for pair in pairs], axis=0))
-        fields.append(field_at_center(back))
+            slope.append(np.sum([interior.multipole_force(*pair, ball) for pair in pairs], axis=0))
+        fields.append(interior.field_at_center(back))
         slopes.append(slope)
     return np.array(fields), np.array(slopes)
 
@@ -488,4 +479,4 @@ def point_response(
     frames = [grid.box.rotation for grid in grids]
     moments = [(b @ r * grid.strengths) @ r.T for grid, r, b in zip(grids, frames, seen, strict=True)]
     moments.append((coupling @ whole.ravel()).reshape(-1, 3))
-    return from_magnetization(places, MU_0 * np.concatenate(moments), ball, len(sources) - 1)
+    return interior.from_magnetization(places, MU_0 * np.concatenate(moments), ball, len(sources) - 1)
