@@ -176,9 +176,8 @@ def _survey_of_mean(
     values, own = parameters(round_scene, scales, frozen_spin=True), _own_spin(scene) * scales.time * ratio
     about = Balance(quick or Rates(roughly), values, spin * ratio, own)
     seeds = search.found(round_scene, exactly, about, AVERAGED)
-    exact, points = _by_whole_body(scene, exactly, about, seeds.points, search.farthest)
-    here, doubts = field_doubts(exactly, points[:, :3] * scales.length)
-    return survey_of(round_scene, exact, FixedPoints.at(exact, points[here], doubts, seeds.curves))
+    exact, points, doubts = _by_whole_body(scene, exactly, about, seeds.points, search.farthest)
+    return survey_of(round_scene, exact, FixedPoints.at(exact, points, doubts, seeds.curves))
 
 
 def _survey_of_any_body(scene: Scene, table: FieldTable, spin: float, rates: Rates | None, search: _Search) -> Survey:
@@ -227,6 +226,7 @@ def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, farthest: floa
     inside = SearchRange(scene, farthest).holds(position)
     known, doubts = field_doubts(table, position[inside] * scales.length)
     chosen = np.flatnonzero(inside)[known]
+    doubts = _with_shape(doubts, scene, table, position[chosen], matrices_of(quaternion[chosen]))
     poses = zip(position[chosen], quaternion[chosen], doubts, strict=True)
     found = [locked_equilibrium(scales, rates, values, *pose) for pose in poses]
     return without_twins([one for one in found if rotor_gap(scene, one.position, one.state.orientation) > 0])
@@ -240,8 +240,8 @@ def _searched(scene: Scene, table: FieldTable, balance: Balance, farthest: float
     if not (scene.floater.is_sphere or scene.floater.mean):
         free, errors = _of_shape(scene, table, known, doubts, where)
         if free is None:
-            balance, where = _by_whole_body(scene, table, balance, where, farthest)
-            known, doubts = field_doubts(table, where[:, :3] * scales.length)
+            balance, where, doubts = _by_whole_body(scene, table, balance, where, farthest)
+            known = np.ones(len(where), bool)
         else:
             known, doubts = free, errors
     weight = scene.floater.mass * float(scene.gravity[2])
@@ -274,8 +274,8 @@ def _of_shape(
 
 def _by_whole_body(
     scene: Scene, table: FieldTable, balance: Balance, where: Array, farthest: float
-) -> tuple[Balance, Array]:
-    """Balance of as many dipoles all over a floater as its force takes, and points (n, 6) where it vanishes."""
+) -> tuple[Balance, Array, Array]:
+    """Balance of as many dipoles all over a floater as its force takes, points (n, 6) where it vanishes, and doubts."""
     round_scene, exactly, _ = mean_over_turns(scene, table)
     scales = Scales.of(round_scene)
     exact = replace(balance, rates=Rates(exactly), values=parameters(round_scene, scales, frozen_spin=True))
@@ -291,7 +291,19 @@ def _by_whole_body(
         inside = table.in_range(place + np.concatenate([sources.places, sources.corners])).all()
         return bool(inside) and rotor_gap(scene, place, scene.floater.axes(moment)) > 0
 
-    return exact, points[np.array([free(p[:3] * scales.length, p[3:]) for p in points], bool)]
+    points = points[np.array([free(p[:3] * scales.length, p[3:]) for p in points], bool)]
+    known, doubts = field_doubts(exactly, points[:, :3] * scales.length)
+    return exact, points[known], _with_shape(doubts, round_scene, exactly, points[known])
+
+
+def _with_shape(doubts: Array, scene: Scene, whole: Interaction, points: Array, axes: Array | None = None) -> Array:
+    """`doubts` (n, k) at `points` (n, 6) with what dipoles all over the floater miss; `axes` (n, 3, 3) are its own."""
+    if axes is None:
+        axes = np.reshape([scene.floater.axes(moment) for moment in points[:, 3:]], (-1, 3, 3))
+    found = np.array(doubts)
+    for body in (effect for effect in whole.effects if isinstance(effect, BodyShape)):
+        found[:, :2] += body.missed(whole, points[:, :3] * Scales.of(scene).length, axes)
+    return found
 
 
 def of_whole_body(scene: Scene, rates: Rates, known: Equilibrium) -> bool:

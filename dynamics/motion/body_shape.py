@@ -7,6 +7,7 @@ and modes, it is force and torque on many dipoles all over the body with their e
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,8 +19,17 @@ from numpy.typing import NDArray
 from ...fem.harmonics import interior
 from ...fem.harmonics.expressions import regular_harmonics
 from ...fem.harmonics.interior import Ball, BallField
-from ...fem.rotor.floater import FloaterSources, floater_sources, polarizability_tensor, shares, slopes_of, strength
-from ...fem.rotor.table import DerivedField, FieldFormula, RangeError
+from ...fem.rotor.floater import (
+    TURNS,
+    FloaterSources,
+    floater_sources,
+    force_and_torque,
+    polarizability_tensor,
+    shares,
+    slopes_of,
+    strength,
+)
+from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable, RangeError
 from ...geometry.common import Array, even_directions
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Solid
@@ -42,8 +52,9 @@ ROUND_OFF = 1e-9  # of the moment, below which a rest of it is none
 ALLOWED = {2: 4e-3, 3: 1e-3, 5: 1e-4}
 REACHES = 0.6, 0.4, 0.25  # of the distance from a magnet: radii of the sphere on which the field is expanded
 # Degrees of the polynomials that dipoles integrate: about a pose of a cube, more of long or hollow bodies up to the
-# second.
-SUMMED, MOST = 8, 18
+# second, and by how many more, of them and of the turns of a mean, dipoles are compared with others. Four: of a cube
+# eight turns leave multipoles of order 8, twelve those of 12.
+SUMMED, MOST, FINER = 8, 18, 4
 WHICH = Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE
 # Times the multipoles' shares: a response misses them as its source and in its force, and near a body's ends they are
 # twice their mean over directions. Of a cube, a cuboid, a disc and a rod up to 3.4 is found.
@@ -53,6 +64,13 @@ MISSED_BY_PLATE = 5.2
 # Of the radius: how far from the centre dipoles stand for multipoles. The nearer, the less they have of further ones
 # (of a cube's a fiftieth), and the stronger they are.
 STAND = 0.25
+
+
+def all_over(floater: Floater, more: int = 0) -> FloaterSources:
+    """Dipoles all over a floater, for polynomials of so many degrees `more`; of its mean over turns where it is one."""
+    degree = int(min(max(1.0, floater.radius / (floater.inner_radius or 1e-9) / 3**0.5) * SUMMED, MOST))
+    sources = floater_sources(floater, degree=degree + more)
+    return sources.averaged(TURNS + more) if floater.mean and not floater.turned else sources
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +88,26 @@ class BodyShape:
     @classmethod
     def of(cls, floater: Floater, field: FieldFormula, magnets: Sequence[Solid]) -> "BodyShape":
         """That of a floater in a `field` of `magnets`."""
-        degree = int(min(max(1.0, floater.radius / (floater.inner_radius or 1e-9) / 3**0.5) * SUMMED, MOST))
-        sources = floater_sources(floater, degree=degree)
-        sources = sources.averaged() if floater.mean and not floater.turned else sources
-        return cls(field, floater, tuple(magnets), sources)
+        return cls(field, floater, tuple(magnets), all_over(floater))
+
+    @cached_property
+    def finer(self) -> FloaterSources:
+        """More dipoles all over it, which tell what these miss."""
+        return all_over(self.floater, FINER)
+
+    def missed(self, table: FieldTable, position: Array, axes: Array) -> Array:
+        """(n, 2) what the dipoles miss of torque, T, and of force, T/m, by the floater's moment.
+
+        `table` is the rotor's field, `position` (n, 3) m the centre's, `axes` (n, 3, 3) are the body's; infinite where
+        part of the body is where that field is not known.
+        """
+        missed = np.full((len(position), 2), np.inf)
+        for k in range(len(position)):
+            with suppress(RangeError):
+                here = table, position[k : k + 1], axes[k : k + 1]
+                own, finer = (force_and_torque(each, *here) for each in (self.sources, self.finer))
+                missed[k] = np.linalg.norm(np.subtract(own, finer)[::-1, 0], axis=1)
+        return missed / (self.floater.moment or 1.0)
 
     def placed(self, first: int) -> "BodyShape":
         return self._changed(first=first)

@@ -55,16 +55,16 @@ class FloaterSources:
         """The same of a body with axes (3, 3)."""
         return replace(self, places=self.places @ axes.T, moments=self.moments @ axes.T, corners=self.corners @ axes.T)
 
-    def averaged(self) -> Self:
-        """Its mean over turns about its z, exact for orders m of its multipoles below `TURNS`."""
-        angles = 2 * np.pi * np.arange(TURNS) / TURNS
+    def averaged(self, number: int = TURNS) -> Self:
+        """Its mean over a `number` of turns about its z, exact for orders m of its multipoles below that."""
+        angles = 2 * np.pi * np.arange(number) / number
         turned = [self.turned(rotation_matrix((0.0, 0.0, angle))) for angle in np.degrees(angles)]
         return replace(
             self,
             places=np.concatenate([one.places for one in turned]),
-            moments=np.concatenate([one.moments for one in turned]) / TURNS,
+            moments=np.concatenate([one.moments for one in turned]) / number,
             corners=np.concatenate([one.corners for one in turned]),
-            charges=np.tile(self.charges, TURNS) / TURNS,
+            charges=np.tile(self.charges, number) / number,
         )
 
     @property
