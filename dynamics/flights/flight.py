@@ -97,7 +97,7 @@ class Flight:
         scene: Scene,
         table: FieldTable,
         duration: float,
-        tolerance: float | None = None,
+        tolerance: float | None = TOLERANCE,
         compact: bool | None = None,
         memory: PlateMemory | None = None,
         in_balls: bool | None = None,

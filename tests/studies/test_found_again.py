@@ -118,7 +118,7 @@ def test_a_damaged_file_is_reported_and_made_anew(cache, caplog):
 
 def test_what_is_known_needs_no_compiled_equations(cache, monkeypatch):
     first = Levitation(SCENE, DIPOLE).without_plate
-    monkeypatch.setattr(Rates, "_compiled", None)
+    monkeypatch.setattr(Rates, "_code", None)
     again = Levitation(SCENE, DIPOLE).without_plate
     assert repr(again.equilibria) == repr(first.equilibria)
 
