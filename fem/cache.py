@@ -54,7 +54,7 @@ FORMATS = {
     "floater-currents": 2,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 13,
+    "equilibria": 14,
     "experiment": 2,
     "code": 1,
 }

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fem.cache import TableKind
-from ...fem.rotor.table import ROUND_OFF, FieldTable, RangeError, RotorTable
+from ...fem.rotor.table import ROUND_OFF, DerivedField, FieldTable, RangeError, RotorTable
 from ...geometry.common import Array, Report, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
 from ...geometry.shapes import rotation_matrix
@@ -300,9 +300,10 @@ def _with_shape(doubts: Array, scene: Scene, whole: Interaction, points: Array, 
     """`doubts` (n, k) at `points` (n, 6) with what dipoles all over the floater miss; `axes` (n, 3, 3) are its own."""
     if axes is None:
         axes = np.reshape([scene.floater.axes(moment) for moment in points[:, 3:]], (-1, 3, 3))
-    found = np.array(doubts)
+    found, field = np.array(doubts), whole.field
     for body in (effect for effect in whole.effects if isinstance(effect, BodyShape)):
-        found[:, :2] += body.missed(whole, points[:, :3] * Scales.of(scene).length, axes)
+        assert isinstance(field, DerivedField)
+        found[:, :2] += body.missed(field, points[:, :3] * Scales.of(scene).length, axes)
     return found
 
 

@@ -7,7 +7,6 @@ and modes, it is force and torque on many dipoles all over the body with their e
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -23,13 +22,12 @@ from ...fem.rotor.floater import (
     TURNS,
     FloaterSources,
     floater_sources,
-    force_and_torque,
     polarizability_tensor,
     shares,
     slopes_of,
     strength,
 )
-from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable, RangeError
+from ...fem.rotor.table import DerivedField, FieldFormula, RangeError
 from ...geometry.common import Array, even_directions
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Solid
@@ -95,19 +93,14 @@ class BodyShape:
         """More dipoles all over it, which tell what these miss."""
         return all_over(self.floater, FINER)
 
-    def missed(self, table: FieldTable, position: Array, axes: Array) -> Array:
+    def missed(self, field: DerivedField, position: Array, axes: Array) -> Array:
         """(n, 2) what the dipoles miss of torque, T, and of force, T/m, by the floater's moment.
 
-        `table` is the rotor's field, `position` (n, 3) m the centre's, `axes` (n, 3, 3) are the body's; infinite where
-        part of the body is where that field is not known.
+        In the rotor's `field`, as of `wrench`; `position` (n, 3) m is the centre's, `axes` (n, 3, 3) are the body's.
         """
-        missed = np.full((len(position), 2), np.inf)
-        for k in range(len(position)):
-            with suppress(RangeError):
-                here = table, position[k : k + 1], axes[k : k + 1]
-                own, finer = (force_and_torque(each, *here) for each in (self.sources, self.finer))
-                missed[k] = np.linalg.norm(np.subtract(own, finer)[::-1, 0], axis=1)
-        return missed / (self.floater.moment or 1.0)
+        own, finer = (slopes_of(each, field, position, axes)[0] for each in (self.sources, self.finer))
+        missed = np.linalg.norm((own - finer).reshape(-1, 2, 3)[:, ::-1], axis=2)
+        return np.asarray(missed / (self.floater.moment or 1.0))
 
     def placed(self, first: int) -> "BodyShape":
         return self._changed(first=first)

@@ -124,7 +124,7 @@ class RealAir:
 
     @property
     def compiled_in(self) -> tuple[float, ...]:
-        return self.size, self.sphericity or 1.0, self.spin_ratio
+        return self.size, self.sphericity or 0.0, self.spin_ratio  # a sphere's law is not that of sphericity 1
 
     def added(self, motion: Motion) -> Added:
         length, time, spin, moment = hy.par[Parameter.LENGTH], hy.par[Parameter.TIME], motion.spin, motion.moment
