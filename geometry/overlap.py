@@ -157,6 +157,7 @@ def overlapping_magnets(magnets: Sequence[Magnet]) -> list[tuple[int, int, float
 
 
 def shifted_magnet(magnet: Magnet, shift: Array) -> Magnet:
+    """The magnet moved by (3,) m."""
     return replace(magnet, body=moved(magnet.body, magnet.body.center + shift)) if shift.any() else magnet
 
 

@@ -105,6 +105,7 @@ def _generated(shape: Any, what: str, **sizes: float) -> Any:
 
 
 def read_brep(brep: str) -> Any:
+    """The solid of OpenCASCADE's own text of it."""
     with tempfile.NamedTemporaryFile("w", suffix=".brep", encoding="utf-8") as copy:
         copy.write(brep)
         copy.flush()
@@ -187,6 +188,7 @@ def step_text(solid: Any) -> str:
 
 
 def solid_of(body: Solid) -> Any:
+    """A body about the origin in its own axes as a solid, lengths in mm."""
     return occ_solid(moved(body, np.zeros(3), np.eye(3)), np.zeros(3), MILLIMETRE)
 
 

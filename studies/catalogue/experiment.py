@@ -176,6 +176,7 @@ SEED = 42
 
 
 def experiment_points(quick: bool) -> list[Point]:
+    """The rotors of all designs, and the variants of the fit."""
     import dynesty  # noqa: F401  # where it is missing, that is said before anything is computed
 
     rotors = [point for design in _designs(SETTINGS[quick], True).values() for point in design]

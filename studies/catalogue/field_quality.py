@@ -339,6 +339,7 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
 
 
 def hard_case_lines(result: xr.Dataset) -> list[str]:
+    """Errors of each rotor near and far, and whether they are as stated, as a table."""
     keys, rows = tuple(LINES)[1::-1] + tuple(LINES)[2:], []
     for name in result["case"].values:
         row = result.sel(case=name)

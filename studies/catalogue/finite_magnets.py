@@ -358,6 +358,7 @@ def floater_figure(result: xr.Dataset) -> Figure:
 
 
 def floater_lines(result: xr.Dataset) -> list[str]:
+    """From where on the rigid dipole does, and what it misses of a levitation, as a table."""
     reach = 1e3 * result["sufficient_from"]
     rows = [(f"{100 * float(k):g} %", *reach.sel(level=k, quantity=["force", "torque"]).values) for k in reach["level"]]
     lines = showing.text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)

@@ -258,6 +258,7 @@ def _rotors(result: xr.Dataset) -> dict[str, xr.Dataset]:
 
 
 def time_lines(result: xr.Dataset) -> list[str]:
+    """Levitation times of each rotor by what is varied, as a table."""
     rows = []
     for case in result["case"].values.tolist():
         for variant in ("nominal", "permeable", "complete"):

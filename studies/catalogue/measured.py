@@ -383,6 +383,7 @@ TEAM28_NAME = "TEAM problem 28"
 
 
 def compute(point: Point) -> xr.Dataset:
+    """What is computed and what was measured of one experiment."""
     if point["experiment"] == TEAM28_NAME:
         rows, data = team28_rows(point["quick"])
         axes = {"time": variable(("time",), data["time"], "s", "time"),
