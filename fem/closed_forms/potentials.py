@@ -35,15 +35,20 @@ class Dipole:
 def unit_dipole_fields(points: Array, places: Array) -> Array:
     """Fields (3 p, n, 3) T at points (n, 3) m of unit moments along x, y, z at each of the places (p, 3) m."""
     d = points - places[:, None]
-    distance = np.linalg.norm(d, axis=2)[..., None]
-    fields = [3 * d * d[..., a : a + 1] / distance**5 - np.eye(3)[a] / distance**3 for a in range(3)]
-    return np.asarray(MU_0 / (4 * np.pi) * np.stack(fields, axis=1).reshape(-1, len(points), 3))
+    inverse = 1 / np.einsum("pna,pna->pn", d, d)
+    cube = MU_0 / (4 * np.pi) * inverse * np.sqrt(inverse)
+    fields = np.empty((len(places), 3, len(points), 3))
+    for a in range(3):
+        np.multiply((3 * cube * inverse * d[..., a])[..., None], d, out=fields[:, a])
+        fields[:, a, :, a] -= cube
+    return fields.reshape(-1, len(points), 3)
 
 
 def unit_dipole_potentials(points: Array, places: Array) -> Array:
     """Potentials ψ (n, 3 p) T m, b = -∇ψ, of the fields of `unit_dipole_fields` at points (n, 3) m."""
     d = points[:, None] - places
-    return np.asarray((MU_0 / (4 * np.pi) * d / np.sum(d * d, axis=2)[..., None] ** 1.5).reshape(len(points), -1))
+    square = np.einsum("npa,npa->np", d, d)
+    return np.asarray((d * (MU_0 / (4 * np.pi) / (square * np.sqrt(square)))[..., None]).reshape(len(points), -1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -434,6 +434,7 @@ class SurfaceCharges:
             areas.append(alike[key].areas)
         self.places, self.normals, self.areas = (np.concatenate(part) for part in (places, normals, areas))
         self.owner = np.repeat(np.arange(len(areas)), [len(one) for one in areas])
+        self._of = [np.flatnonzero(self.owner == k) for k in range(len(self.magnets))]
         self.contrast = np.array([magnet.recoil_permeability - 1 for magnet in self.magnets])[self.owner]
         centers = np.array([magnet.body.center for magnet in self.magnets])
         radii = np.array([magnet.body.circumradius for magnet in self.magnets])
@@ -480,8 +481,7 @@ class SurfaceCharges:
     def normal_field(self, charges: Array) -> Array:
         """K σ (n, ...) T of charges (n, ...) T."""
         found = np.zeros_like(charges)
-        of = [np.flatnonzero(self.owner == k) for k in range(len(self.magnets))]
-        for surface, mine, (at, rows) in zip(self._surfaces, of, self._near, strict=True):
+        for surface, mine, (at, rows) in zip(self._surfaces, self._of, self._near, strict=True):
             found[mine] += surface.kernel @ charges[mine]
             found[at] += rows @ charges[mine]
         amounts = (self.areas * charges.T).T
@@ -489,9 +489,9 @@ class SurfaceCharges:
             shares = [surface.coarse[far][2] for surface in self._surfaces]
             ends = np.cumsum([share.shape[1] for share in shares])
             seen = np.zeros((ends[-1], *charges.shape[1:]))
-            for share, mine, (at, rows) in zip(shares, of, blocks, strict=True):
+            for share, mine, (at, rows) in zip(shares, self._of, blocks, strict=True):
                 seen[at] += rows @ (share.T @ amounts[mine])
-            for share, mine, part in zip(shares, of, np.split(seen, ends[:-1]), strict=True):
+            for share, mine, part in zip(shares, self._of, np.split(seen, ends[:-1]), strict=True):
                 found[mine] += share @ part
         return found
 
@@ -546,11 +546,18 @@ class SurfaceCharges:
     @cached_property
     def _factors(self) -> tuple[Array, NDArray[np.int32]]:
         """Of (1 + χ/2) - χ K, for many right-hand sides, or where the iteration of `solved` does not converge."""
-        count = len(self.places)
-        whole = np.empty((count, count), order="F")  # which is factorised in its place
-        for start in range(0, count, BLOCK):
-            columns = np.eye(count, min(BLOCK, count - start), -start)
-            whole[:, start : start + BLOCK] = -self.contrast[:, None] * self.normal_field(columns)
+        whole = np.zeros((len(self.places),) * 2, order="F")  # which is factorised in its place
+        for surface, mine, (at, rows) in zip(self._surfaces, self._of, self._near, strict=True):
+            whole[np.ix_(mine, mine)] = surface.kernel
+            whole[np.ix_(at, mine)] = rows
+        for far, blocks in enumerate(self._from_afar if self._distance.any() else ()):
+            shares = [surface.coarse[far][2] for surface in self._surfaces]
+            owner = np.repeat(np.arange(len(shares)), [share.shape[1] for share in shares])
+            for share, mine, (at, rows) in zip(shares, self._of, blocks, strict=True):
+                amounts = (share * self.areas[mine, None]).T
+                for k in np.unique(owner[at]).tolist():
+                    whole[np.ix_(self._of[k], mine)] = shares[k] @ (rows[owner[at] == k] @ amounts)
+        whole *= -self.contrast[:, None]
         whole[np.diag_indices_from(whole)] += 1 + self.contrast / 2
         factors, pivots = scipy.linalg.lu_factor(whole, overwrite_a=True)
         return factors, pivots

@@ -48,11 +48,11 @@ SMALL, FEW_WEIGHTS = 1e-9, 500
 PENALTY, FREE, FEW, ENOUGH = 1e-3, 1e-6, 1e-2, 15
 # Points along an edge where there are several magnets: between the samples of some hundred places more run wild
 MOST = 8
-CHUNK = 512  # rows of equations at once, so that they take some megabytes
+CHUNK = 512  # rows of equations at once: all would take hundreds of megabytes
 # Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
 SINGLE = 250
 GAPS = (0.03, 0.08, 0.16, 0.5, 1.5)  # at which both are compared, in floater radii
-MOST_PLACES = 500  # of dipoles, the responses to which are fitted; many magnets would have thousands
+MOST_PLACES = 250  # of dipoles, the responses to which are fitted; many magnets would have thousands
 SAFETY = 4.0  # for the poses that were not looked at
 MEANS = 0.2  # of what is added, by the difference of two permeabilities whose mean the charges have: 0.09 measured
 CHARGED = 1.0  # error of the finer charges by what the coarser ones differ from them
@@ -115,7 +115,7 @@ OBLIQUE = (
 )
 # Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
 # many places the rotor's response to the sphere's is
-EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
+EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 5000, 5.0, 6, 6, 3
 # Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, of two whose
 # points have weights of their own, and of others
 SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
@@ -223,9 +223,12 @@ def _rotor_fit(
         first, second = first[chosen], second[chosen]
     counts = np.where(first // 3 == second // 3, AT_ONE_PLACE, 1.0)
     columns, kinds = [], [classes(g, True)[:, : None if m.contrast else 0] for g, m in zip(grids, magnets, strict=True)]
+    rows = [slice(start, start + CHUNK) for start in range(0, len(first), CHUNK)]
     for grid, kind in zip(grids, kinds, strict=True):
-        fields = unit_dipole_fields(grid.places, places) @ grid.box.rotation * size[:, None, None]
-        columns += [(fields[first, :, a] * fields[second, :, a]) @ kind for a in range(3)]
+        fields = unit_dipole_fields(grid.places, places) * size[:, None, None]
+        for axis in grid.box.rotation.T:
+            along = fields @ axis
+            columns.append(np.concatenate([(along[first[some]] * along[second[some]]) @ kind for some in rows]))
     whole = (unit_dipole_fields(np.concatenate(inner), places) * size[:, None, None]).reshape(len(size), -1)
     # a lone magnet's points do it alone; the coupling is symmetric, and counted once
     a, b = np.triu_indices(whole.shape[1] if len(grids) > 1 else 0)
@@ -234,13 +237,12 @@ def _rotor_fit(
     ends, number = np.cumsum([column.shape[1] for column in columns]), alone.shape[1]
     if len(a):
         square, right = np.zeros([number + len(a)] * 2, order="F"), np.zeros(number + len(a))
-        for start in range(0, len(alone), CHUNK):  # all rows would take hundreds of megabytes
-            some = slice(start, start + CHUNK)
+        for some in rows:
             one, other = whole[first[some]], whole[second[some]]
             coupled = one[:, a] * other[:, b] + (a != b) * one[:, b] * other[:, a]
-            rows = np.concatenate([alone[some], counts[some, None] * coupled], axis=1)
-            square = scipy.linalg.blas.dsyrk(1.0, rows.T, beta=1.0, c=square, overwrite_c=True)
-            right += beyond[some] @ rows
+            both = np.concatenate([alone[some], counts[some, None] * coupled], axis=1)
+            square = scipy.linalg.blas.dsyrk(1.0, both.T, beta=1.0, c=square, overwrite_c=True)
+            right += beyond[some] @ both
         found = _held(square, right, len(alone), np.arange(len(square)) >= number)
     else:
         found = least_squares(alone, beyond, np.zeros(number, bool))
@@ -416,7 +418,8 @@ def least_squares(columns: Array, values: Array, small: Array, cost: float = PEN
         size = np.linalg.norm(columns, axis=0)
         size[size == 0] = 1.0
         return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
-    return _held((columns.T @ columns).T, columns.T @ values, len(values), small, cost)
+    square = scipy.linalg.blas.dsyrk(1.0, columns, trans=1)
+    return _held(square, columns.T @ values, len(values), small, cost)
 
 
 def _held(square: Array, right: Array, values: int, small: Array, cost: float = PENALTY) -> Array:
