@@ -271,6 +271,7 @@ def test_gravity_across_the_axis_makes_the_motion_periodic(rates):
     assert lab[0] > 5e-5  # it hangs towards where gravity points: 0.34 m/s² against some 10 Hz
 
 
+@pytest.mark.slow
 def test_gravity_across_the_axis_shakes_a_locked_body(uneven):
     """Back to itself after each of five turns in which deviations grow 600 times; half the gravity moves it half."""
     ways = []
@@ -338,6 +339,7 @@ def test_a_locked_body_over_a_plate_is_a_periodic_motion(uneven, memory):
     np.testing.assert_array_equal(currents, found.currents[0])
 
 
+@pytest.mark.slow
 def test_a_locked_body_as_even_as_a_sphere_moves_as_the_sphere(memory, rates):
     """Place, moment and modes of a body whose inertia differs by 1e-8 are those of the round body's orbit over a plate.
 

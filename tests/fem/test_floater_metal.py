@@ -177,10 +177,14 @@ def test_a_turned_body_has_turned_tensors():
     assert seen @ straight[3:, 3:] @ seen.T == pytest.approx(askew[3:, 3:], abs=2e-3 * size)
 
 
-def test_a_thin_wall_takes_smaller_elements_and_what_cannot_be_meshed_is_told(monkeypatch):
-    """0.05 mm, and 5 nm."""
+@pytest.mark.slow
+def test_a_wall_of_fifty_micrometres_takes_smaller_elements():
     found = loss(floater(Cylinder(RADIUS, 3e-3, inner_radius=4.95e-3)))
     assert found[2, 2] == pytest.approx(np.pi / 8 * (RADIUS**4 - 4.95e-3**4) * 3e-3, rel=1e-3)
-    monkeypatch.setattr(floater_metal, "LONGEST", 3.0)
+
+
+def test_what_cannot_be_meshed_is_told(monkeypatch):
+    """A wall of 5 nm."""
+    monkeypatch.setattr(floater_metal, "LONGEST", 1.0)
     with pytest.raises(ComputationError, match=r"currents are not known: the mesher .* Leave out"):
         current_shape(floater(Cylinder(RADIUS, 3e-3, inner_radius=4.999995e-3)))

@@ -73,6 +73,7 @@ def test_a_flight_that_cannot_begin_leaves_the_others(long_table, tmp_path):
     assert "inside one of them" in found.attrs["failed_points"]
 
 
+@pytest.mark.slow
 def test_cubes_of_a_sweep_are_simulated_together():
     """At two frequencies and from two places each: code with runtime parameters in it, where each alone has numbers."""
     cube = {"shape": "cuboid", "size_mm": [10.0, 10.0, 10.0], "remanence_T": 1.305, "density_kg_m3": 7500.0}

@@ -54,7 +54,8 @@ def truth(scene: Scene, height: float, speed: float, time: Array) -> Array:
     return np.asarray(np.interp(time, fine, found))
 
 
-@pytest.mark.parametrize(("model", "error"), [("slab", 0.76), pytest.param("auto", 0.098, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("model", "error"), [("slab", 0.76), ("auto", 0.098)])
 def test_a_magnet_thrown_at_cold_copper_turns_round_in_mid_air(model: str, error: float):
     """As far as 42 mm from where it begins, from where the first table reaches 3 mm: no impact, as it was once told.
 

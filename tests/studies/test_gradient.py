@@ -159,7 +159,8 @@ def test_a_spun_body_moves_as_its_spin_says():
     assert float(found.distance[0, 0]) == pytest.approx((ends[0] - ends[1]) / 0.2, rel=1e-5)  # of second order
 
 
-@pytest.mark.parametrize("name", ["displaced", pytest.param("tilted, finite", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["displaced", "tilted, finite"])
 def test_ends_of_stable_frequencies_move_as_branches_say(name):
     """A fold below and a change of stability above, against whole branches at both sides (of second order)."""
     scene, model, _ = CASES[name]

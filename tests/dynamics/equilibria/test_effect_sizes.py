@@ -85,6 +85,7 @@ def test_growth_by_the_currents_of_the_floater(table, alone):
     assert said == pytest.approx(there.growth_per_s - alone.growth_per_s, rel=0.02)
 
 
+@pytest.mark.slow
 def test_growth_of_a_locked_body_by_the_currents_of_the_rotor(table, locked):
     scene = replace(SCENE, floater=UNEVEN)
     there = nearest_locked(scene, Interaction(table, (RotorCurrents(LOSSES),)))

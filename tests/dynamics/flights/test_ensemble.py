@@ -175,6 +175,7 @@ def test_bodies_of_every_shape_end_as_if_each_flew_alone(shape, tmp_path):
     assert set(flown.ended_by) == {"duration", "contact", "lost"}
 
 
+@pytest.mark.slow
 def test_offsets_of_bodies_are_those_of_a_scene(tmp_path):
     """In the small ball in which `simulate` has a body about its equilibrium, too."""
     scene = replace(scene_of("cuboid", tmp_path), plate=None)

@@ -112,7 +112,9 @@ def test_over_a_plate_that_goes_down_it_is_so_too(starts):
     assert np.abs(found.last.position[0] - alone.rotor.position[-1]).max() < 1e-9
 
 
-@pytest.mark.parametrize("body", [Cylinder(7e-3, 5e-3), Box((10e-3,) * 3)], ids=["disc", "cube"])
+@pytest.mark.parametrize(
+    "body", [Cylinder(7e-3, 5e-3), pytest.param(Box((10e-3,) * 3), marks=pytest.mark.slow)], ids=["disc", "cube"]
+)
 def test_launches_of_other_shapes_are_what_each_is_alone(memory, body):
     """By another integrator, to round-off; the plate is touched by the lowest point of the true surface."""
     floater = Floater(body.circumradius, FLOATER.remanence, 1.0, FLOATER.density, body=body)

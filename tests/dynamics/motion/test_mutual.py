@@ -274,7 +274,7 @@ def test_of_other_shapes_mutual_magnetisation_has_the_stated_error(name):
     assert np.max(missed) > stated / 10
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", [*(pytest.param(name, marks=pytest.mark.slow) for name in ("cube", "cuboid")), "disc"])
 def test_error_bars_have_what_the_response_misses_of_a_shape(name, mutual):
     """That part of the force that mutual magnetisation adds to a sphere of the body's volume, over the moment."""
     body = BODIES[name]

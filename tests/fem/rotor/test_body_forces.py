@@ -57,7 +57,7 @@ def summed(floater, place, turn, n):
     return total
 
 
-SLOW = {"disc", "ring"}
+SLOW = {"disc", "ring", "composite"}
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,7 @@ def test_seeds_differ_from_rotor_to_rotor_and_from_batch_to_batch():
     assert len({tuple(seed_of(*a)) for a in asked}) == 4
 
 
-@pytest.mark.parametrize("shape", ["sphere", "cube"])
+@pytest.mark.parametrize("shape", ["sphere", pytest.param("cube", marks=pytest.mark.slow)])
 def test_a_small_point_is_computed_drawn_and_told(shape):
     row = CAPTURE.compute({**POINT, "shape": shape})
     assert set(np.unique(row["outcome"])) <= set(range(4))

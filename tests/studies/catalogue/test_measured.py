@@ -58,6 +58,7 @@ def test_team28_is_the_published_table():
     assert height[[0, -1]] == pytest.approx([3.7e-3, 11.4e-3])
 
 
+@pytest.mark.slow
 def test_known_answers_are_met():
     parts = [compute({"experiment": name, "quick": True}) for name in EXPERIMENTS if "TEAM" not in name]
     rows = measured_numbers(gather(parts))["experiments"]
@@ -107,6 +108,7 @@ def test_drag_and_lift_at_speed_are_within_their_stated_errors():
         assert abs(found - known) < error < 0.01 * known
 
 
+@pytest.mark.slow
 def test_magnet_falls_in_a_tube_as_it_does_by_the_series():
     """From rest to its terminal speed, in 1e-3 of the infinite tube's: of this one's ends 4 cm are left beyond it."""
     (_, _, exact, found, error, *_), motion = falling_magnet()

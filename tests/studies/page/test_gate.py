@@ -25,8 +25,10 @@ from spinlev.studies.page.server import program, serve
 
 @pytest.fixture(scope="module")
 def page():
-    """A page that is served; no process is begun for it before someone asks."""
-    served = sl.explore(OVER_PLATE)
+    """A page that is served and waits for one second; no process is begun for it before someone asks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("spinlev.studies.page.server.PATIENCE", 1)
+        served = sl.explore(OVER_PLATE)
     yield served
     served.stop()
 
