@@ -18,7 +18,8 @@ from ...geometry.scene.contents import Scene
 from .balance import AXIAL, CONVERGED_STEP, DUPLICATE_DISTANCE, EVERY, LATERAL, Balance, Indices, solve
 from .path import AtRest, Steps, whole_curves
 
-THINNED = 16  # One of so many starts is tried in the whole balance too where there is a rough one; of 20 scenes 32 lost none
+# One of so many starts is tried in the whole balance too where there is a rough one; with 32, 20 scenes lost none.
+THINNED = 16
 # One of so many starts is tried for what lies on none of the curves: a test of 90 scenes finds no such equilibrium.
 SPARE = 3
 # Of Newton's method from the starts; none of those that have not met by then was seen to meet in twice as many.
