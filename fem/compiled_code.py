@@ -83,15 +83,20 @@ def compiled_later(
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Let heyoka evaluate in this thread alone; others wait busily for small work: 1.6 times the time of a search."""
+    """Let heyoka evaluate in this thread alone; others wait busily for small work: 1.6 times the time of a search.
+
+    Where the environment says that a process has one thread, as the command line does, the others do not come back:
+    each time they do they wake, and wait for a quarter of a command's processor time.
+    """
     import heyoka as hy
 
-    before = hy.get_nthreads()
-    hy.set_nthreads(1)
+    if (before := hy.get_nthreads()) > 1:
+        hy.set_nthreads(1)
     try:
         yield
     finally:
-        hy.set_nthreads(before)
+        if before > 1 and os.environ.get("OMP_NUM_THREADS") != "1":
+            hy.set_nthreads(before)
 
 
 @contextmanager

@@ -82,10 +82,20 @@ def settings():
     return hy.get_nthreads(), states.get_memcache_limit(), states.get_diskcache_enabled()
 
 
+@pytest.fixture
+def two_threads(monkeypatch):
+    """Of heyoka's, as a user has them who has not said otherwise."""
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    before = hy.get_nthreads()
+    hy.set_nthreads(2)
+    yield
+    hy.set_nthreads(before)
+
+
+@pytest.mark.usefixtures("two_threads")
 def test_heyokas_settings_stay_those_of_the_user_and_it_keeps_nothing_by_itself(folder, monkeypatch):
     """Neither a key nor code that is compiled, read or run changes them; what is compiled here is kept here alone."""
     before = settings()
-    assert before[0] != 1  # what a test of one thread would not tell
     compiled_code._target.cache_clear()
     assert value() == (VALUE, True)
     compiled_code._functions.clear()
@@ -392,9 +402,11 @@ def test_code_under_another_name_is_not_run(folder):
     assert compiled(hy.cfunc, [x + 3.0], [x])([1.0])[0] == 4.0
 
 
-def test_a_block_of_one_thread_gives_the_others_back():
-    """Others wait busily for small work; parallel work is by processes."""
-    before = hy.get_nthreads()
+@pytest.mark.parametrize(("said", "left"), [("", 2), ("2", 2), ("1", 1)])
+@pytest.mark.usefixtures("two_threads")
+def test_a_block_of_one_thread_gives_the_others_back(monkeypatch, said, left):
+    """Others wait busily for small work; parallel work is by processes. A process that has one thread keeps to it."""
+    monkeypatch.setenv("OMP_NUM_THREADS", said)
     with one_thread():
         assert hy.get_nthreads() == 1
-    assert hy.get_nthreads() == before
+    assert hy.get_nthreads() == left
