@@ -19,7 +19,7 @@ def main() -> None:
     stop = threading.Event()
     _open_streams()
     _listen(stop)
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # work side by side is by processes; the user's own setting wins
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # parallel work is by processes; the user's own setting wins
     os.environ["PYTHONSAFEPATH"] = "1"  # no process begun here loads what lies in the folder that it is begun in
     try:
         from .console import make_readable

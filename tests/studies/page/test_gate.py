@@ -29,8 +29,8 @@ def page():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("spinlev.studies.page.server.PATIENCE", 1)
         served = sl.explore(OVER_PLATE)
-    yield served
-    served.stop()
+        yield served
+        served.stop()
 
 
 def answer(page, path, method="GET"):
