@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
+import scipy
 import xarray as xr
-from scipy.stats import qmc
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
 from ..geometry.common import Array, InputError, shown
@@ -46,7 +46,7 @@ def error_bars(
         raise EquilibriumError(f"At {levitation.scene.frequency:g} Hz the floater has no equilibrium.")
     wide = np.array([float(tolerances[key]) for key in keys])
     # a Latin hypercube: each number's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239)
-    cube = qmc.LatinHypercube(len(keys), seed=seed).random(draws) if draws else np.zeros((0, len(keys)))
+    cube = scipy.stats.qmc.LatinHypercube(len(keys), seed=seed).random(draws) if draws else np.zeros((0, len(keys)))
     rows = [_row(gradient, one, keys, wide, wide * (2 * cube - 1)) for one in known]
     data: dict[str, Any] = {}
     for k, (answer, (unit, label, dims)) in enumerate(ANSWERS.items()):
