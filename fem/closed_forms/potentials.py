@@ -28,8 +28,9 @@ class Dipole:
     def vector_potential(self, points: Array) -> Array:
         """A (n, 3), T m, at points (n, 3), m."""
         offset = points - self.position
-        distance = np.linalg.norm(offset, axis=1)[:, None]
-        return np.asarray(MU_0 / (4 * np.pi) * np.cross(self.moment, offset) / distance**3)
+        square = np.einsum("na,na->n", offset, offset)[:, None]
+        turned = offset @ np.cross(MU_0 / (4 * np.pi) * self.moment, np.eye(3))  # m × r, row by row
+        return np.asarray(turned / (square * np.sqrt(square)))
 
 
 def unit_dipole_fields(points: Array, places: Array) -> Array:
@@ -77,7 +78,7 @@ class PolarizedCuboid:
     def vector_potential(self, points: Array) -> Array:
         """A (n, 3), T m, at points (n, 3), m."""
         pull = attraction(self.box.to_body(points), self.box.half_edges) @ self.box.rotation.T
-        return np.asarray(np.cross(self.polarization, pull) / (4 * np.pi))
+        return np.asarray(pull @ np.cross(self.polarization / (4 * np.pi), np.eye(3)))
 
 
 def unit_dipoles(positions: ArrayLike) -> list[Dipole]:
