@@ -256,7 +256,7 @@ class Levitation:
                 break
             way = past[0].laboratory_turn.position
             place = np.array([np.hypot(*way.T[:2]).max(), 0.0, way[:, 2].mean()])
-            self.plate = self.plate_about(place, plans.plate_plan(self.scene, self.models, place))
+            self.plate = self.plate_about(place, plans.plate_plan(self.scene, self.models, place, self._tables))
             over = with_plate(self.still, self.interaction, found, self.plate, self.rates)
         return over
 
@@ -331,7 +331,7 @@ class Levitation:
         place = self._place(() if alone else self.quiet.without_plate.equilibria)
         if place is not None:
             plans.check_room(scene, place)
-        plan = plans.plate_plan(scene, self.models, place if self._nearest is None else self._nearest)
+        plan = plans.plate_plan(scene, self.models, place if self._nearest is None else self._nearest, self._tables)
         if plan.model == "none" or scene.plate is None or place is None:
             return None
         if (far := self._foreseen() if plan.model == "reduced" else None) is not None:
@@ -494,7 +494,7 @@ class Levitation:
             return False
         way = _seen(plate, simulated)
         self._nearest = way[int(np.argmin(plate.body.distance(way)))]
-        if plans.plate_plan(self.scene, self.models, self._nearest).model == "none":
+        if plans.plate_plan(self.scene, self.models, self._nearest, self._tables).model == "none":
             return False
         note("The floater comes so near to the plate that its currents count; it begins anew with them.")
         del self.plate

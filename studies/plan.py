@@ -128,13 +128,17 @@ class PlatePlan:
     region: Region | None = None
 
 
-def plate_plan(scene: Scene, models: Models, place: Array | None) -> PlatePlan:
-    """Model of a `scene`'s plate by `models` for a floater that comes to a `place` (3,) m; its reason is reported."""
+def plate_plan(scene: Scene, models: Models, place: Array | None, tables: SharedTables) -> PlatePlan:
+    """Model of a `scene`'s plate by `models` for a floater that comes to a `place` (3,) m.
+
+    It is reported, once for all scenes that share `tables`; its reason is with the details.
+    """
     choice = resolve_plate_model(scene, models.plate_model, place, models.plate_rtol, note)
     if scene.plate is not None:
         edges = 1e3 * scene.plate.box.size
         size = f"{' × '.join(f'{edge:.4g}' for edge in edges)} mm"
-        note(f"Plate: {PLATE_WORDS[choice.model].format(size=size, thickness=min(edges))}")
+        text = f"Plate: {PLATE_WORDS[choice.model].format(size=size, thickness=min(edges))}"
+        tables.once(text, lambda: note(text))
         detail(f"Plate model: {choice.model} ({choice.reason})")
     return PlatePlan(choice.model, choice.edges, models.plate_rtol)
 

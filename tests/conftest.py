@@ -12,10 +12,10 @@ import pytest
 def pytest_configure(config):
     """Before anything of the program is imported; xdist's workers inherit the environment.
 
-    As in the program, BLAS and heyoka have one thread: two wait busily for each other, and change the last bits.
+    As in the program, BLAS, heyoka and NGSolve have one thread: others wait busily, and change the last bits.
     $SPINLEV_TEST_CACHE is a folder to keep for whoever runs one test again and again.
     """
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NGS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     if not hasattr(config, "workerinput"):
         os.environ["SPINLEV_CACHE"] = os.environ.get("SPINLEV_TEST_CACHE") or tempfile.mkdtemp(prefix="spinlev-tests-")

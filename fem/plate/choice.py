@@ -81,7 +81,6 @@ def resolve_plate_model(
             return PlateChoice("slab", f"the plate's edges take at most {error:.1e} of its reaction", error)
         if not isinstance(plate.body, Box):
             return PlateChoice("reduced", f"edges may take {error:.1e} of an infinite slab's reaction")
-        report("Effect of the plate's edges ...")
         rotor = np.mean([magnet.box.center for magnet in scene.rotor], axis=0)
         error = cached_edge_error(plate, np.array([place, rotor]), scene.frequency, report)
         if error <= rtol:

@@ -19,7 +19,9 @@ def main() -> None:
     stop = threading.Event()
     _open_streams()
     _listen(stop)
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # parallel work is by processes; the user's own setting wins
+    # Parallel work is by processes, and idle threads wait busily; the user's own setting wins.
+    for threads in ("OMP_NUM_THREADS", "NGS_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")
     os.environ["PYTHONSAFEPATH"] = "1"  # no process begun here loads what lies in the folder that it is begun in
     try:
         from .console import make_readable

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from article import PERMEABLE
-from ngsolve import SetNumThreads
 
 from spinlev.dynamics.equilibria.equilibrium import Survey
 from spinlev.dynamics.equilibria.orbits import floquet_modes, periodic_orbit
@@ -29,7 +28,6 @@ from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import AbsoluteStart, Drag, Lowering, Plate, Scene
 from spinlev.geometry.shapes import Box
 
-SetNumThreads(1)
 MAGNETS = tuple(replace(magnet, conductivity=6.7e5) for magnet in horizontal(2e-3, 10e-3, 1.305, 1.05))
 BARE = tuple(replace(magnet, conductivity=None) for magnet in MAGNETS)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.01, 0.0, -0.055)), 3.5e7)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from article import FLOATER, MAGNETS
-from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 from second_opinions.phasor import mean_force, mean_torque
 from second_opinions.plate_tables import reaction_gradient
@@ -27,7 +26,6 @@ from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Drag, Lowering, OffsetStart, Plate, Scene
 from spinlev.geometry.shapes import Box
 
-SetNumThreads(1)
 CUBOID = RotorTable("cuboid", MAGNETS, MAGNETS)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.01, 0.0, -0.055)), 3.5e7, Lowering(0.1, 0.02, 0.002))
 SCENE = Scene(110.0, MAGNETS, FLOATER, Drag(0.0, 0.0), plate=PLATE, start=OffsetStart(np.zeros(3)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms.potentials import unit_dipoles
 from spinlev.fem.plate.choice import reachable_region
@@ -29,7 +28,6 @@ from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.shapes import Box
 
-SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7)
 REGION = reachable_region(PLATE, (0.0, 0.0, -0.02), (0.003, 0.003, 0.003), 6.35e-3)
 RULE = MeshRule(2.0, 3.0, 3.0)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import heyoka as hy
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 from scipy.integrate import solve_ivp
 from second_opinions.dipole_derivative import DipoleDerivative
 from second_opinions.phasor import mean_force, mean_loss, mean_torque
@@ -26,7 +25,6 @@ from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.scene.contents import Lowering, Plate
 from spinlev.geometry.shapes import Box
 
-SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.02, 0.02))
 REGION = over_face(PLATE.box.size, (0.018, 0.026), 0.0015)
 RTOL = 0.1

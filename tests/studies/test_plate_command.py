@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 
 from spinlev.fem.plate.slab import EDGES
 from spinlev.geometry.common import InputError
@@ -17,7 +16,6 @@ from spinlev.studies.cli.main import app
 from spinlev.studies.plan import check_room
 from spinlev.studies.run import response
 
-SetNumThreads(1)
 SCENE = "scenes/tilt-over-plate.toml"
 
 

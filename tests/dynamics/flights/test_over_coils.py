@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from second_opinions.coaxial_rings import Rings
@@ -30,7 +29,6 @@ from spinlev.geometry.scene.making import assemble
 from spinlev.geometry.shapes import Box
 from spinlev.studies.catalogue.measured import TEAM28
 
-SetNumThreads(1)
 SCENE = parse_scene(TEAM28)
 BODY, WEIGHT = SCENE.floater.bodies[0], SCENE.floater.mass * 9.81
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 from second_opinions.time_stepping import TimeStepper, work_on
 
 from spinlev.fem.closed_forms.potentials import Dipole, unit_dipoles
@@ -12,7 +11,6 @@ from spinlev.fem.plate.eddy import EddySpace, solve_eddy
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.shapes import Box
 
-SetNumThreads(1)
 FREQUENCY = 200.0
 PLACE = np.array([0.002, -0.003, 0.012])
 PHASOR = np.array([1.0, -1j, 0.5])

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from article import RADIUS
-from ngsolve import SetNumThreads
 
 from spinlev.fem.closed_forms.potentials import unit_dipoles
 from spinlev.fem.plate.choice import reachable_region
@@ -21,7 +20,6 @@ from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.scene.contents import Lowering, Plate
 from spinlev.geometry.shapes import Box, rotation_matrix
 
-SetNumThreads(1)
 TURN = rotation_matrix((5.0, -10.0, 20.0))
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.004, 0.0, -0.055), TURN), 3.5e7, Lowering(0.0, 0.01, 0.02))
 RULE = MeshRule(1.6, 2.5, 2.5)

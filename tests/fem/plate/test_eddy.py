@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 from second_opinions.dipole_derivative import DipoleDerivative
 from second_opinions.phasor import mean_loss
 
@@ -16,7 +15,6 @@ from spinlev.geometry.common import MU_0
 from spinlev.geometry.meshes.plate import Block, ConductorMesh, MeshRule, hex_mesh, plate_mesh
 from spinlev.geometry.shapes import Box, Cylinder
 
-SetNumThreads(1)
 SIZE, SIGMA = (0.1, 0.24, 0.03), 3.5e7
 PLACES = np.array([[0.01, -0.02, 0.035], [0.0, 0.0, 0.04]])
 

@@ -6,7 +6,6 @@ import ngsolve
 import numpy as np
 import pytest
 from netgen.occ import Box as OccBox, Pnt, Sphere
-from ngsolve import SetNumThreads
 from second_opinions.phasor import mean_loss
 from second_opinions.solids import Conductor, occ_mesh
 
@@ -16,7 +15,6 @@ from spinlev.fem.plate.eddy import EddySpace, current_density, solve_eddy
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.shapes import Box
 
-SetNumThreads(1)
 SIZE, SIGMA, FREQUENCY = (0.1, 0.24, 0.03), 3.5e7, 100.0
 PLACE = np.array([[0.01, -0.02, 0.045]])
 AMPLITUDES = np.array([1.0, -1j, 0.3])

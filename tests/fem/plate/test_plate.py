@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 from second_opinions.phasor import mean_loss
 
 from spinlev.fem.plate.eddy import plate_reaction
@@ -14,7 +13,6 @@ from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.shapes import Box, rotation_matrix
 
-SetNumThreads(1)
 LYING = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.015)), 3.5e7)
 HEIGHTS = (0.012, 0.02, 0.03)
 

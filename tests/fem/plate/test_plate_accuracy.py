@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 from second_opinions.plate_tables import over_face
 
 from spinlev.fem.plate.eddy import plate_reaction
@@ -14,7 +13,6 @@ from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.shapes import Box
 
-SetNumThreads(1)
 pytestmark = pytest.mark.slow
 PLATE = Plate(Box((0.1, 0.24, 0.03)), 3.5e7)
 COLUMN = over_face(PLATE.box.size, (0.01, 0.04), 0.005)

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from netgen.occ import WorkPlane
-from ngsolve import SetNumThreads
 from second_opinions.coaxial_rings import Rings, mutual
 
 from spinlev.fem.closed_forms.eddy_bodies import polarizability, tube_reaction
@@ -21,7 +20,6 @@ from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.shapes import Box, Cylinder, Sphere, ring
 from spinlev.geometry.step_file import part_of
 
-SetNumThreads(1)
 SIGMA = 3.4e7
 AXIAL = HomogeneousField(np.array([0.0, 0.0, 1.0]))
 FAR_AIR = MeshRule(skin_share=0.5, reach=60.0)  # its end takes (1/120)³ of the induced moment

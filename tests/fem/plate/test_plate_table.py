@@ -5,7 +5,6 @@ from __future__ import annotations
 import heyoka as hy
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 from second_opinions.plate_tables import over_face, reaction_gradient, signal_expressions
 
 from spinlev.fem.cache import TableFileError
@@ -27,7 +26,6 @@ from spinlev.geometry.meshes.plate import MeshRule
 from spinlev.geometry.scene.contents import Lowering, Plate
 from spinlev.geometry.shapes import Box
 
-SetNumThreads(1)
 PLATE = Plate(Box((0.1, 0.24, 0.03), (0.0, 0.0, -0.055)), 3.5e7, Lowering(0.0, 0.01, 0.02))
 REGION = over_face(PLATE.box.size, (0.016, 0.026), 0.004)
 RTOL = 0.1

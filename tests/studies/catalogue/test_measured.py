@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 from second_opinions.coaxial_rings import mutual
 
 from spinlev.fem.closed_forms.eddy_bodies import tube_drag
@@ -27,8 +26,6 @@ from spinlev.studies.catalogue.measured import (
     swing_errors,
 )
 from spinlev.studies.coils import coils_figure, coils_summary, modes_of
-
-SetNumThreads(1)
 
 
 def test_swing_of_a_damped_oscillation():

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from ngsolve import SetNumThreads
 
 from spinlev.studies.catalogue.plates import (
     CURVES,
@@ -14,8 +13,6 @@ from spinlev.studies.catalogue.plates import (
     team7_lines,
     team7_mesh,
 )
-
-SetNumThreads(1)
 
 
 def test_team_problem_7_with_coarse_elements():
