@@ -394,7 +394,7 @@ class FittedExpansions:
             self._columns[rows] = fields.reshape(len(parts), -1)
         self._size = np.sqrt(np.einsum("ij,ij->i", self._columns, self._columns))  # `norm` makes a copy
         self._columns /= self._size[:, None]
-        square = scipy.linalg.blas.dsyrk(1.0, self._columns.T, trans=1, lower=1)
+        square = self._columns @ self._columns.T
         square[np.diag_indices_from(square)] += HELD * len(square)
         self._factor = scipy.linalg.cholesky(square, lower=True, overwrite_a=True)
 

@@ -418,8 +418,7 @@ def least_squares(columns: Array, values: Array, small: Array, cost: float = PEN
         size = np.linalg.norm(columns, axis=0)
         size[size == 0] = 1.0
         return np.asarray(np.linalg.lstsq(columns / size, values, rcond=SMALL)[0] / size)
-    square = scipy.linalg.blas.dsyrk(1.0, columns, trans=1)
-    return _held(square, columns.T @ values, len(values), small, cost)
+    return _held((columns.T @ columns).T, columns.T @ values, len(values), small, cost)
 
 
 def _held(square: Array, right: Array, values: int, small: Array, cost: float = PENALTY) -> Array:
