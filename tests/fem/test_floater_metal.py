@@ -120,6 +120,7 @@ def test_the_own_field_of_currents_about_the_axis(height):
     assert missed == pytest.approx(0.0, abs=1e-3 if height > 1e-3 else 0.1)
 
 
+@pytest.mark.slow
 def test_the_delay_of_a_long_rod():
     """What 10 mm more of a rod add: L = μ0σR²/6 K, of fields along the axis and across (J₂/J₀ of the skin depth).
 

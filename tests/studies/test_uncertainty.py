@@ -21,6 +21,7 @@ TOLERANCES = {"rotor.edge_mm": 0.05, "frequency_hz": 0.5, "floater.diameter_mm":
 TEXT = re.sub(r"edge_mm = [\d.]+", "edge_mm = {value = 10.0, tolerance = 0.05}", HORIZONTAL.read_text())
 
 
+@pytest.mark.slow
 def test_draws_scatter_as_the_first_order_says():
     """200 draws of a Latin hypercube tell a standard deviation to about 4 %, and the second order adds 1 % here."""
     found = sl.uncertainty(HORIZONTAL, TOLERANCES, **FEW).isel(equilibrium=0)

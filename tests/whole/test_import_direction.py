@@ -4,11 +4,9 @@ import ast
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-from places import ROOT, TESTS
+from places import ROOT, TESTS, modules
 
 FLOORS = ("geometry", "fem", "dynamics", "studies")
-SOURCES = {path: ast.parse(path.read_text()) for floor in FLOORS for path in sorted((ROOT / floor).rglob("*.py"))}
-"""Each module's tree."""
 LONGEST = 600
 """Lines of a module; one of a single subject has about 400."""
 
@@ -27,7 +25,7 @@ def imported(path: Path, body: list[ast.stmt]) -> set[Path]:
 
 def test_a_floor_knows_those_below_alone():
     wrong = []
-    for path, tree in SOURCES.items():
+    for path, tree in modules().items():
         floor = FLOORS.index(path.relative_to(ROOT).parts[0])
         known = {other.relative_to(ROOT).parts[0] for other in imported(path, tree.body)}
         wrong += [f"{path} imports from {other}" for other in known if FLOORS.index(other) > floor]
@@ -37,7 +35,7 @@ def test_a_floor_knows_those_below_alone():
 def test_no_modules_import_each_other():
     """At their top; a command that calls another one late may."""
     graph = {}
-    for path, tree in SOURCES.items():
+    for path, tree in modules().items():
         top = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
         graph[path] = imported(path, top)
     TopologicalSorter(graph).prepare()  # raises CycleError
@@ -46,7 +44,7 @@ def test_no_modules_import_each_other():
 def test_rooms_are_used_in_one_order():
     """At the top of their modules; a module that lies in no room counts as one."""
     graph: dict[tuple[str, ...], set[tuple[str, ...]]] = {}
-    for path, tree in ((path, tree) for path, tree in SOURCES.items() if path.name != "__init__.py"):
+    for path, tree in ((path, tree) for path, tree in modules().items() if path.name != "__init__.py"):
         top = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
         graph.setdefault(room(path), set()).update({room(other) for other in imported(path, top)} - {room(path)})
     TopologicalSorter(graph).prepare()
@@ -59,18 +57,18 @@ def room(path: Path) -> tuple[str, ...]:
 def test_the_tests_mirror_the_rooms():
     """Each test in its room's folder, in its floor's if several rooms are in it, or in `whole`; names are unique."""
     files = list(TESTS.rglob("test_*.py"))
-    known = {path.parent.relative_to(ROOT) for path in SOURCES} | {Path("whole")}
+    known = {path.parent.relative_to(ROOT) for path in modules()} | {Path("whole")}
     assert {path.parent.relative_to(TESTS) for path in files} <= known
     assert len({path.name for path in files}) == len(files)
 
 
 def test_a_room_says_what_it_is_and_no_module_is_crowded():
-    assert [path for path, tree in SOURCES.items() if not ast.get_docstring(tree)] == []
-    assert [path for path in SOURCES if path.read_text().count("\n") > LONGEST] == []
+    assert [path for path, tree in modules().items() if not ast.get_docstring(tree)] == []
+    assert [path for path in modules() if path.read_text().count("\n") > LONGEST] == []
 
 
 def test_dynamics_knows_no_mesh_and_geometry_and_dynamics_no_solver():
-    for path, tree in SOURCES.items():
+    for path, tree in modules().items():
         text, floor = path.read_text(), path.relative_to(ROOT).parts[0]
         if floor in ("dynamics", "studies"):
             assert "import ngsolve" not in text

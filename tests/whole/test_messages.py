@@ -11,12 +11,11 @@ import re
 import tokenize
 from importlib import import_module
 
-from places import ROOT
+from places import ROOT, modules
 from words import NAMES, OF_CODE, PROGRAM
 
 from spinlev.geometry.common import ComputationError
 
-FILES = sorted(path for folder in ("geometry", "fem", "dynamics", "studies") for path in (ROOT / folder).rglob("*.py"))
 INPUT = re.compile(r"(\{\}: )?Input \S.* must .+; instead[ :].+", re.DOTALL)
 SENTENCE = re.compile(r"[A-Z].*[.}]", re.DOTALL)
 RELAYED = {
@@ -66,16 +65,13 @@ def literal(node):
     return None
 
 
-TREES = {path: ast.parse(path.read_text()) for path in FILES}
-CALLS = {
-    path: [
+def calls_of(tree):
+    """Every call of a plain name that a module makes: the name, the last argument and the line."""
+    return [
         (node.func.id, node.args[-1], node.lineno)
         for node in ast.walk(tree)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args
     ]
-    for path, tree in TREES.items()
-}
-"""Every call of a plain name that a module makes: the name, the last argument and the line."""
 
 
 def meant(path, name):
@@ -87,7 +83,7 @@ def meant(path, name):
 def test_every_error_has_a_message_of_its_kind():
     """Errors are known by their names: every other call is of something else."""
     names, wrong = set(), []
-    for path, calls in CALLS.items():
+    for path, calls in ((path, calls_of(tree)) for path, tree in modules().items()):
         for name in {name for name, *_ in calls}:
             kind = meant(path, name)
             if (isinstance(kind, type) and issubclass(kind, Exception)) != name.endswith(("Error", "Warning")):
@@ -128,7 +124,7 @@ def test_a_message_of_another_grammar_is_found():
 def test_every_sentence_about_input_follows_the_grammar():
     """Also those that functions give back to be raised elsewhere."""
     found, wrong = 0, []
-    for path, tree in TREES.items():
+    for path, tree in modules().items():
         inner = {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
         for node in ast.walk(tree):
             text = None if node in inner else literal(node)
@@ -143,7 +139,7 @@ def test_every_sentence_about_input_follows_the_grammar():
 def test_the_words_are_those_of_the_field():
     """All strings with a space, and of docstrings those that are help."""
     wrong = []
-    for path, tree in TREES.items():
+    for path, tree in modules().items():
         owners = (ast.FunctionDef, ast.ClassDef, ast.Module)
         docstrings = {id(node.body[0].value) for node in ast.walk(tree)
                       if isinstance(node, owners) and node.body and isinstance(node.body[0], ast.Expr)}  # fmt: skip
@@ -157,8 +153,8 @@ def test_the_words_are_those_of_the_field():
 def test_comments_and_docstrings_are_in_the_words_of_the_field():
     """Not yet those of the page."""
     wrong = []
-    for path in (path for path in FILES if path.parent.name != "page"):
-        text, tree = path.read_text(), TREES[path]
+    for path, tree in ((path, tree) for path, tree in modules().items() if path.parent.name != "page"):
+        text = path.read_text()
         inner = [child for node in ast.walk(tree) for child in ast.iter_child_nodes(node)]
         strings = {(n.value.lineno, n.value.col_offset) for n in inner
                    if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)}  # fmt: skip
@@ -173,7 +169,7 @@ def test_comments_and_docstrings_are_in_the_words_of_the_field():
 def test_names_say_what_a_thing_is():
     """Not yet those of the page."""
     wrong = []
-    for path, tree in TREES.items():
+    for path, tree in modules().items():
         for node in ast.walk(tree) if path.parent.name != "page" else ():
             name = next((getattr(node, key) for key in ("id", "arg", "name") if getattr(node, key, None)), "")
             if isinstance(name, str) and NAMES.fullmatch(name):

@@ -40,7 +40,7 @@ def conductor(scene, frequency):
 
 @pytest.fixture(scope="module")
 def modes():
-    return floating_modes(conductor(SCENE, 50.0), heights_over(SCENE), 1e-3, order=3)
+    return floating_modes(conductor(SCENE, 50.0), heights_over(SCENE), 1e-3, order=2)
 
 
 @pytest.fixture(scope="module")

@@ -236,6 +236,7 @@ def round_equilibrium():
     return find_equilibria(LEVITATING, with_effects(LEVITATING, FIELD))[0]
 
 
+@pytest.mark.slow
 def test_a_mode_of_a_cylinder_grows_in_a_trajectory_as_it_says(round_equilibrium):
     """Over 130 turns, with the spin about the moment held as in modes: amplitude and phase.
 
@@ -268,6 +269,7 @@ def test_a_mode_of_a_cylinder_grows_in_a_trajectory_as_it_says(round_equilibrium
     assert np.angle(grown * np.exp(-1j * found[leading].imag * turns)) == pytest.approx(0.0, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_growth_by_the_currents_of_a_cylinder(round_equilibrium):
     """By the eigenvalues of the motion with them and without them."""
     bare = replace(LEVITATING, floater=replace(LEVITATING.floater, conductivity=None))

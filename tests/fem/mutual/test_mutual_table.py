@@ -101,6 +101,7 @@ def test_from_a_millimetre_off_contact_on_cubes_are_met_to_a_thousandth(rotor):
         assert max(worst) < 1e-3
 
 
+@pytest.mark.slow
 def test_few_nodes_do_at_any_distance():
     """What a cube responds to a dipole, by 10 nodes along an edge and by 28: 7e-4 of it at most, near a face."""
     (cube,) = canonical(MAGNETS)

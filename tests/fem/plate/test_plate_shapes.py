@@ -32,6 +32,7 @@ def test_sphere_in_a_uniform_field(frequency):
     assert found == pytest.approx(polarizability(0.01, SIGMA, frequency), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_disc_in_a_weak_axial_field():
     """j = -iωσ r B/2 where the currents' own field is weak, whatever the thickness: m = -iωσ π R⁴ t B/8.
 
