@@ -42,7 +42,7 @@ from ..geometry.files import MOST, closed, hdf5_fault, ours, regular_file, seal,
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
     "rotor": 11,
-    "mutual": 16,
+    "mutual": 17,
     "map": 3,
     "plate": 2,
     "driven-plate": 3,

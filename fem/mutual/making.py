@@ -115,7 +115,7 @@ OBLIQUE = (
 )
 # Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
 # many places the rotor's response to the sphere's is
-EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 5000, 5.0, 6, 6, 3
+EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
 # Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, of two whose
 # points have weights of their own, and of others
 SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
