@@ -112,6 +112,7 @@ def working_point_answer(found: xr.Dataset) -> dict[str, Any]:
 
 
 def working_point_lines(answer: Mapping[str, Any]) -> list[str]:
+    """How far down each magnet's field goes along its easy axis, and whether it demagnetises."""
     lines = [] if answer["floater_position_mm"] is not None else ["The floater has no equilibrium: it is left out."]
     for one in answer["working_points"]:
         text = (

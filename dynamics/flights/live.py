@@ -43,7 +43,7 @@ class LiveFlight:
             raise InputError("Input drive must have no center_mm and no axis in live motion; instead it has.")
         start, currents = initial_state(scene, table, equilibria, memory)
         self.scene = scene
-        flight = Flight(scene, table, np.inf, None, True, memory)
+        flight = Flight(scene, table, np.inf, tolerance=None, compact=True, memory=memory)
         self._course = flight.begin(start, np.inf, currents, offset=flight.offset)
         flight.part(flight.degree(self._course.values))  # compiled now, so that the first piece is not late
         self._check_range(self.now.position)

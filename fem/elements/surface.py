@@ -36,7 +36,7 @@ from ..harmonics.interior import sphere
 from ..harmonics.solid import FOUR_PI, gauss_legendre, members, orthonormal
 
 INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
-DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and columns that are made at once
+DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and fields otherwise at once
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
 TURNS = 25  # of magnets' responses to each other; with χ up to 1/2 they settle to that in fewer
 # Distance from a face, in edges by the nodes along them, from which on the nodes' own rule does: nodes are at most
@@ -46,7 +46,7 @@ MORE = 2  # times as many nodes along an edge for moments as for charges
 KINKS = 0.2  # gap, in edges, from which on a neighbour's edges make no kink in the charges
 FINE = 10  # nodes of the rule for a product beyond those along an edge
 ROWS = 1 << 20  # numbers at once in such a rule
-PAIRS = 1 << 15  # of pairs of a charge and a place, so that they stay in the processor's cache
+PAIRS = 1 << 15  # of a charge and a place at once, so that they stay in the processor's cache
 TOGETHER = 1e-14  # square of a distance, by those from the axes' origin, below which two nodes are one
 ROUND_OFF = 1e-13  # of a line's half: no place is nearer to a node than that
 WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near the axis, too

@@ -404,6 +404,7 @@ def gather(parts: Sequence[xr.Dataset]) -> xr.Dataset:
 
 
 def measured_numbers(result: xr.Dataset) -> dict[str, Any]:
+    """What was measured and computed of each experiment, and of TEAM problem 28 its motion and sensitivities."""
     keys = "name", "kind", "unit", "measured", "measured_error", "measured_error_from", "computed", "error"
     rows = zip(*(result[key].values.tolist() for key in keys), strict=True)
     found: dict[str, Any] = {"experiments": [dict(zip(keys, row, strict=True)) for row in rows]}

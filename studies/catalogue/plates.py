@@ -384,6 +384,7 @@ def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
 
 
 def team7_lines(result: xr.Dataset) -> list[str]:
+    """How far each line of the problem is off, and what of that one turn of all phases explains."""
     lines = ["TEAM workshop problem 7, B_z on y = 72, z = 34 mm: deviation in per cent of the line's peak"]
     size = 100 * abs(result["deviation"])
     every = {str(curve): size.sel(curve=curve) for curve in size["curve"].values}

@@ -60,7 +60,7 @@ LASTING: Columns = {
 
 
 def map_points(quick: bool) -> list[Point]:
-
+    """Rotors by their measures and models; trajectories and the plate for those whose levitation is known."""
     rotors = {name: (value,) for name, value in article.QUICK_ROTORS} if quick else MEASURES
     return [
         {

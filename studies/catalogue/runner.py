@@ -73,6 +73,7 @@ def read_result(path: Path) -> xr.Dataset:
 
 
 def figures_of(result: xr.Dataset) -> Mapping[str, Figure]:
+    """Figures of a study's or a command's result by name. Raises InputError: it is of none that is known."""
     kind = str(result.attrs["study"])
     if kind in CATALOGUE:
         return {name: draw(result) for name, draw in CATALOGUE[kind].figures.items()}
@@ -155,6 +156,7 @@ def failed_points(result: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def failure_lines(result: xr.Dataset) -> list[str]:
+    """Which points of a sweep have no value, and why."""
     return [f"No value at {json.dumps(f['point'], ensure_ascii=False)}: {f['reason']}" for f in failed_points(result)]
 
 

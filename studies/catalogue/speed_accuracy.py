@@ -165,6 +165,7 @@ ERRORS: Columns = {
 
 
 def cube(problem: str) -> tuple[Magnet, ...]:
+    """The article's cube with the permeability of a problem."""
     return horizontal(0.0, EDGE, REMANENCE, PERMEABILITIES[problem])
 
 

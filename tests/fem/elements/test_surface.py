@@ -302,8 +302,9 @@ def test_errors_by_nodes(name):
 
 @pytest.mark.parametrize("mu", [1.05, 1.5, 3.0])
 def test_too_many_nodes_to_factorise_have_the_charges_that_factors_give(monkeypatch, mu):
-    """In a few turns of responses to each other, or where these do not settle field by field."""
-    surfaces = SurfaceCharges(halbach(4, 1.0, mu), 3)
+    """In a few turns of responses to each other, or where these do not settle field by field; some are far away."""
+    surfaces = SurfaceCharges((*halbach(4, 1.0, mu), box(center=(0, 4, 0), mu=mu), box(center=(9, 0, 9), mu=mu)), 3)
+    assert set(surfaces._distance.ravel()) == {0, 1, 2}  # all of the ways in which charges see each other
     field = np.random.default_rng(6).normal(size=(len(surfaces.places), 7))
     factorised = surfaces.response(field)
     monkeypatch.setattr(surface, "DENSE", 0)

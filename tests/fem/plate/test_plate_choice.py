@@ -8,7 +8,7 @@ from places import HORIZONTAL
 
 from spinlev.fem.plate.choice import plate_around, resolve_plate_model
 from spinlev.fem.plate.eddy import plate_reaction
-from spinlev.fem.plate.slab import EDGES, Slab, edge_error, measured_edge_error, reaction_tensor
+from spinlev.fem.plate.slab import EDGES, Slab, cached_edge_error, edge_error, measured_edge_error, reaction_tensor
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.shapes import Box, Cylinder
@@ -81,6 +81,40 @@ def test_measured_edges_fade_as_the_plate_grows_and_are_below_the_bound():
     narrow, wide = (measured_edge_error(plate, PLACE[None], 100.0) for plate in plates)
     assert 0 < wide < narrow / 1.5
     assert wide < edge_error(plates[1], PLACE) / 2
+
+
+def test_neighbours_share_a_measurement_which_is_told_once(monkeypatch):
+    """Also a floater of half a millimetre beside the plate: where it is measured is outside of that, and nearby."""
+    plate, seen, said = Plate(Box((0.0431, 0.05, 0.01)), 3.5e7), [], []
+
+    def measured(plate, places, frequency):
+        seen.append(places[0])
+        return 0.1
+
+    monkeypatch.setattr("spinlev.fem.plate.slab.measured_edge_error", measured)
+    for frequency in (100.0, 104.0):
+        for height in (0.0203, 0.0206):
+            assert cached_edge_error(plate, np.array([[0.0, 2e-4, height]]), frequency, said.append) == 0.1
+    assert len(seen) == len(said) == 1
+    for gap in (5e-5, 4e-4, 1.4e-3):
+        place = np.array([1e-4, 0.0, 0.005 + gap])
+        cached_edge_error(plate, place[None], 100.0, said.append)
+        assert np.abs(seen[-1] - place).max() <= gap / 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(0.1, 0.24, 0.03), (0.05, 0.05, 0.01)])
+@pytest.mark.parametrize("gap", [3e-3, 12e-3])
+def test_what_neighbours_share_errs_by_little(size, gap):
+    """Between places that are rounded alike, at most half a step along each axis from where it is measured."""
+    plate, rotor = Plate(Box(size), 3.5e7), np.array([0.0, 0.0, size[2] / 2 + gap + 0.02])
+    place, half = np.array([1e-3, 0.0, size[2] / 2 + gap]), min(1e-3, 0.1 * gap) / 2
+    shared = measured_edge_error(plate, np.array([place, rotor]), 100.0)
+    off = [*(half * np.eye(3)), *(-half * np.eye(3)), half * np.ones(3)]
+    found = [measured_edge_error(plate, np.array([place + d, rotor]), 100.0) for d in off]
+    found += [measured_edge_error(plate, np.array([place, rotor]), 100.0 * 2.0 ** (s / 8)) for s in (-1, 1)]
+    print(f"\n{size}, {gap}: {np.round(np.array(found) / shared - 1, 3)}")
+    assert np.abs(np.array(found) / shared - 1).max() < 0.06
 
 
 def test_what_lies_beyond_a_round_edge_counts():

@@ -1,6 +1,7 @@
 """The command line as a user sees it: keys, files, messages and exit statuses."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -209,3 +210,15 @@ def test_plate_takes_a_place_that_begins_with_a_minus(spinlev):
     status, out, err = spinlev("plate", scene, "--at", "-5,0,-20", "--frequency-hz", "130", "--model", "slab", "--json")
     assert status == 0, err
     assert np.shape(json.loads(out)["G_T_per_A_m2"]["imag"]) == (3, 3)
+
+
+@pytest.mark.parametrize(("own", "left"), [({}, "1 1"), ({"OMP_NUM_THREADS": "2"}, "2 1")])
+def test_a_command_computes_in_one_thread_unless_the_user_says_otherwise(own, left):
+    names = ("OMP_NUM_THREADS", "NGS_NUM_THREADS")
+    code = (
+        "import os, sys, atexit; from spinlev.studies.cli.start import main; sys.argv = ['spinlev', '--version']; "
+        f"atexit.register(lambda: print(*(os.environ[name] for name in {names}))); main()"
+    )
+    environment = {name: value for name, value in os.environ.items() if name not in names}
+    answer = subprocess.run([sys.executable, "-c", code], env=environment | own, capture_output=True, text=True)
+    assert answer.stdout.splitlines()[-1] == left
