@@ -322,10 +322,8 @@ def _whole(scene: Scene, starts: State) -> State:
 def _ended(
     scene: Scene, table: FieldTable, duration: float, memory: PlateMemory | None, currents: Array | None, given: Begun
 ) -> Endings:
-    flight, (starts, offset) = (
-        Flight(scene, table, duration, tolerance=None, compact=True, memory=memory, in_balls=True),
-        given,
-    )
+    starts, offset = given
+    flight = Flight(scene, table, duration, tolerance=None, compact=True, memory=memory, in_balls=True)
     passengers = list[_Passenger]()
     for k in range(len(starts.position)):
         left = settled_currents(scene, memory, starts[k]) if memory and currents is None else currents
