@@ -14,7 +14,7 @@ from spinlev.dynamics.motion.rates import Rates
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.scene.files import load_scene
-from spinlev.studies.cli.options import Models, default_scene, shipped_scene
+from spinlev.studies.cli.options import Models, shipped_scene
 from spinlev.studies.gradient import ANSWERS, Gradient
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.page.state import first_state
@@ -105,7 +105,7 @@ def test_one_equilibrium(benchmark, model):
 )
 def test_slider(benchmark):
     """Equilibria and stability by both models from those of a scene nearby, and what the page shows of them."""
-    state = first_state(load_scene(default_scene()))
+    state = first_state(load_scene(shipped_scene()))
     near = preview(state, patient=True).places  # the tables are in the cache from here on
     found = benchmark.pedantic(preview, (state.changed("rotor.angle_deg", 10.2), near), rounds=10, warmup_rounds=1)
     assert [one.stability for one in found.models] == ["stable", "stable"]

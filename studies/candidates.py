@@ -26,9 +26,10 @@ from ..geometry.common import Array, ComputationError, InputError, SpinlevError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, scene_numbers
 from .cli.options import FieldModel, Models
-from .gradient import Gradient, derivative
+from .gradient import Gradient
 from .levitation import Levitation
-from .result import IN_JSON
+from .nearby_scenes import NearbyScenes
+from .result import MODES
 
 MAGNET_DENSITY = 7500.0  # kg/m³, of a rotor's magnets, whose scene file has none: sintered neodymium
 # Ways to a scene that Newton's method does not reach at once are halved so often, but none that is so small a part of
@@ -122,14 +123,19 @@ class Candidate:
             return _gap_mm(scene, known)
         if name in OF_SCENE:
             return np.array([OF_SCENE[name](scene)])
-        stem, scale = _answer(name)
-        return np.array([getattr(known, stem) / scale])
+        if name in ENDS:
+            return np.array([self.ends[ENDS.index(name)].parameter])
+        if name in MODE_OF:
+            modes = {mode.name: (-mode.growth_per_s, mode.frequency_hz) for mode in known.modes}
+            return np.array([modes.get(MODE_OF[name], (np.nan, np.nan))[name.endswith(FREQUENCY)]])
+        return np.array([OF_EQUILIBRIUM[name](known)])
 
     def slopes(self, name: str) -> Array:
         """Derivatives (k, key) of the same."""
         scene, known = self.gradient.scene, self.known
+        nearby = NearbyScenes(self.levitation, scene, averaged=False, with_plate=False)
         if name in OF_SCENE:
-            return self._of_scenes(lambda there: np.array([OF_SCENE[name](there)]))
+            return np.array([[nearby.of_scenes(key, OF_SCENE[name]) for key in self.keys]])
         if name == "margin":
             own = np.array([key == "frequency_hz" for key in self.keys])
             relative = np.array([end.parameter for end in self.ends])[:, None] / scene.frequency
@@ -138,10 +144,14 @@ class Candidate:
         if name == "decay_per_s":
             return -np.array([[way.modes[mode.name].real for way in ways] for mode in known.modes])
         if name == "gap_mm":
-            own = self._of_scenes(lambda there: _gap_mm(there, known))
-            return np.asarray(own + np.array([way.of(lambda one: _gap_mm(scene, one)) for way in ways]).T)
-        stem, scale = _answer(name)
-        return np.array([[np.asarray(derivative(known, way, stem.removesuffix("_deg"))) / scale for way in ways]])
+            alone = [nearby.of_scenes(key, lambda there: _gap_mm(there, known)) for key in self.keys]
+            return np.transpose(alone + np.array([way.of(lambda one: _gap_mm(scene, one)) for way in ways]))
+        if name in ENDS:
+            return np.asarray(self.ends_by[[ENDS.index(name)]])
+        if name in MODE_OF:
+            rates = np.array([[way.modes[MODE_OF[name]] for way in ways]])
+            return rates.imag / (2 * np.pi) if name.endswith(FREQUENCY) else -rates.real
+        return np.array([[way.of(OF_EQUILIBRIUM[name]) for way in ways]])
 
     @cached_property
     def ends_by(self) -> Array:
@@ -152,17 +162,18 @@ class Candidate:
             rows.append([0.0 if end.kind == frequencies.BORDER else there.end_by(end, key)[0] for key in self.keys])
         return np.array(rows)
 
-    def _of_scenes(self, quantity: Callable[[Scene], Array]) -> Array:
-        """Derivatives (k, key) of what the scene decides alone, by central differences."""
-        columns = []
-        for key in self.keys:
-            number = self.gradient.numbers[key]
-            step = 1e-4 * (abs(number) or 1.0)
-            ends = [quantity(changed(self.gradient.scene, {key: number + s * step})) for s in (1, -1)]
-            columns.append((ends[0] - ends[1]) / (2 * step))
-        return np.array(columns).T
 
-
+# Measures by their names: ends of the stable frequencies, frequencies and decay rates of modes, and others
+ENDS = ("lowest_hz", "highest_hz")
+FREQUENCY, DECAY = "_hz", "_decay_per_s"
+NAMES = ("axial", "backward_whirl", "forward_whirl", "precession", "nutation")
+MODE_OF = {f"{name}{end}": mode for end in (FREQUENCY, DECAY) for name, mode in zip(NAMES, MODES, strict=True)}
+OF_EQUILIBRIUM: Mapping[str, Callable[[Equilibrium], float]] = {
+    "distance_mm": lambda known: 1e3 * known.distance,
+    "depth_mm": lambda known: -1e3 * float(known.position[2]),
+    "lateral_offset_mm": lambda known: 1e3 * known.lateral_offset,
+    "polar_angle_deg": lambda known: known.polar_angle_deg,
+}
 OF_SCENE: Mapping[str, Callable[[Scene], float]] = {
     "frequency_hz": lambda scene: scene.frequency,
     "floater_mass_g": lambda scene: 1e3 * scene.floater.mass,
@@ -174,10 +185,8 @@ def _gap_mm(scene: Scene, known: Equilibrium) -> Array:
     return 1e3 * np.array([rotor_gap(scene, known.position, known.state.orientation)])
 
 
-def _answer(name: str) -> tuple[str, float]:
-    if name.endswith("_deg"):
-        return name, 1.0
-    return name.removesuffix("_mm"), IN_JSON["m"][1]
+def _pose(known: Equilibrium) -> Array:
+    return np.stack([known.position, known.state.moment])
 
 
 class Search:
@@ -261,18 +270,17 @@ class Search:
             levitation = self._levitation(numbers)
             levitation.share(near.levitation, changed=True)
             bare, step = near.bare, numbers - begun
-            place, moment = bare.position, bare.state.moment
+            pose = _pose(bare)
             if "ways" in near.__dict__:  # where the tangent leads
-                ways = [near.ways[key] for key in self.keys]
-                place = place + sum(s * way.of(lambda e: e.position) for s, way in zip(step, ways, strict=True))
-                moment = moment + sum(s * way.of(lambda e: e.state.moment) for s, way in zip(step, ways, strict=True))
+                pose = pose + sum(s * near.ways[key].of(_pose) for s, key in zip(step, self.keys, strict=True))
+            place, moment = pose
             survey = survey_near(levitation, place[None], (moment / np.linalg.norm(moment))[None])
-            if survey is None and levitation.scene.floater.is_sphere and not levitation.scene.gravity[:2].any():
-                return None
             if survey is not None:
                 if np.linalg.det(survey.equilibria[0].slope) * np.linalg.det(bare.slope) < 0:
                     return None  # it is beyond the fold in which both meet
                 levitation.adopt(survey)
+            elif levitation.scene.floater.is_sphere and not levitation.scene.gravity[:2].any():
+                return None
             found = nearest_of(levitation.equilibria, place)
             return None if found is None else Candidate(levitation, found, self.keys, near, step)
         except SpinlevError:

@@ -12,6 +12,7 @@ from ..fem.closed_forms.coil import coils_field
 from ..fem.plate.floating import FloatingModes, FreeModes, Levitated, cached_floating_modes
 from ..geometry.common import Array
 from ..geometry.scene.contents import Scene
+from ..geometry.scene.files import scene_text
 from .cli.console import note
 from .cli.options import Answer
 from .figures.style import PALETTE, drawn, panels, save_figures
@@ -59,7 +60,7 @@ def coils_summary(scene: Scene, duration: float, modes: FloatingModes | FreeMode
     said = {"ended_by": motion.ended_by, "energy_error": motion.energy_error}
     levitated = float(motion.time[-1])
     place = [*(1e3 * scene.coils[0].center[:2]).tolist(), 1e3 * height]
-    return xr.Dataset(found, axes, {"study": "coils", **said}), {
+    return xr.Dataset(found, axes, {"study": "coils", "scene": scene_text(scene), **said}), {
         "model": "fem",
         "error_estimate": modes.error,
         "levitated_s": levitated,
@@ -77,7 +78,7 @@ def coils_job(scene: Scene, duration: float, rtol: float, out: Path) -> Answer:
     modes, cached = modes_of(scene, rtol)
     result, values = coils_summary(scene, duration, modes)
     path = out / "trajectory.nc"
-    write_dataset(result, path, scene)
+    write_dataset(result, path)
     save_figures({"trajectory": coils_figure(result)}, out)
     values |= {"trajectory": str(path), "tables_from_cache": ["floating"] if cached else []}
     mean = values["levitation_position_mm"]

@@ -12,10 +12,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ..dynamics.continuation.branch import BranchPoint
-from ..dynamics.continuation.frequencies import branch_through, levitates, on_branch, stable_ranges
-from ..dynamics.equilibria.equilibrium import CRITERION, STABILITIES, Equilibrium, EquilibriumError, Survey, nearest_of
+from ..dynamics.continuation.frequencies import levitates, on_branch, stable_ranges
+from ..dynamics.equilibria.equilibrium import CRITERION, STABILITIES, Equilibrium, Survey, nearest_of
 from ..dynamics.flights.flight import most_like_levitation
-from ..dynamics.motion.state import Scales
 from ..fem.rotor.models import of_true_moment
 from ..geometry.common import Array, InputError
 from ..geometry.files import write_whole
@@ -25,7 +24,7 @@ from ..geometry.solids import Part
 from .cli.console import aligned, note, to_json
 from .cli.options import Answer, FieldModel, Models
 from .figures.style import COLORS, NAMES, PALETTE, drawn, panels, save_figures
-from .levitation import Levitation
+from .levitation import Levitation, branch_of
 from .plan import PlatePlan, sources
 from .result import variable, write_dataset
 from .words import bracketed, worth_a_row
@@ -144,19 +143,13 @@ def _nearest(equilibria: Sequence[Equilibrium], to: Equilibrium | None) -> Equil
 
 def _with_branch(one: Compared) -> Compared:
     """The same with the branch of its equilibrium, where gravity is along the axis, so that there is one."""
-    scene = replace(one.levitation.scene, plate=None)
-    here = _nearest(one.levitation.without_plate.equilibria, one.found)
-    if here is None or scene.gravity[:2].any():
+    frequency, here = one.levitation.scene.frequency, _nearest(one.levitation.without_plate.equilibria, one.found)
+    if here is None:
         return one
-    start = Scales.of(scene).pack(here.state)
-    try:
-        points = branch_through(scene, one.levitation.rates, start, scene.frequency, one.levitation.spin)
-    except EquilibriumError as error:
-        note(f"The range of stable frequencies is not known: {error}")
-        return one
+    points = branch_of(one.levitation, here, "The range of stable frequencies is")
     ranges = [(run.low.parameter, run.high.parameter) for run in stable_ranges(points)]
-    apart = [max(low - scene.frequency, scene.frequency - high) for low, high in ranges]
-    return replace(one, branch=tuple(points), stable=ranges[int(np.argmin(apart))] if ranges else None)
+    nearest = min(ranges, key=lambda ends: max(ends[0] - frequency, frequency - ends[1]), default=None)
+    return replace(one, branch=points, stable=nearest)
 
 
 def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None) -> xr.Dataset:
@@ -279,7 +272,7 @@ def compare_job(scene: Scene, requested: Models, spin: float, frequencies: Array
     """Results as of `compared`, at `frequencies` (n,) Hz too; writes compare.nc, .json and the figure to `out`."""
     rows = compared(scene, requested, spin)
     best = rows[-1]
-    result = compared_dataset(rows, frequencies)
+    result = compared_dataset(rows, frequencies).assign_attrs(scene=scene_text(scene))
     values: dict[str, Any] = {
         "models": [row.row() for row in rows],
         "frequency_hz": scene.frequency,
@@ -292,7 +285,7 @@ def compare_job(scene: Scene, requested: Models, spin: float, frequencies: Array
         branches = 1e3 * result["branch_distance"].values
         values["frequencies_hz"] = frequencies
         values["distances_mm"] = {row.name: branches[k] for k, row in enumerate(rows)}
-    write_dataset(result, out / "compare.nc", scene)
+    write_dataset(result, out / "compare.nc")
     write_whole(out / "compare.json", f"{to_json(values)}\n".encode())
     save_figures({"compare": compare_figure(result)}, out)
     return values, [*compare_words(rows), f"Figure and numbers in {out}/compare.png, .pdf, .nc and .json"]

@@ -13,6 +13,7 @@ from ..dynamics.flights.flight import most_like_levitation
 from ..fem.rotor.working_point import EasyField, easy_axis, working_points
 from ..geometry.common import InputError
 from ..geometry.files import write_whole
+from ..geometry.scene.files import scene_text
 from .cli.console import note, to_json
 from .cli.options import Answer
 from .figures.run import working_point_figure
@@ -85,7 +86,11 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
     return xr.Dataset(
         columns(COLUMNS, values),
         {"magnet": ("magnet", np.array(numbers) + 1), "axis": list(AXIS), "share": share},
-        {"study": "working-point", "title": "Field along the easy axes of the rotor's magnets, rotor's frame"},
+        {
+            "study": "working-point",
+            "title": "Field along the easy axes of the rotor's magnets, rotor's frame",
+            "scene": scene_text(scene),
+        },
     )
 
 
@@ -134,7 +139,7 @@ def working_point_lines(answer: Mapping[str, Any]) -> list[str]:
 def write_working_point(levitation: Levitation, out: Path) -> tuple[dict[str, Any], list[str], list[str]]:
     """Write working-point.nc and its picture; returns the numbers, lines for a person, and the files."""
     found = working_point_dataset(levitation)
-    write_dataset(found, out / "working-point.nc", levitation.scene)
+    write_dataset(found, out / "working-point.nc")
     files = [str(out / "working-point.nc"), *save_figures({"working-point": working_point_figure(found)}, out)]
     answer = working_point_answer(found)
     return answer, working_point_lines(answer), files

@@ -16,19 +16,17 @@ import scipy
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics.continuation.frequencies import branch_through, levitates
+from ..dynamics.continuation.frequencies import levitates
 from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
-from ..dynamics.motion.state import Scales
 from ..geometry.common import Array, ComputationError, InputError, SpinlevError, check_names, shown
 from ..geometry.files import write_whole
-from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, load_scene, scene_numbers, scene_text, toml_tables
 from .candidates import OF_SCENE, Candidate, Limits, Search, survey_near
 from .cli.console import note, to_json
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
 from .figures.style import PALETTE, drawn, panels, plot_branch, save_figures
 from .gradient import Gradient
-from .levitation import Levitation
+from .levitation import Levitation, branch_of
 from .nearby_scenes import unknown_over_plate
 from .plan import SceneLike
 from .result import label_of_key, variable, write_dataset
@@ -158,14 +156,11 @@ class _Problem:
             return np.zeros(len(z))
         return -np.eye(len(z))[-1] if self.raised else np.asarray(-self.sense * self.slopes(z, self.name)[0])
 
-    def excess(self, z: Array, name: str, end: float, sign: int, equal: bool) -> Array:
+    def excess(self, z: Array, name: str, end: float | None, sign: int, equal: bool) -> Array:
+        """By how much a measure is more than its end, or, without one, than the bound that is raised."""
         if (value := self.values(z, name, sign)) is None:
             return np.full(self._count(name) if sign > 0 else 1, FAILED if equal else -FAILED)
-        return sign * (value - end / self.sizes[name])
-
-    def above(self, z: Array) -> Array:
-        value = self.values(z, self.name)
-        return np.full(self._count(self.name), -FAILED) if value is None else value - z[-1]
+        return sign * (value - (z[-1] if end is None else end / self.sizes[name]))
 
     def keep(self, z: Array) -> None:
         """Remember a scene that meets all limits, or else how near it comes to that."""
@@ -194,17 +189,15 @@ class _Problem:
         z = (search.at_near - search.low) / self.width
         if self.raised:
             z = np.append(z, float(search.near.values(self.name).min()) / self.sizes[self.name])
-        constraints: list[dict[str, Any]] = [
+        raised = np.eye(len(z))[-1]
+        constraints = [
             {
-                "type": "eq" if row[3] else "ineq",
-                "fun": lambda z, row=row: self.excess(z, *row),
-                "jac": lambda z, row=row: row[2] * self.slopes(z, row[0], row[2]),
+                "type": "eq" if equal else "ineq",
+                "fun": lambda z, row=(name, end, sign, equal): self.excess(z, *row),
+                "jac": lambda z, row=(name, end, sign): row[2] * self.slopes(z, *row[::2]) - raised * (row[1] is None),
             }
-            for row in self.rows
+            for name, end, sign, equal in [*self.rows, *[(self.name, None, 1, False)] * self.raised]
         ]
-        if self.raised:
-            by = {"jac": lambda z: self.slopes(z, self.name) - np.eye(len(z))[-1]}
-            constraints.append({"type": "ineq", "fun": self.above, **by})
         self.keep(z)
         with suppress(_SettledError):
             scipy.optimize.minimize(
@@ -305,10 +298,6 @@ def design(
 
     Examples
     --------
-    >>> import spinlev as sl
-    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
-    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
-    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
     >>> free, limits = {"frequency_hz": (60.0, 130.0)}, {"gap_mm": (0.0, 12.0)}
     >>> found = sl.design(scene, "lowest frequency", free, limits, model="dipole")
     >>> round(float(found.number.sel(key="frequency_hz")[0]), 2)
@@ -319,7 +308,7 @@ def design(
     return designed(levitation, wanted, bounds, ends, points)
 
 
-def checked_goals(goals: object, free: object, limits: object, points: int) -> tuple[list[str], Limits, Limits]:
+def checked_goals(goals: object, free: object, limits: object, points: object) -> tuple[list[str], Limits, Limits]:
     """Goals, bounds of free numbers and limits as they are used. Raises InputError."""
     wanted = [goals] if isinstance(goals, str) else list(goals) if isinstance(goals, Sequence) else []
     if not 1 <= len(wanted) <= 2 or len(set(map(str, wanted))) < len(wanted):
@@ -424,7 +413,7 @@ def _dataset(
             "scene": (("point",), texts[1:]),
         },
         axes,
-        {"study": "designed", "goals": ", ".join(goals), **search.near.levitation.labels},
+        {"study": "designed", "goals": ", ".join(goals), "scene": texts[0], **search.near.levitation.labels},
     )
 
 
@@ -441,17 +430,12 @@ def _measured(levitation: Levitation, known: Equilibrium | None, keys: tuple[str
 
 def _curve(levitation: Levitation, known: Equilibrium | None) -> Array:
     """Frequencies, distances and stability (3, `CURVE`) along the branch of an equilibrium; NaN where there is none."""
-    scene, found = replace(levitation.still, plate=None), np.full((3, CURVE), np.nan)
-    if known is None or scene.gravity[:2].any() or not scene.floater.round:
-        return found
-    start = Scales.of(scene).pack((known.without or known).start)
-    try:
-        points = branch_through(scene, levitation.rates, start, scene.frequency, levitation.spin)
-    except EquilibriumError:
-        return found
-    chosen = np.unique(np.linspace(0, len(points) - 1, CURVE).round().astype(int))
-    some = [(points[k].parameter, points[k].distance, levitates(points[k])) for k in chosen]
-    found[:, : len(some)] = np.array(some).T
+    found = np.full((3, CURVE), np.nan)
+    points = branch_of(levitation, known.without or known) if known and levitation.scene.floater.round else ()
+    if points:
+        chosen = np.unique(np.linspace(0, len(points) - 1, CURVE).round().astype(int))
+        some = [(points[k].parameter, points[k].distance, levitates(points[k])) for k in chosen]
+        found[:, : len(some)] = np.array(some).T
     return found
 
 
@@ -507,26 +491,17 @@ def design_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-TABLE = ("scene", "goals", "free", "limits", "points")
-
-
-def read_goals(path: Path) -> tuple[Scene, tuple[Any, ...]]:
-    """Scene and goals, bounds, limits and points of a file of goals. Raises InputError."""
-    table = toml_tables(path, "goals")
-    check_names(table, TABLE, "goals", f"keys of {path}")
+def design_job(path: Path, requested: Models, out: Path) -> Answer:
+    """The scene that a file of goals asks for, written as design.toml with design.nc, .json and its figure."""
+    table = {"points": 7, **toml_tables(path, "goals")}
+    check_names(table, ("scene", "goals", "free", "limits", "points"), "goals", f"keys of {path}")
     if not isinstance(table.get("scene"), str):
         raise InputError(
             f"Input scene must be the path of a scene file, in {path}; instead received {shown(table.get('scene'))}."
         )
-    wanted = checked_goals(table.get("goals"), table.get("free"), table.get("limits"), table.get("points", 7))
-    return load_scene(path.parent / table["scene"]), (*wanted, table.get("points", 7))
-
-
-def design_job(path: Path, requested: Models, out: Path) -> Answer:
-    """The scene that a file of goals asks for, written as design.toml with design.nc, .json and its figure."""
-    scene, (goals, bounds, limits, points) = read_goals(path)
-    levitation = Levitation(scene, requested)
-    result = designed(levitation, goals, bounds, limits, points)
+    wanted = checked_goals(*map(table.get, ("goals", "free", "limits", "points")))
+    levitation = Levitation(load_scene(path.parent / table["scene"]), requested)
+    result = designed(levitation, *wanted, table["points"])
     count, files = result.sizes["point"], list[str]()
     for k, text in enumerate(result["scene"].values):
         files.append(str(out / ("design.toml" if count == 1 else f"design-{k + 1}.toml")))
@@ -537,9 +512,9 @@ def design_job(path: Path, requested: Models, out: Path) -> Answer:
         "scene": files[0] if count == 1 else files,
         **{name: float(row[0]) if count == 1 else row for name, row in names.items()},
         "numbers": [dict(zip(keys, row, strict=True)) for row in result["number"].values.tolist()],
-        "goals": list(goals), **levitation.labels,
+        "goals": wanted[0], **levitation.labels,
     }  # fmt: skip
-    write_dataset(result, out / "design.nc", scene)
+    write_dataset(result, out / "design.nc")
     write_whole(out / "design.json", f"{to_json(values)}\n".encode())
     save_figures({"design": design_figure(result)}, out)
     said = f"Scene{'s' if count > 1 else ''} in {', '.join(files)}; figure and numbers in"

@@ -17,6 +17,7 @@ from ..fem.rotor.near_field import near_field
 from ..geometry.common import MU_0, Array, InputError
 from ..geometry.files import replacing
 from ..geometry.scene.contents import AbsoluteStart, Scene
+from ..geometry.scene.files import scene_text
 from .cli.console import note
 from .cli.options import Answer, Models
 from .coils import coils_at_start
@@ -192,7 +193,7 @@ def field_map_job(scene: Scene, plane: str, extent: Array | None, offset: float,
     twice the rotor's), `steps` the points along the longer side.
     """
     found = field_map(scene, plane, extent, offset, steps)
-    write_dataset(found, out / "field-map.nc", scene)
+    write_dataset(found, out / "field-map.nc")
     files = [str(out / "field-map.nc"), *save_figures({"field-map": field_map_figure(found)}, out)]
     files.append(str(out / "field-map.vtu"))
     places, cells = _lattice([found[plane[1]].values, found[plane[0]].values])
@@ -255,7 +256,7 @@ def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, ste
     }
     axes = {name: (name, line, {"units": "m"}) for name, line in zip(plane, (u, v), strict=True)}
     title = f"Field of the rotor{' and the coils' if scene.coils else ''} on a plane, in its frame at t = 0"
-    said = {"study": "field-map", "plane": plane, "offset_m": offset, "title": title}
+    said = {"study": "field-map", "plane": plane, "offset_m": offset, "title": title, "scene": scene_text(scene)}
     return xr.Dataset(data, {"model": list(MODELS), "component": list("xyz"), **axes}, said)
 
 

@@ -11,10 +11,9 @@ import scipy
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ..dynamics.equilibria.equilibrium import AXIAL, SIDE, TILT, Equilibrium
 from ..geometry.common import Array, ComputationError, InputError, shown
 from ..geometry.scene.files import changed, scene_numbers
-from .candidates import Candidate, Limits, Search
+from .candidates import DECAY, FREQUENCY, MODE_OF, Candidate, Limits, Search
 from .cli.options import FieldModel, Models, PlateModel, Requested, documented
 from .design import checked_free
 from .figures.style import PALETTE, drawn, panels
@@ -31,10 +30,6 @@ MEASURABLE: Mapping[str, tuple[str, str]] = {
     "lowest_hz": ("Hz", "lowest stable frequency"),
     "highest_hz": ("Hz", "highest stable frequency"),
 }
-ENDS = ("lowest_hz", "highest_hz")
-NAMES = {"axial": AXIAL, **dict(zip(("backward_whirl", "forward_whirl"), SIDE, strict=True)), **{n: n for n in TILT}}
-FREQUENCY, DECAY = "_hz", "_decay_per_s"
-MODE_OF = {f"{name}{end}": mode for end in (FREQUENCY, DECAY) for name, mode in NAMES.items()}
 TIME, HEIGHT = "time_s", "z_mm"  # columns of a track
 FEWEST, CLEAR = 16, 5.0  # points of a track at least; amplitude of an oscillation, by its error, that is one
 ERROR = "_error"  # what a column of standard deviations is called after that of its measure
@@ -176,7 +171,7 @@ class _Rows:
         """What is computed less what was measured, in standard deviations."""
         return np.concatenate([
             np.full(len(names), LOST) if known is None
-            else (np.array([_value(known, name) for name in names]) - measured) / deviations
+            else (np.concatenate([known.values(name) for name in names]) - measured) / deviations
             for known, names, measured, deviations in self._at(numbers)
         ])  # fmt: skip
 
@@ -187,38 +182,15 @@ class _Rows:
             parts.append(np.zeros((len(names), len(numbers))))
             if known is not None:
                 search.go_on_from(known, numbers)
-                parts[-1] += np.array([_slope(known, name) for name in names]).reshape(parts[-1].shape)
+                for row, name in zip(parts[-1], names, strict=True):
+                    row += known.slopes(name)[0]
                 parts[-1] /= deviations[:, None]
         return np.concatenate(parts)
 
     def computed(self, numbers: Array) -> Array:
         """(row, measure) all that the scenes answer; NaN where they have no equilibrium."""
         known = [search.at(numbers) for search in self.searches]
-        return np.array([[np.nan if one is None else _value(one, name) for name in self.measures] for one in known])
-
-
-def _value(known: Candidate, name: str) -> float:
-    if name in MODE_OF:
-        modes = [mode for mode in known.known.modes if mode.name == MODE_OF[name]]
-        return next((-m.growth_per_s if name.endswith(DECAY) else m.frequency_hz for m in modes), np.nan)
-    if name in ENDS:
-        return known.ends[ENDS.index(name)].parameter
-    return _depth(known.known) if name == "depth_mm" else float(known.values(name)[0])
-
-
-def _depth(known: Equilibrium) -> float:
-    return -1e3 * float(known.position[2])
-
-
-def _slope(known: Candidate, name: str) -> Array:
-    if name in MODE_OF:
-        rates = np.array([known.ways[key].modes[MODE_OF[name]] for key in known.keys])
-        return -rates.real if name.endswith(DECAY) else rates.imag / (2 * np.pi)
-    if name in ENDS:
-        return np.asarray(known.ends_by[ENDS.index(name)])
-    if name == "depth_mm":
-        return np.array([known.ways[key].of(_depth) for key in known.keys])
-    return np.asarray(known.slopes(name)[0])
+        return np.array([[np.nan if one is None else one.values(name)[0] for name in self.measures] for one in known])
 
 
 @documented
@@ -263,14 +235,10 @@ def fit(
 
     Examples
     --------
-    >>> import spinlev as sl
-    >>> cube = sl.tilt(angle_deg=9.0, edge_mm=10.0, remanence_T=1.3)
-    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.3, density_kg_m3=7500.0)
-    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
     >>> seen = {"frequency_hz": [110.0, 130.0, 150.0], "distance_mm": [21.2, 18.8, 17.1]}
     >>> found = sl.fit(scene, seen, {"rotor.angle_deg": (5.0, 20.0)}, model="dipole")
     >>> print(f"{float(found.estimate[0]):.2f} ± {float(found.error[0]):.2f}")
-    9.88 ± 0.21
+    9.95 ± 0.21
     """
     bounds = checked_free(free)
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
@@ -309,7 +277,7 @@ def fit(
             "measure": rows.measures, "setting": rows.keys, "end": ["least", "most"],
         },
         {"study": "fitted", "chi_squared": chi, "degrees_of_freedom": freedom, "deviations_given": int(rows.given),
-         **levitation.labels},
+         **levitation.about},
     )  # fmt: skip
 
 

@@ -57,8 +57,6 @@ def floater_force(
 
     Examples
     --------
-    >>> import spinlev as sl
-    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
     >>> disc = {"shape": "cylinder", "diameter_mm": 12.0, "height_mm": 6.0}
     >>> disc |= {"remanence_T": 1.305, "recoil_permeability": 1.0, "density_kg_m3": 7500.0}
     >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=disc)

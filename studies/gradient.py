@@ -24,11 +24,11 @@ from ..dynamics.motion.state import Scales, State
 from ..fem.rotor.choice import PERMEABLE
 from ..geometry.common import Array, InputError, check_names, shown
 from ..geometry.cutting import united
-from ..geometry.scene.files import changed, scene_numbers, scene_text
+from ..geometry.scene.files import scene_numbers
 from .cli.console import aligned
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented
 from .levitation import Levitation
-from .nearby_scenes import CENTRAL, NearbyScenes, unknown_over_plate
+from .nearby_scenes import NearbyScenes, unknown_over_plate
 from .plan import SceneLike
 from .result import IN_JSON, MODES, label_of_key, variable, write_dataset
 
@@ -136,19 +136,14 @@ class Gradient:
                 if point.kind != CONTACT:
                     return float(np.real(derivative(known, tangent, "growth")))
                 moved = tangent.of(lambda e: rotor_gap(self.scene, e.position, e.state.orientation))
-                return float(moved) + self._gap_by(known, by)
+                pose = known.position, known.state.orientation
+                return float(moved) + float(base.of_scenes(by, lambda scene: rotor_gap(scene, *pose)))
 
             one, other = implicit.by(nearby), implicit.by(by_frequency)
             assert one.lower is not None
             slope = excess(other, "frequency_hz")
             value, lower = -excess(one, key) / slope, -excess(one.lower, key) / slope
         return value, TRUNCATED * abs(value - lower) + END_FOUND * abs(value)
-
-    def _gap_by(self, known: Equilibrium, key: str) -> float:
-        """Derivative of the gap between floater and rotor by a number, the floater where it is."""
-        step = NearbyScenes(self.levitation, self.scene, False, False).step(key, self.numbers[key])
-        gaps = [(weight, changed(self.scene, {key: self.numbers[key] + k * step})) for k, weight, _ in CENTRAL]
-        return sum(w * rotor_gap(scene, known.position, known.state.orientation) for w, scene in gaps) / step
 
     def dataset(self, equilibria: Sequence[Equilibrium], of: Sequence[str], by: Sequence[str]) -> xr.Dataset:
         """Derivatives over `equilibrium` and `key`; NaN where they do not exist, with the reasons as an attribute."""
@@ -189,7 +184,7 @@ class Gradient:
         data["number"] = variable(("key",), [self.numbers[key] for key in by], "as the key", "number of the scene")
         axes = {"equilibrium": np.arange(len(equilibria)), "key": list(by), "mode": list(MODES), "axis": list("xyz")}
         axes["unit"] = ("key", [label_of_key(key)["units"] for key in by])
-        said = {"study": "gradient", "not_known": "; ".join(self.reasons.values()), **self.levitation.labels}
+        said = {"study": "gradient", "not_known": "; ".join(self.reasons.values()), **self.levitation.about}
         return xr.Dataset(data, axes, said)
 
     def with_errors(
@@ -380,10 +375,6 @@ def gradient(
 
     Examples
     --------
-    >>> import spinlev as sl
-    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
-    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
-    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
     >>> found = sl.gradient(scene, ["distance"], ["rotor.edge_mm"], model="dipole").isel(equilibrium=0)
     >>> round(1e3 * float(found.distance[0]), 3)  # mm by mm
     1.573
@@ -395,7 +386,7 @@ def gradient(
     keys = found.checked_keys(by)
     if not levitation.equilibria:
         raise EquilibriumError(f"At {levitation.scene.frequency:g} Hz the floater has no equilibrium to differentiate.")
-    return found.dataset(levitation.equilibria, names, keys).assign_attrs(scene=scene_text(levitation.scene))
+    return found.dataset(levitation.equilibria, names, keys)
 
 
 def _checked(name: str, given: Sequence[str], known: Collection[str], what: str) -> list[str]:
@@ -414,7 +405,7 @@ def gradient_job(levitation: Levitation, out: Path) -> Answer:
     if not levitation.equilibria:
         return {"gradient": []}, []
     result = found.dataset(levitation.equilibria, list(ANSWERS), found.checked_keys(None))
-    write_dataset(result, out / "gradient.nc", levitation.scene)
+    write_dataset(result, out / "gradient.nc")
     plain = {name: IN_JSON[unit] for name, (unit, _, dims) in ANSWERS.items() if not dims}
     rows: list[dict[str, Any]] = []
     for number in range(result.sizes["equilibrium"]):

@@ -65,8 +65,7 @@ def equilibria(
         The rotor is at rest and the floater does not spin about its moment.
     """
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
-    found = Result(levitation, levitation.survey).dataset()
-    return found.assign_attrs(study="equilibria", scene=scene_text(levitation.scene))
+    return Result(levitation, levitation.survey).dataset()
 
 
 @documented
@@ -97,15 +96,10 @@ def compare(
     ------
     EquilibriumError
         The rotor is at rest.
-    InputError
-        A frequency, a model, a tolerance or a file that cannot be used.
 
     Examples
     --------
-    >>> import spinlev as sl
-    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
-    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
-    >>> found = sl.compare(sl.scene(frequency_hz=130.0, rotor=cube, floater=ball), [120.0, 130.0])
+    >>> found = sl.compare(scene, [120.0, 130.0])
     >>> (1e3 * found.distance.sel(model=["dipole", "cuboid"])).round(2).values.tolist()
     [18.83, 19.1]
     """
@@ -144,7 +138,7 @@ def stability(
     """
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
     found = found_dataset((levitation.stability,)).isel(equilibrium=0, drop=True).drop_vars("number")
-    return found.assign_attrs(study="stability", scene=scene_text(levitation.scene), **levitation.labels)
+    return found.assign_attrs(study="stability", **levitation.about)
 
 
 @documented
@@ -181,14 +175,13 @@ def simulate(
     given = given_scene(scene)
     if given.carried_by_coils:
         modes, _ = modes_of(given, requested.get("plate_rtol", 1e-3))
-        return coils_summary(given, duration_s, modes)[0].assign_attrs(scene=scene_text(given))
+        return coils_summary(given, duration_s, modes)[0]
     given = given if drive is None else driven(given, drive)
     if given.companions:
         together = several(given, Models(model, plate_model, **requested).checked(), duration_s)
         return several_dataset(*together).assign_attrs(scene=scene_text(given))
     levitation = Levitation(given, Models(model, plate_model, **requested))
-    simulated = Result(levitation, flight=levitation.flight(duration_s)).dataset()
-    return simulated.assign_attrs(scene=scene_text(levitation.scene))
+    return Result(levitation, flight=levitation.flight(duration_s)).dataset()
 
 
 @documented
@@ -206,10 +199,10 @@ def rotor_table(
 
     Raises
     ------
-    InputError
-        A model, a tolerance or a file that cannot be used; of `evaluate`, a point on an edge of a magnet.
     AccuracyError
         The accuracy cannot be reached.
+    InputError
+        An argument or a file that cannot be used; of `evaluate`, a point on an edge of a magnet.
     """
     table = Levitation(scene, Models(model, rtol=rtol)).table
     return complete(table, max(rtol, NEAR_RTOL)) if isinstance(table, RotorTable) else table
@@ -242,15 +235,10 @@ def field_map(
     xarray.Dataset
         Over `model`, the two coordinates of the plane (m) and `component`: `B` (T), `H`, `M` (A/m), the relative
         `difference` from the finite elements, their stated `error` (T), and the number of the `magnet` at a place.
-
-    Raises
-    ------
-    InputError
-        A plane, an extent, a number of steps or a file that cannot be used.
     """
     if plane not in PLANES:
         raise InputError(f"Input plane must be one of {', '.join(PLANES)}; instead received {plane}.")
-    options.check_steps("steps", steps)
+    options.check_between("steps", steps, options.STEPS, whole=True)
     ends = None if extent_mm is None else 1e-3 * np.array([options.finite("extent_mm", end) for end in extent_mm])
     if ends is not None and not (len(ends) == 4 and ends[0] < ends[1] and ends[2] < ends[3]):
         said = "left, right, lower and upper end in rising order, mm"
@@ -301,10 +289,9 @@ def working_point(
     Raises
     ------
     InputError
-        No magnet has a polarisation, or a model, a tolerance or a file that cannot be used.
+        No magnet has a polarisation, or an argument or a file cannot be used.
     """
-    levitation = Levitation(scene, Models(model, rtol=rtol, interaction=interaction))
-    return working_point_dataset(levitation).assign_attrs(scene=scene_text(levitation.scene))
+    return working_point_dataset(Levitation(scene, Models(model, rtol=rtol, interaction=interaction)))
 
 
 @documented
@@ -359,10 +346,6 @@ def ensemble(
 
     Examples
     --------
-    >>> import spinlev as sl
-    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
-    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
-    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
     >>> flights = sl.ensemble(scene, {"offset_mm": [[0, 0, 0.1], [0, 0, 9.0]]}, 0.2, model="dipole")
     >>> flights.ended_by.values.tolist()
     ['duration', 'contact']
@@ -391,8 +374,8 @@ def ensemble(
     if known.plate is not None:
         text = "whether it left the plate's table"
         data["left_plate_table"] = variable(("flight",), found.left_plate_table, "1", text)
-    said = {"study": "ensemble", "scene": scene_text(levitation.scene), "duration_s": duration_s}
-    return xr.Dataset(data, {"axis": list(AXIS)}, {**said, **known.labels, **drawn})
+    said = {"study": "ensemble", "duration_s": duration_s, **known.labels, "scene": scene_text(levitation.scene)}
+    return xr.Dataset(data, {"axis": list(AXIS)}, {**said, **drawn})
 
 
 @documented
@@ -434,8 +417,6 @@ def sweep(
 
     Raises
     ------
-    InputError
-        A key, a value or a model that is not allowed.
     SweepError
         No point could be computed.
     """
@@ -475,8 +456,6 @@ def run_study(
 
     Raises
     ------
-    InputError
-        The name is unknown.
     SweepError
         No point could be computed.
     """

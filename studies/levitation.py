@@ -34,6 +34,7 @@ from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
 from ..geometry.common import Array, SpinlevError, Watch, unwatched
 from ..geometry.scene.contents import AbsoluteStart, Plate
+from ..geometry.scene.files import scene_text
 from ..geometry.solids import moved
 from . import plan as plans
 from .cli.console import detail, note, progress, stages
@@ -128,6 +129,11 @@ class Levitation:
     def labels(self) -> dict[str, str]:
         plate = self.plate.model if self.plate else "none"
         return {"model": self.table.model, "plate_model": plate, "interaction": self.interaction_model}
+
+    @property
+    def about(self) -> dict[str, str]:
+        """Attributes of every result: its models and the text of its scene."""
+        return {**self.labels, "scene": scene_text(self.scene)}
 
     # The rotor's field and what else acts
 
@@ -285,13 +291,7 @@ class Levitation:
         chosen = None if moved else _first(self.without_plate.equilibria)
         if chosen is None or chosen.kind == LOCKED:  # no branch of these is followed
             return ()
-        mean, scene = self.mean, self.mean.still
-        start = Scales.of(scene).pack(chosen.start)
-        try:
-            return tuple(branch_through(scene, mean.rates, start, scene.frequency, self.spin))
-        except EquilibriumError as error:
-            note(f"Equilibria at other frequencies are not known: {error}")
-            return ()
+        return branch_of(self.mean, chosen, "Equilibria at other frequencies are")
 
     @cached_property
     def beyond_fold(self) -> tuple[BranchPoint, ...]:
@@ -517,6 +517,22 @@ def _seen(plate: Plate, simulated: Trajectory, most: int | None = None) -> Array
     height = plate_depth(plate, simulated.time)  # the plate may be lowered
     places = simulated.lab.position + np.column_stack([np.zeros((len(height), 2)), height])
     return np.asarray(places[:: max(1, len(places) // most) if most else 1])
+
+
+def branch_of(levitation: Levitation, known: Equilibrium, words: str = "") -> tuple[BranchPoint, ...]:
+    """Equilibria without plate against the frequency through one of a `levitation`, which is `known`.
+
+    None where they cannot be followed, or gravity is not along the axis; a message that begins with `words` says why.
+    """
+    scene = levitation.still
+    if scene.gravity[:2].any():
+        return ()
+    start = Scales.of(scene).pack(known.start)
+    try:
+        return tuple(branch_through(scene, levitation.rates, start, scene.frequency, levitation.spin))
+    except EquilibriumError as error:
+        note(f"{words} not known: {error}") if words else None
+        return ()
 
 
 def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:

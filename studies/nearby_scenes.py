@@ -27,7 +27,7 @@ from ..fem.rotor.floater import floater_sources
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import MovedLosses, RotorLosses, cached_rotor_losses
 from ..geometry.common import Array, InputError
-from ..geometry.scene.contents import Plate, Scene
+from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import changed, scene_numbers
 from ..geometry.scene.messages import SceneError
 from .cli.console import note
@@ -103,6 +103,10 @@ class NearbyScenes:
                     for k, weight, lower in steps
                 ]
         raise InputError(f"Input {key} must have room to change for a derivative; instead it has none.")
+
+    def of_scenes(self, key: str, quantity: Callable[[Scene], Any]) -> Any:
+        """Derivative by a number of a quantity that the scene decides alone."""
+        return sum(weight * quantity(scene) for _, weight, _, scene in self._scenes(key))
 
     @cached_property
     def setting(self) -> Setting:
@@ -196,18 +200,17 @@ class NearbyScenes:
         table = self.levitation.table
         if not wanted or memory is None or requested is None or not isinstance(table, RotorTable):
             return
-        others, weights = list[tuple[Plate, RotorTable]](), list[list[float]]()
-        for key in wanted:
-            scenes = self._scenes(key)
-            weights.append([weight for _, weight, _, _ in scenes])
-            for *_, scene in scenes:
-                assert scene.plate is not None
-                others.append((replace(memory.plate, body=scene.plate.body), changed_table(table, scene.rotor)))
+        near = {key: self._scenes(key) for key in wanted}
+        others = [
+            (replace(memory.plate, body=scene.plate.body), changed_table(table, scene.rotor))
+            for scenes in near.values()
+            for *_, scene in scenes
+            if scene.plate is not None  # as all have one
+        ]
         note("The rotor's share of the plate's currents by what moves both ...")
-        found = requested.changed_shares((memory.table, memory.share), others, note)
-        ends = np.cumsum([len(row) for row in weights])
-        for key, row, some in zip(wanted, weights, np.split(found, ends[:-1]), strict=True):
-            self._shares[key] = np.asarray(np.tensordot(row, some, 1))
+        found = iter(requested.changed_shares((memory.table, memory.share), others, note))
+        for key, scenes in near.items():
+            self._shares[key] = np.sum([weight * next(found) for _, weight, *_ in scenes], axis=0)
 
     def _ends_of(self, name: str, key: str, base: Any, make: Callable[[Scene], Any]) -> tuple[Any, Any, float]:
         """Tables that are made a `WIDE` step to both sides of a number, and the way between."""

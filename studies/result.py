@@ -20,8 +20,6 @@ from ..dynamics.motion.state import State, polar_angle
 from ..fem.cache import write_checked
 from ..fem.rotor.table import FieldTable
 from ..geometry.common import Array, millimetres
-from ..geometry.scene.contents import Scene
-from ..geometry.scene.files import scene_text
 from . import words
 from .effects import PLATE_NEGLECTED, ListedEffect, effects_summary, listed_effects, would_end
 from .levitation import Levitation
@@ -100,8 +98,9 @@ class Result:
                 found = found.assign(columns(DRIVE, [frequency, *(row for rows in motor for row in rows)]))
         else:
             survey = self.survey or levitation.survey
-            found = found_dataset(survey.equilibria).assign_attrs(left_out=left_out_text(survey.left_out))
-        return found.assign_attrs(levitation.labels)
+            found = found_dataset(survey.equilibria)
+            found = found.assign_attrs(study="equilibria", left_out=left_out_text(survey.left_out))
+        return found.assign_attrs(levitation.about)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -218,16 +217,13 @@ def _plate(memory: PlateMemory | None) -> dict[str, Any]:
     return {"plate_model": memory.model, "plate_error_estimate": memory.error, "plate_states": len(memory.table.rates)}
 
 
-def write_dataset(dataset: xr.Dataset, path: Path, scene: Scene | None = None) -> None:
-    """Write a `dataset` to `path` with its provenance: versions, command, and the text of the `scene` if it has one.
+def write_dataset(dataset: xr.Dataset, path: Path) -> None:
+    """Write a dataset with its provenance, command and versions; that of a scene has the scene's text already.
 
     The same command gives the same file, to the last byte, wherever its numbers are not times.
     """
-    provenance = {f"version_{name}": version(name) for name in LIBRARIES}
-    if scene:
-        provenance["scene"] = scene_text(scene)
-    command = shlex.join(["spinlev", *sys.argv[1:]])
-    write_checked(dataset.assign_attrs(command=command, **provenance), path)
+    versions = {f"version_{name}": version(name) for name in LIBRARIES}
+    write_checked(dataset.assign_attrs(command=shlex.join(["spinlev", *sys.argv[1:]]), **versions), path)
 
 
 def variable(dims: Sequence[str], values: Any, units: str, long_name: str) -> xr.Variable:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from ..dynamics.equilibria.equilibrium import EquilibriumError, Survey
 from ..dynamics.equilibria.search import free_of_bodies
@@ -29,6 +28,7 @@ from ..geometry.common import MU_0, Array, InputError
 from ..geometry.files import write_whole
 from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
+from .catalogue.runner import figures_of
 from .cli.console import note, to_json
 from .cli.options import COLUMNS, Answer, Models
 from .coils import coils_at_start, coils_job
@@ -36,7 +36,6 @@ from .compare import compared_models
 from .demagnetising import write_working_point
 from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
-from .figures.run import drive_figure, field_figure, force_figure, trajectory_figure
 from .figures.style import save_figures
 from .gradient import gradient_job
 from .levitation import Levitation
@@ -229,8 +228,8 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
     def kept(flight: Trajectory) -> Result:
         result = Result(levitation, flight=flight)
         simulated = result.dataset().assign_attrs(headline=flight_words(levitation, flight))
-        write_dataset(simulated, path, scene)
-        save_figures(_of_trajectory(simulated), out)
+        write_dataset(simulated, path)
+        save_figures(figures_of(simulated), out)
         return result
 
     try:
@@ -244,11 +243,6 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
     note_details(flight)
     values = {**result.summary, "trajectory": str(path), "tables_from_cache": levitation.from_cache}
     return values, [*result.text(), f"Trajectory in {path}, figure in {out / 'trajectory.png'}"]
-
-
-def _of_trajectory(result: xr.Dataset) -> dict[str, Figure]:
-    drive = {"drive": drive_figure(result)} if "motor_torque" in result else {}
-    return {"trajectory": trajectory_figure(result), **drive}
 
 
 def main_job(
@@ -312,7 +306,7 @@ def main_job(
     if failure:
         values["failed"] = str(failure)
         lines += [] if str(failure) in lines else [str(failure)]
-    about = {**levitation.labels, "body_spin": spin, "left_out": left_out_text(survey.left_out)}
+    about = {**levitation.about, "body_spin": spin, "left_out": left_out_text(survey.left_out)}
     dataset = _static_dataset(levitation, survey, alone, best).assign_attrs(about)
     if flight:
         simulated = Result(levitation, flight=flight).dataset().assign_attrs(study="run")
@@ -352,16 +346,15 @@ def _write(
     note("Files and figures ...")
     scene = levitation.scene
     (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result
-    write_dataset(result, out / "result.nc", scene)
+    write_dataset(result, out / "result.nc")
     write_whole(out / "summary.json", f"{to_json(values)}\n".encode())
-    figures = {"field": field_figure(result), "force": force_figure(result)}
     if flight is None:
-        save_figures(figures, out)
+        save_figures(figures_of(result), out)
         return
     with ThreadPoolExecutor(1) as beside:  # in three dimensions another process draws, meanwhile
         view = {out / "scene.png": last_view(scene, levitation.table, flight.time, flight.rotor)}
         in_space = beside.submit(render, view)
-        save_figures(figures | _of_trajectory(result), out)
+        save_figures(figures_of(result), out)
         try:
             in_space.result()
         except RenderError as error:

@@ -14,6 +14,7 @@ from ..dynamics.motion.events import CONTACT
 from ..fem.rotor_metal import pieces_of
 from ..geometry.common import InputError
 from ..geometry.scene.contents import Scene
+from ..geometry.scene.files import scene_text
 from .cli.console import note, progress
 from .cli.options import Answer, Models, positive
 from .effects import PLATE_NEGLECTED
@@ -116,8 +117,8 @@ def several_job(scene: Scene, requested: Models, duration: float, out: Path, che
     what is finished was written, and what `several` raises.
     """
     found, levitation = several(scene, requested, duration, checkpoint)
-    path, data = out / "trajectory.nc", several_dataset(found, levitation)
-    write_dataset(data, path, scene)
+    path, data = out / "trajectory.nc", several_dataset(found, levitation).assign_attrs(scene=scene_text(scene))
+    write_dataset(data, path)
     names = [f"trajectory-{k}" for k in range(len(found.trajectories))]
     save_figures({name: trajectory_figure(data.isel(floater=k)) for k, name in enumerate(names)}, out)
     if found.ended_by == STOPPED:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
 from ..geometry.common import Array, InputError, shown
-from ..geometry.scene.files import changed, scene_text
+from ..geometry.scene.files import changed
 from ..geometry.scene.messages import SceneError
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
 from .gradient import ANSWERS, Gradient, answer_of, derivative
@@ -69,7 +69,7 @@ def error_bars(
     data["tolerance"] = variable(("key",), wide, "as the key", "how far the number may be off")
     axes = {"equilibrium": np.arange(len(known)), "key": keys, "mode": list(MODES), "axis": list(AXIS)}
     about = {"study": "uncertainty", "draws": draws, "seed": seed, "not_known": "; ".join(gradient.reasons.values())}
-    return xr.Dataset(data, {**axes, "percentile": list(PERCENTILES)}, {**about, **levitation.labels})
+    return xr.Dataset(data, {**axes, "percentile": list(PERCENTILES)}, {**about, **levitation.about})
 
 
 def _statistics(sample: Array) -> tuple[Array, Array]:
@@ -147,17 +147,13 @@ def uncertainty(
 
     Examples
     --------
-    >>> import spinlev as sl
-    >>> cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
-    >>> ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
-    >>> scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)
     >>> found = sl.uncertainty(scene, {"rotor.edge_mm": 0.05}, model="dipole").isel(equilibrium=0)
     >>> print(f"{1e3 * found.distance:.2f} ± {1e3 * found.distance_error:.2f} mm")
     18.84 ± 0.05 mm
     """
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
     given = dict(levitation.scene.tolerances) if tolerances is None else tolerances
-    return error_bars(levitation, given, draws, seed).assign_attrs(scene=scene_text(levitation.scene))
+    return error_bars(levitation, given, draws, seed)
 
 
 def uncertainty_job(levitation: Levitation, out: Path) -> Answer:
@@ -167,7 +163,7 @@ def uncertainty_job(levitation: Levitation, out: Path) -> Answer:
         return {}, []
     over_plate = any(one.currents is not None for one in levitation.equilibria)
     found = error_bars(levitation, tolerances, FEW_DRAWS if over_plate else DRAWS)
-    write_dataset(found, out / "uncertainty.nc", levitation.scene)
+    write_dataset(found, out / "uncertainty.nc")
     rows = []
     for number in range(found.sizes["equilibrium"]):
         one, row = found.isel(equilibrium=number), dict[str, Any]()

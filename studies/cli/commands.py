@@ -15,20 +15,7 @@ from cyclopts import Parameter
 from ...geometry.common import InputError
 from . import options
 from .console import note
-from .options import (
-    Answer,
-    FieldModel,
-    Flag,
-    InteractionModel,
-    Models,
-    Output,
-    Place,
-    PlateModel,
-    Quantity,
-    SceneFile,
-    Spin,
-    Workers,
-)
+from .options import Answer, Flag, Models, Output, Place, SceneFile, Spin, Workers
 
 if TYPE_CHECKING:
     from ...geometry.scene.contents import Scene
@@ -71,13 +58,13 @@ def run(
         Also the derivatives of the equilibria by all numbers of the scene file, gradient.nc.
     """
     options.positive("--duration-s", duration_s)
-    options.check_spin("--spin", spin)
+    options.check_between("--spin", spin, options.SPINS)
     requested = requested.checked()
     if quick:
-        interaction: InteractionModel = "rigid" if requested.interaction == "auto" else requested.interaction
         rtol, plate_rtol = max(requested.rtol, 1e-3), max(requested.plate_rtol, 0.05)
-        requested = replace(requested, interaction=interaction, rtol=rtol, plate_rtol=plate_rtol)
-    loaded = _loaded(scene or options.default_scene())
+        requested = replace(requested, rtol=rtol, plate_rtol=plate_rtol)
+        requested = replace(requested, interaction="rigid") if requested.interaction == "auto" else requested
+    loaded = _loaded(scene or options.shipped_scene())
     from ...fem.cache import owned
     from ..run import main_job
 
@@ -96,8 +83,8 @@ def field(
     offset_mm: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0,
     steps: int = 121,
     working_point: Flag = False,
-    model: FieldModel = "auto",
-    rtol: float = 3e-6,
+    model: options.FieldModel = "auto",
+    rtol: float = Models.rtol,
     output: Output = Output(),
 ) -> Answer:
     """B and its gradient at points in the rotor's frame at t = 0, maps of the field on a plane, or the working point.
@@ -136,7 +123,7 @@ def field(
         return working_point_job(Levitation(_loaded(scene), requested), output.folder)
     if plane is not None:
         extent = None if extent_mm is None else options.map_extent(extent_mm)
-        options.check_steps("--steps", steps)
+        options.check_between("--steps", steps, options.STEPS)
         from ..exchange import field_map_job
 
         return field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)
@@ -162,7 +149,7 @@ def equilibria(
     gradient
         Also their derivatives by all numbers of the scene file, gradient.nc.
     """
-    options.check_spin("--spin", spin)
+    options.check_between("--spin", spin, options.SPINS)
     loaded = _loaded(scene)
     from ..run import equilibria_job
 
@@ -173,7 +160,7 @@ def compare(
     scene: SceneFile,
     *,
     frequency_hz: str | None = None,
-    plate_model: PlateModel = "auto",
+    plate_model: options.PlateModel = "auto",
     rtol: float | None = None,
     plate_rtol: float = Models.plate_rtol,
     spin: Spin = 0.0,
@@ -195,7 +182,7 @@ def compare(
     plate_rtol
         Relative accuracy of the plate's response.
     """
-    options.check_spin("--spin", spin)
+    options.check_between("--spin", spin, options.SPINS)
     frequencies = None if frequency_hz is None else options.frequency_grid(frequency_hz)
     loaded = _loaded(scene)
     from ..compare import compare_job, field_rtol
@@ -284,7 +271,7 @@ def study(
     list: Flag = False,
     quick: Flag = False,
     vary: Annotated[tuple[str, ...], Parameter(negative="")] = (),
-    ask: Quantity = "equilibria",
+    ask: options.Quantity = "equilibria",
     at: Place = "0,0,-20",
     spin: Spin = 0.0,
     duration_s: float = 3.0,
@@ -478,9 +465,8 @@ def explore(
     no_browser
         Only print the address.
     """
-    if not 0 <= port <= 65535:
-        raise InputError(f"Input --port must be between 0 and 65535; instead received {port}.")
-    source = scene or options.default_scene()
+    options.check_between("--port", port, options.PORTS)
+    source = scene or options.shipped_scene()
     loaded = _loaded(source)
     from ..page.server import serve
 

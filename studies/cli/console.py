@@ -236,19 +236,19 @@ def progress(label: str) -> Iterator[Callable[..., None]]:
     shown = LOG.handlers and (ERRORS.is_interactive or ERRORS.is_jupyter)
     with ExitStack() as parts, Progress(*columns, console=ERRORS, transient=True, disable=not shown) as bar:
         task = bar.add_task(label, total=1.0)
-        for handler in LOG.handlers:
-            if isinstance(handler, _Printed):
-                parts.enter_context(handler.heartbeat.around())
+        heartbeats = [handler.heartbeat for handler in LOG.handlers if isinstance(handler, _Printed)]
+        for heartbeat in heartbeats:
+            parts.enter_context(heartbeat.around())
 
         def advance(fraction: float, text: str = label) -> None:
             if text != bar.tasks[task].description:
                 bar.reset(task, description=text)
             bar.update(task, completed=fraction)
-            for handler in LOG.handlers:
-                if isinstance(handler, _Printed) and shown:
-                    handler.heartbeat.said()
-                elif isinstance(handler, _Printed):
-                    handler.heartbeat.advanced(fraction, text.partition(": ")[2])
+            for heartbeat in heartbeats:
+                if shown:
+                    heartbeat.said()
+                else:
+                    heartbeat.advanced(fraction, text.partition(": ")[2])
 
         yield advance
 

@@ -28,6 +28,7 @@ Answer = tuple[Mapping[str, Any], list[str]]  # of a command: numbers for a prog
 COLUMNS = ("x_mm", "y_mm", "z_mm")
 MOST = 50_000_000  # bytes of a file of points: a million of them
 FARTHEST = 1e9  # largest coordinate, mm: beyond, powers of it overflow
+SPINS, STEPS, PORTS = (-1000, 1000), (5, 1001), (0, 65535)  # body spins, points along a map's longer side, ports
 
 
 def _floats(text: str, separator: str = ",") -> list[float]:
@@ -74,12 +75,6 @@ def map_extent(text: str) -> Array:
     return np.array(numbers) * 1e-3
 
 
-def check_steps(name: str, steps: int) -> None:
-    """Raise InputError where a map cannot have so many points along its longer side."""
-    if not is_number(steps) or steps != int(steps) or not 5 <= steps <= 1001:
-        raise InputError(f"Input {name} must be between 5 and 1001; instead received {shown(steps)}.")
-
-
 def is_number(value: Any) -> bool:
     """Whether it is a finite number that a float holds."""
     if not isinstance(value, Real) or isinstance(value, bool):
@@ -103,10 +98,11 @@ def finite(name: str, value: float) -> float:
     return float(value)
 
 
-def check_spin(name: str, spin: float) -> None:
-    """Raises InputError where the body spin is larger than any that is looked at."""
-    if not -1e3 <= spin <= 1e3:
-        raise InputError(f"Input {name} must be between -1000 and 1000; instead received {spin}.")
+def check_between(name: str, value: float, ends: tuple[int, int], whole: bool = False) -> None:
+    """Raises InputError about `name` where the value is no number between `ends`, or none that is `whole`."""
+    low, high = ends
+    if not is_number(value) or not low <= value <= high or (whole and value != int(value)):
+        raise InputError(f"Input {name} must be between {low} and {high}; instead received {shown(value)}.")
 
 
 def read_points(path: Path) -> Array:
@@ -161,13 +157,8 @@ NAMES = {
 }  # fmt: skip
 
 
-def default_scene() -> Path:
-    """The scene that is meant where none is named: `tilt-over-plate`."""
-    return shipped_scene("tilt-over-plate")
-
-
-def shipped_scene(name: str) -> Path:
-    """The file of a scene that comes with the program."""
+def shipped_scene(name: str = "tilt-over-plate") -> Path:
+    """The file of a scene that comes with the program; by default the one that is meant where none is named."""
     return Path(str(files("spinlev.scenes").joinpath(f"{name}.toml")))
 
 
@@ -260,10 +251,10 @@ class Workers:
 
     def checked(self) -> Self:
         """Itself. Raises InputError for no number of workers, or both a number and a scheduler."""
-        if self.workers is not None and not 1 <= self.workers <= 1024:
-            raise InputError(f"Input --workers must be between 1 and 1024; instead received {self.workers}.")
-        if self.workers is not None and self.scheduler is not None:
-            raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
+        if self.workers is not None:
+            check_between("--workers", self.workers, (1, 1024))
+            if self.scheduler is not None:
+                raise InputError("Input --workers must be left out where --scheduler is given; instead received both.")
         return self
 
 
@@ -288,7 +279,11 @@ out : str or Path
 progress : bool, optional
     Whether messages and a progress bar go to standard error; left out: on terminals and in notebooks.
 """
-UNUSABLE = "InputError\n    A model, a tolerance or a file that cannot be used."
+UNUSABLE = "InputError\n    An argument or a file that cannot be used."
+EXAMPLE = """import spinlev as sl
+cube = sl.tilt(angle_deg=10.0, edge_mm=10.0, remanence_T=1.305)
+ball = sl.sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
+scene = sl.scene(frequency_hz=130.0, rotor=cube, floater=ball)"""
 SECTIONS = ("Parameters", "Returns", "Raises", "Examples")
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -302,7 +297,7 @@ SHARED = _entries("\n".join([COMMON, inspect.getdoc(Models) or "", inspect.getdo
 
 
 def documented(function: Callable[P, T]) -> Callable[P, T]:
-    """A function whose docstring says what the shared arguments and errors are that it leaves out.
+    """A function whose docstring says what it leaves out: shared arguments and errors, and the scene of its example.
 
     Messages are printed where `progress` is true; of an unknown keyword it says which one it resembles.
     """
@@ -330,6 +325,8 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
     sections["Parameters"] = "\n".join(entries[parameter.name] for parameter in own)
     if "InputError" not in (raised := sections.get("Raises", "")):
         sections["Raises"] = f"{raised}\n{UNUSABLE}".strip()
+    if example := sections.get("Examples"):
+        sections["Examples"] = "\n".join([*(" ".join((">>>", line)) for line in EXAMPLE.splitlines()), example])
     shown = [f"{name}\n{'-' * len(name)}\n{sections[name]}" for name in SECTIONS if name in sections]
     called.__doc__ = "\n\n".join([summary.strip(), *shown])
     return called
@@ -358,14 +355,15 @@ def parse_vary(requested: Sequence[str]) -> dict[str, list[Any]]:
     found: dict[str, list[Any]] = {}
     for text in requested:
         key, equals, values = text.partition("=")
-        if not equals or not key:
-            raise _wrong(text)
+        given = [part.strip() for part in values.split(",")] if key in NAMES else _numbers(values)
+        if not (key and equals and given):
+            raise InputError(
+                "Input --vary must be KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,... with a key of the scene file, such as "
+                f"rotor.displacement_mm=1:4:0.5; instead received {shown(text)}.{_decimal_point(text)}"
+            )
         if key in found:
             raise InputError(f"Input --vary must give each key once; instead received {shown(key)} twice.")
-        numbers = [part.strip() for part in values.split(",")] if key in NAMES else _numbers(values)
-        if numbers is None:
-            raise _wrong(text)
-        found[key] = numbers
+        found[key] = given
     return checked_values(found, "--vary")
 
 
@@ -402,7 +400,7 @@ def combinations(values: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
 
 def frequency_grid(text: str) -> Array:
     """(n,) Hz, rising, from FIRST:LAST:STEP or VALUE,VALUE,... Raises InputError unless all are positive."""
-    numbers = sorted(set(_numbers(text) or ()))
+    numbers = sorted(set(_numbers(text)))
     if not numbers or numbers[0] <= 0:
         raise InputError(
             "Input --frequency-hz must be FIRST:LAST:STEP or VALUE,VALUE,... of positive numbers, such as 100:180:5; "
@@ -411,25 +409,18 @@ def frequency_grid(text: str) -> Array:
     return np.array(numbers)
 
 
-def _numbers(values: str) -> list[float] | None:
-    """Numbers of FIRST:LAST:STEP or VALUE,VALUE,...; None where it is neither."""
+def _numbers(values: str) -> list[Any]:
+    """Numbers of FIRST:LAST:STEP or VALUE,VALUE,...; none where it is neither."""
     separator = ":" if ":" in values else ","
     numbers = _floats(values, separator)
     if numbers and separator == ",":
         return numbers
     if len(numbers) != 3 or numbers[2] == 0 or (numbers[1] - numbers[0]) / numbers[2] < 0:
-        return None
+        return []
     first, last, step = numbers
     count = int(min((last - first) / step + 1e-6, MOST_VALUES)) + 1
     # Rounded to 12 digits: 0.1, 0.2, 0.3 and not 0.30000000000000004.
     return [float(f"{first + k * step:.12g}") for k in range(count)]
-
-
-def _wrong(text: str) -> InputError:
-    return InputError(
-        f"Input --vary must be KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,... with a key of the scene file, such as "
-        f"rotor.displacement_mm=1:4:0.5; instead received {shown(text)}.{_decimal_point(text)}"
-    )
 
 
 def _decimal_point(text: str) -> str:

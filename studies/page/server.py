@@ -29,6 +29,7 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from ...geometry.common import ComputationError, InputError, SpinlevError
 from ...geometry.scene.contents import Scene
+from ..cli.options import PORTS, check_between
 from ..plan import check_coils, levitating_scene
 from .page import Page
 from .state import PageState, first_state
@@ -128,8 +129,7 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
     computed; ComputationError: the port is taken, or the address is not this machine's.
     """
     check_coils(levitating_scene(scene))
-    if not 0 <= port <= 65535:
-        raise InputError(f"Input port must be between 0 and 65535; instead received {port}.")
+    check_between("port", port, PORTS)
     if not host:
         raise InputError(
             f'Input host must be an address of this machine, such as {LOOPBACK}; instead received "". All of them are '

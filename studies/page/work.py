@@ -398,8 +398,7 @@ def content(kind: str, state: PageState) -> bytes:
     if kind == "json":
         answer: dict[str, Any] = {**result.summary, "tables_from_cache": levitation.from_cache}
         return f"{to_json(answer)}\n".encode()
-    dataset = result.dataset().assign_attrs(study="equilibria")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "equilibria.nc"
-        write_dataset(dataset, path, state.scene)
+        write_dataset(result.dataset(), path)
         return path.read_bytes()
