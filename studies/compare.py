@@ -51,7 +51,6 @@ class Compared:
     stable: tuple[float, float] | None = None  # the range of stable frequencies there, Hz
 
     def row(self) -> dict[str, Any]:
-        """For JSON."""
         row: dict[str, Any] = {"name": self.name, "stable_range_hz": self.stable}
         if (e := self.found) is None:
             return row | dict.fromkeys(OF_EQUILIBRIUM)

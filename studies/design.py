@@ -18,12 +18,12 @@ from matplotlib.figure import Figure
 
 from ..dynamics.continuation.frequencies import levitates
 from ..dynamics.equilibria.equilibrium import MARGINAL, Equilibrium, EquilibriumError, nearest_of
-from ..geometry.common import Array, ComputationError, InputError, SpinlevError, check_names, shown
+from ..geometry.common import Array, ComputationError, InputError, SpinlevError, check_names
 from ..geometry.files import write_whole
 from ..geometry.scene.files import changed, load_scene, scene_numbers, scene_text, toml_tables
 from .candidates import OF_SCENE, Candidate, Limits, Search, survey_near
 from .cli.console import note, to_json
-from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
+from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number, refused
 from .figures.style import PALETTE, drawn, panels, plot_branch, save_figures
 from .gradient import Gradient
 from .levitation import Levitation, branch_of
@@ -75,10 +75,7 @@ def _range(name: str, value: object) -> tuple[float, float]:
         good = all(is_number(end) or (isinstance(end, float) and np.isinf(end)) for end in (low, high))
         if good and float(low) <= float(high) and float(low) < np.inf and float(high) > -np.inf:  # type: ignore[arg-type]
             return float(low), float(high)  # type: ignore[arg-type]
-    raise InputError(
-        f"Input {name} must be a number, or two in order, least and most, of which inf leaves an end open; "
-        f"instead received {shown(value)}."
-    )
+    raise refused(name, "be a number, or two in order, least and most, of which inf leaves an end open", value)
 
 
 class _SettledError(ComputationError):
@@ -312,14 +309,14 @@ def checked_goals(goals: object, free: object, limits: object, points: object) -
     """Goals, bounds of free numbers and limits as they are used. Raises InputError."""
     wanted = [goals] if isinstance(goals, str) else list(goals) if isinstance(goals, Sequence) else []
     if not 1 <= len(wanted) <= 2 or len(set(map(str, wanted))) < len(wanted):
-        raise InputError(f"Input goals must be one or two of {', '.join(GOALS)}; instead received {shown(goals)}.")
+        raise refused("goals", f"be one or two of {', '.join(GOALS)}", goals)
     check_names(wanted, GOALS, "goals", "goals")
     if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= 100:
-        raise InputError(f"Input points must be a number from 2 to 100; instead received {shown(points)}.")
+        raise refused("points", "be a number from 2 to 100", points)
     given = {} if limits is None else limits
     if not isinstance(given, Mapping):
         said = "what a scene can be asked for"
-        raise InputError(f"Input limits must be ranges by {said}; instead received {shown(limits)}.")
+        raise refused("limits", f"be ranges by {said}", limits)
     check_names(given, MEASURES, "limits", "what a scene can be asked for")
     ends = {name: _range(f"limits.{name}", value) for name, value in given.items()}
     return [str(one) for one in wanted], checked_free(free), {**ALWAYS, **ends}
@@ -328,14 +325,11 @@ def checked_goals(goals: object, free: object, limits: object, points: object) -
 def checked_free(free: object, levitation: Levitation | None = None) -> Limits:
     """Bounds of free numbers, which hold those of a `levitation` and have derivatives in it. Raises InputError."""
     if not isinstance(free, Mapping) or not free:
-        raise InputError(f"Input free must be least and most by key of the scene file; instead received {shown(free)}.")
+        raise refused("free", "be least and most by key of the scene file", free)
     bounds = {str(key): _range(f"free.{key}", value) for key, value in free.items()}
     for key, (low, high) in bounds.items():
         if not low < high or not np.isfinite([low, high]).all():
-            raise InputError(
-                f"Input free.{key} must be two finite numbers in order, least and most; instead received "
-                f"{shown(free[key])}."
-            )
+            raise refused(f"free.{key}", "be two finite numbers in order, least and most", free[key])
     if levitation is None:
         return bounds
     gradient, plate = Gradient(levitation), levitation.scene.plate is not None
@@ -496,9 +490,7 @@ def design_job(path: Path, requested: Models, out: Path) -> Answer:
     table = {"points": 7, **toml_tables(path, "goals")}
     check_names(table, ("scene", "goals", "free", "limits", "points"), "goals", f"keys of {path}")
     if not isinstance(table.get("scene"), str):
-        raise InputError(
-            f"Input scene must be the path of a scene file, in {path}; instead received {shown(table.get('scene'))}."
-        )
+        raise refused("scene", f"be the path of a scene file, in {path}", table.get("scene"))
     wanted = checked_goals(*map(table.get, ("goals", "free", "limits", "points")))
     levitation = Levitation(load_scene(path.parent / table["scene"]), requested)
     result = designed(levitation, *wanted, table["points"])

@@ -1,7 +1,7 @@
 """Numbers of a scene that fit what was measured: least squares over equilibria with their derivatives."""
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Unpack
@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ..geometry.common import Array, ComputationError, InputError, shown
 from ..geometry.scene.files import changed, scene_numbers
 from .candidates import DECAY, FREQUENCY, MODE_OF, Candidate, Limits, Search
-from .cli.options import FieldModel, Models, PlateModel, Requested, documented
+from .cli.options import FieldModel, Models, PlateModel, Requested, documented, refused
 from .design import checked_free
 from .figures.style import PALETTE, drawn, panels
 from .levitation import Levitation
@@ -54,7 +54,7 @@ def table_of(data: Data) -> dict[str, Array]:
     elif isinstance(data, Mapping):
         columns = {str(name): list(np.atleast_1d(values)) for name, values in data.items()}
     else:
-        raise InputError(f"Input data must be a table or its file; instead received {shown(data)}.")
+        raise refused("data", "be a table or its file", data)
     if len({len(values) for values in columns.values()}) != 1 or not min(map(len, columns.values())):
         raise InputError("Input data must have columns of one length that are not empty; instead they have not.")
     found = {}
@@ -157,28 +157,24 @@ class _Rows:
             there.share(levitation)
             self.searches.append(Search(there, free))
 
-    def _at(self, numbers: Array) -> list[tuple[Candidate | None, list[str], Array, Array]]:
-        """Each row's scene, the names of what was measured in it, that, and its standard deviations."""
-        return [
-            (search.at(numbers), [name for name, here in zip(self.measures, there, strict=True) if here],
-             measured[there], deviations[there])
-            for search, there, measured, deviations in zip(
-                self.searches, self.there, self.measured, self.deviations, strict=True
-            )
-        ]  # fmt: skip
+    def _at(self, numbers: Array) -> Iterator[tuple[Search, Candidate | None, list[str], Array, Array]]:
+        """Each row's search and scene, the names of what was measured in it, that, and its standard deviations."""
+        for k, search in enumerate(self.searches):
+            names = [name for name, here in zip(self.measures, self.there[k], strict=True) if here]
+            yield search, search.at(numbers), names, self.measured[k][self.there[k]], self.deviations[k][self.there[k]]
 
     def residuals(self, numbers: Array) -> Array:
         """What is computed less what was measured, in standard deviations."""
         return np.concatenate([
             np.full(len(names), LOST) if known is None
             else (np.concatenate([known.values(name) for name in names]) - measured) / deviations
-            for known, names, measured, deviations in self._at(numbers)
+            for _, known, names, measured, deviations in self._at(numbers)
         ])  # fmt: skip
 
     def slopes(self, numbers: Array) -> Array:
         """Derivatives of the same by the free numbers; from here on equilibria are followed from these scenes."""
         parts = []
-        for search, (known, names, _, deviations) in zip(self.searches, self._at(numbers), strict=True):
+        for search, known, names, _, deviations in self._at(numbers):
             parts.append(np.zeros((len(names), len(numbers))))
             if known is not None:
                 search.go_on_from(known, numbers)

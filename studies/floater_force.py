@@ -11,7 +11,7 @@ from ..geometry.overlap import body_overlap
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from .cli.console import note
-from .cli.options import FieldModel, Models, documented
+from .cli.options import FieldModel, Models, documented, refused
 from .levitation import Levitation
 from .plan import SceneLike
 from .result import AXIS, variable
@@ -99,7 +99,7 @@ def _vectors(name: str, value: ArrayLike) -> Array:
     except (TypeError, ValueError):
         found = np.zeros((0, 0))
     if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
-        raise InputError(f"Input {name} must be three numbers or a list of such; instead received {value!r}.")
+        raise refused(name, "be three numbers or a list of such", value)
     return found
 
 
@@ -107,7 +107,7 @@ def _directions(name: str, value: ArrayLike) -> Array:
     found = _vectors(name, value)
     length = np.linalg.norm(found, axis=1, keepdims=True)
     if not length.all():
-        raise InputError(f"Input {name} must be a direction, not zero; instead received {value!r}.")
+        raise refused(name, "be a direction, not zero", value)
     return np.asarray(found / length)
 
 

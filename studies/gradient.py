@@ -22,11 +22,11 @@ from ..dynamics.motion.events import rotor_gap
 from ..dynamics.motion.rotor_effects import Mutual
 from ..dynamics.motion.state import Scales, State
 from ..fem.rotor.choice import PERMEABLE
-from ..geometry.common import Array, InputError, check_names, shown
+from ..geometry.common import Array, InputError, check_names
 from ..geometry.cutting import united
 from ..geometry.scene.files import scene_numbers
 from .cli.console import aligned
-from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented
+from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, refused
 from .levitation import Levitation
 from .nearby_scenes import NearbyScenes, unknown_over_plate
 from .plan import SceneLike
@@ -55,8 +55,6 @@ END_FOUND = 1e-6  # Relative error of derivatives of ends, by how exactly they a
 # Relative error of a derivative, by that of the place, force or currents that a table misses: so it is more than 97 of
 # 100 are off by, in scenes by which it was chosen (two) and others (nine)
 TABLED = 10.0
-OF_MODES = ("growth", "mode_growth", "mode_frequency", "plate_damping")
-AT_FOLD = "at a fold an equilibrium has no derivatives"
 
 
 class Gradient:
@@ -97,7 +95,7 @@ class Gradient:
             return {}, None, base
         implicit = Implicit(known, base.setting)
         if implicit.at_fold:
-            self.reasons["fold"] = AT_FOLD
+            self.reasons["fold"] = "at a fold an equilibrium has no derivatives"
         fixed = None
         if base.with_plate and known.without is not None:
             fixed = Implicit(known.without, replace(base.setting, plate=None))
@@ -326,7 +324,7 @@ def derivative(known: Equilibrium, tangent: Tangent, name: str) -> ArrayLike:
 
 def derivatives_of(known: Equilibrium, tangent: Tangent, names: Sequence[str]) -> list[Array]:
     """Derivatives of several answers of `ANSWERS` and `MORE`, those of the motion alone at once."""
-    plain = [name for name in names if name not in OF_MODES]
+    plain = [name for name in names if name not in ("growth", "mode_growth", "mode_frequency", "plate_damping")]
     sizes = [np.size(answer_of(known, name)) for name in plain]
     row = tangent.of(lambda e: np.concatenate([[], *(np.ravel(answer_of(e, name)) for name in plain)]))
     parts = dict(zip(plain, np.split(row, np.cumsum(sizes)), strict=False))
@@ -392,10 +390,10 @@ def gradient(
 def _checked(name: str, given: Sequence[str], known: Collection[str], what: str) -> list[str]:
     """The names `given` as an argument; InputError unless each is `known`, which all are `what`."""
     if isinstance(given, str) or not given or not all(isinstance(one, str) for one in given):
-        raise InputError(f"Input {name} must be a list of {what}; instead received {shown(given)}.")
+        raise refused(name, f"be a list of {what}", given)
     check_names(given, known, name, what)
     if len(set(given)) < len(given):
-        raise InputError(f"Input {name} must name each once; instead received {shown(list(given))}.")
+        raise refused(name, "name each once", list(given))
     return list(given)
 
 

@@ -25,8 +25,7 @@ from .cli.console import missing_extra
 from .cli.options import FieldModel, InteractionModel, Models, PlateModel, Quantity, Requested, Workers, documented
 from .coils import coils_summary, modes_of
 from .compare import compared, compared_dataset, field_rtol
-from .demagnetising import working_point_dataset
-from .exchange import PLANES, field_map as plane_map
+from .fields import PLANES, field_map as plane_map, working_point_dataset
 from .figures.run import scene_figure
 from .figures.style import FigureWidth, figures_across
 from .levitation import Levitation
@@ -354,8 +353,7 @@ def ensemble(
     if (starts is None) == (n is None):
         raise InputError("Input starts must be given, or n with spread; instead received both or neither.")
     number = Workers(workers).checked().workers or os.cpu_count() or 1
-    models = Models(model, plate_model, rtol, plate_rtol=plate_rtol, interaction=interaction).checked()
-    levitation = Levitation(scene, models)
+    levitation = Levitation(scene, Models(model, plate_model, rtol, plate_rtol, interaction))
     if starts is not None:
         (near, begun, offset), drawn = given_starts(levitation, starts), dict[str, Any]()
     else:
@@ -424,7 +422,7 @@ def sweep(
     models = Models(model, plate_model, **requested).checked()
     where = tuple(1e-3 * options.finite("place_mm", coordinate) for coordinate in place_mm)
     if len(where) != 3:
-        raise InputError(f"Input place_mm must be three numbers; instead received {place_mm!r}.")
+        raise options.refused("place_mm", "be three numbers", place_mm)
     numbers = options.finite("spin", spin), options.finite("duration_s", duration_s)
     question = Question(loaded, "scene", ask, models, *numbers, where)
     grid = options.checked_values(values)

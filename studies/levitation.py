@@ -287,7 +287,7 @@ class Levitation:
 
         None where it does not begin at an equilibrium, or gravity is not along the axis.
         """
-        moved = self.absolute or self.scene.gravity[:2].any() or self.scene.other_coils
+        moved = self.absolute or self.scene.other_coils
         chosen = None if moved else _first(self.without_plate.equilibria)
         if chosen is None or chosen.kind == LOCKED:  # no branch of these is followed
             return ()

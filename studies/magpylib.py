@@ -21,6 +21,7 @@ from ..geometry.scene.making import magnets
 from ..geometry.shapes import Box, Cylinder, Sphere
 from ..geometry.solids import Part, Solid, known_shape
 from ..geometry.step_file import part_of
+from .cli.options import refused
 
 KINDS = (kinds.Cuboid, kinds.Cylinder, kinds.CylinderSegment, kinds.Sphere, kinds.Tetrahedron, kinds.TriangularMesh)
 SIZES = ("diameter", "dimension", "vertices")
@@ -128,10 +129,8 @@ def _sources(collection: Any) -> Iterator[Any]:
 
 def _magnet(source: Any) -> _Magnet:
     if not isinstance(source, KINDS):
-        raise InputError(
-            "Input collection must hold cuboids, cylinders and their segments, spheres, tetrahedra and triangular "
-            f"meshes only; instead received {source!r}."
-        )
+        known = "cuboids, cylinders and their segments, spheres, tetrahedra and triangular meshes"
+        raise refused("collection", f"hold {known} only", source)
     size = next((getattr(source, name) for name in SIZES if getattr(source, name, None) is not None), None)
     if size is None or source.polarization is None:
         raise InputError(f"Input collection must have magnets with a size and a polarisation; instead: {source!r}.")

@@ -77,7 +77,6 @@ class NearbyScenes:
     _ends: dict[tuple[str, str], tuple[Any, Any, float]] = field(default_factory=dict, init=False)
 
     def step(self, key: str, value: float) -> float:
-        """Of the differences by a key's number."""
         usual = next((size for end, size in USUAL.items() if key.rstrip(".0123456789").endswith(f"_{end}")), 0.0)
         return STEP * (max(abs(value), usual) or 1.0)
 

@@ -24,13 +24,13 @@ from ..fem.plate.choice import resolve_plate_model
 from ..fem.plate.table import Region
 from ..fem.rotor.table import ROTOR, RotorTable
 from ..fem.rotor_metal import losses_key, pieces_of
-from ..geometry.common import Array, InputError, Watch, shown
+from ..geometry.common import Array, InputError, Watch
 from ..geometry.overlap import TOUCHING, sphere_overlap
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import check_files, load_scene, map_digest
 from ..geometry.scene.floater import Floater
 from .cli.console import detail, note, stages
-from .cli.options import Models
+from .cli.options import Models, refused
 
 Made = TypeVar("Made")
 SceneLike = Scene | str | Path  # a scene, or the path of its file
@@ -82,7 +82,7 @@ def given_scene(scene: SceneLike) -> Scene:
         return scene
     if isinstance(scene, str | Path):
         return load_scene(scene)
-    raise InputError(f"Input scene must be a Scene or the path of a scene file; instead received {shown(scene)}.")
+    raise refused("scene", "be a Scene or the path of a scene file", scene)
 
 
 def levitating_scene(scene: SceneLike) -> Scene:

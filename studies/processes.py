@@ -168,7 +168,6 @@ class _Process:
             self.connection.send_bytes(cloudpickle.dumps(what))  # functions of a notebook as well
 
     def receive(self) -> tuple[str, Any]:
-        """The kind of a message, and its content."""
         try:
             kind, content = pickle.loads(self.connection.recv_bytes())
         except (EOFError, OSError):

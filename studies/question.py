@@ -151,8 +151,6 @@ class Question:
         chosen = {key: point[key] for key in CHOICES if key in point}
         spin = float(chosen.pop("spin", self.spin))
         keys = {key: value for key, value in point.items() if key not in CHOICES}
-        if texts := [key for key, value in keys.items() if isinstance(value, str)]:
-            raise InputError(f"Input {texts[0]} must be varied over numbers; instead received {keys[texts[0]]!r}.")
         return Levitation(changed(self.scene, keys, self.source), replace(self.models, **chosen), spin)
 
     def __call__(self, point: Point) -> xr.Dataset:

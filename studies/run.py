@@ -1,6 +1,5 @@
 """The commands that answer one question about a scene: field, plate, equilibria, simulate, and run, which asks all."""
 
-import csv
 import io
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -30,10 +29,10 @@ from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
 from .catalogue.runner import figures_of
 from .cli.console import note, to_json
-from .cli.options import COLUMNS, Answer, Models
+from .cli.options import COLUMNS, Answer, Models, refused
 from .coils import coils_at_start, coils_job
 from .compare import compared_models
-from .demagnetising import write_working_point
+from .fields import write_working_point
 from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
 from .figures.style import save_figures
@@ -58,10 +57,9 @@ def field_job(scene: Scene, points: Array, requested: Models, out: Path) -> Answ
     values = _field(known, points, *coils_at_start(levitation.scene, points))
     b, gradient, error = values["B_T"], values["dB_T_per_m"].reshape(-1, 9), values["B_relative_error"]
     slopes = (f"dB{i}_d{j}_T_per_m" for i in "xyz" for j in "xyz")
+    head = ",".join([*COLUMNS, "Bx_T", "By_T", "Bz_T", *slopes, "B_relative_error"])
     stream = io.StringIO(newline="")
-    writer = csv.writer(stream)
-    writer.writerow([*COLUMNS, "Bx_T", "By_T", "Bz_T", *slopes, "B_relative_error"])
-    writer.writerows(np.column_stack([points * 1e3, b, gradient, error]))
+    np.savetxt(stream, np.column_stack([points * 1e3, b, gradient, error]), "%s", ",", "\r\n", head, comments="")
     write_whole(out / "field.csv", stream.getvalue().encode())
     lines = [f"{'x':>9} {'y':>9} {'z':>9} mm {'Bx':>14} {'By':>14} {'Bz':>14} T   relative error"]
     lines += [
@@ -124,7 +122,7 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
     if (plate := scene.plate) is None:
         raise InputError("Input scene must have a [plate]; instead received none.")
     if not (np.isfinite(frequency) and frequency >= 0):
-        raise InputError(f"Input --frequency-hz must be finite and not negative; instead received {frequency}.")
+        raise refused("--frequency-hz", "be finite and not negative", frequency)
     distance, farthest = float(plate.body.distance(place)), FARTHEST * float(plate.box.size.max())
     if not NEAREST <= distance <= farthest:
         where = ", ".join(f"{c * 1e3:.6g}" for c in place)
@@ -133,7 +131,7 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
             f"instead received ({where}) mm."
         )
     if not TIGHTEST <= rtol < 1:
-        raise InputError(f"Input --rtol must be at least {TIGHTEST:g} and less than 1; instead received {rtol}.")
+        raise refused("--rtol", f"be at least {TIGHTEST:g} and less than 1", rtol)
     name, tensor, error, from_cache = response(plate, place, frequency, model, rtol)
     values = {
         "model": name,

@@ -13,6 +13,7 @@ from ..dynamics.motion.events import clearance
 from ..dynamics.motion.state import State
 from ..geometry.common import Array, InputError
 from ..geometry.scene.contents import AbsoluteStart, OffsetStart
+from .cli.options import refused
 from .levitation import Levitation
 from .processes import mapped
 
@@ -74,12 +75,12 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Lev
     """
     columns = {str(key): _rows("starts", str(key), values, UNITS) for key, values in starts.items()}
     if ("offset_mm" in columns) == ("position_mm" in columns):
-        raise InputError(f"Input starts must have either offset_mm or position_mm; instead received {list(columns)}.")
+        raise refused("starts", "have either offset_mm or position_mm", list(columns))
     if "offset_mm" in columns and len(columns) > 1:
-        raise InputError(f"Input starts must have offset_mm alone, or position_mm; instead received {list(columns)}.")
+        raise refused("starts", "have offset_mm alone, or position_mm", list(columns))
     lengths = {key: len(rows) for key, rows in columns.items() if len(rows) != 1}
     if len(set(lengths.values())) > 1:
-        raise InputError(f"Input starts must have as many rows in each key; instead received {lengths}.")
+        raise refused("starts", "have as many rows in each key", lengths)
     count = next(iter(lengths.values()), 1)
     if "offset_mm" in columns:
         about, offset = levitation.elsewhere(start=OffsetStart(np.zeros(3))), columns["offset_mm"]
@@ -112,7 +113,7 @@ def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: M
     """
     for name, value, least in (("n", count, 1), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
-            raise InputError(f"Input {name} must be a whole number, {least} at least; instead received {value!r}.")
+            raise refused(name, f"be a whole number, {least} at least", value)
     sizes = {key: _rows("spread", key, values, SPREADS)[0] for key, values in spread.items()}
     if not sizes or any((size < 0).any() for size in sizes.values()):
         raise InputError(
@@ -140,11 +141,11 @@ def _least_turns(before: Array, after: Array) -> Array:
 
 def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array:
     if key not in units:
-        raise InputError(f"Input {name} must have keys among {', '.join(units)}; instead received {key!r}.")
+        raise refused(name, f"have keys among {', '.join(units)}", key)
     try:
         rows = np.asarray(values, float)
     except (TypeError, ValueError):
-        raise InputError(f"Input {name}.{key} must be numbers; instead received {values!r}.") from None
+        raise refused(f"{name}.{key}", "be numbers", values) from None
     if name == "spread" and rows.ndim == 0:
         rows = np.full(3, rows)
     fine = rows.ndim in (1, 2) and rows.shape[-1] == 3 and rows.size and np.isfinite(rows).all()

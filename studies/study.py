@@ -1,20 +1,16 @@
 """Studies: a pure function of one point, and the points at which it is computed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
 from .result import Columns, Found, columns
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Point = Mapping[str, Any]  # what distinguishes one point of a study, in types that JSON knows
 Compute = Callable[[Point], xr.Dataset]  # one point's labelled result, the same whoever computes it

@@ -9,10 +9,10 @@ import scipy
 import xarray as xr
 
 from ..dynamics.equilibria.equilibrium import Equilibrium, EquilibriumError
-from ..geometry.common import Array, InputError, shown
+from ..geometry.common import Array
 from ..geometry.scene.files import changed
 from ..geometry.scene.messages import SceneError
-from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number
+from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, positive, refused
 from .gradient import ANSWERS, Gradient, answer_of, derivative
 from .levitation import Levitation
 from .plan import SceneLike
@@ -30,18 +30,13 @@ def error_bars(
     """The Dataset of `uncertainty` for a scene's `levitation`."""
     gradient = Gradient(levitation)
     if not isinstance(tolerances, Mapping) or not tolerances:
-        raise InputError(
-            f"Input tolerances must be numbers by key of the scene file; instead received {shown(tolerances)}. A scene "
-            "file may have them: edge_mm = {value = 10, tolerance = 0.05}."
-        )
+        way_out = " A scene file may have them: edge_mm = {value = 10, tolerance = 0.05}."
+        raise refused("tolerances", "be numbers by key of the scene file", tolerances, way_out)
     keys = gradient.checked_keys(list(tolerances), "tolerances")
     for key, value in tolerances.items():
-        if not is_number(value) or not value > 0:
-            raise InputError(
-                f"Input tolerances: that of {key} must be a positive number; instead received {shown(value)}."
-            )
+        positive(f"tolerances: that of {key}", value)
     if isinstance(draws, bool) or not isinstance(draws, int) or not 0 <= draws <= 100_000:
-        raise InputError(f"Input draws must be a number from 0 to 100000; instead received {shown(draws)}.")
+        raise refused("draws", "be a number from 0 to 100000", draws)
     if not (known := levitation.equilibria):
         raise EquilibriumError(f"At {levitation.scene.frequency:g} Hz the floater has no equilibrium.")
     wide = np.array([float(tolerances[key]) for key in keys])

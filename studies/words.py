@@ -123,7 +123,10 @@ def _polar_angle(equilibrium: Equilibrium, digits: int, unit: str = "") -> str:
 
 
 def _least_stable(equilibrium: Equilibrium) -> str:
-    name = max(equilibrium.modes, key=lambda mode: mode.growth_per_s).name if equilibrium.modes else "unnamed"
+    return mode_words(max(equilibrium.modes, key=lambda m: m.growth_per_s).name if equilibrium.modes else "unnamed")
+
+
+def mode_words(name: str) -> str:
     return MODE_NAMES.get(name, name)
 
 

@@ -24,7 +24,7 @@ from ..cli.options import NAMES, Answer, Models, Workers, combinations
 from ..coils import coils_figure
 from ..compare import compare_figure
 from ..design import design_figure
-from ..exchange import field_map_figure
+from ..fields import field_map_figure
 from ..figures import run as drawing
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page

@@ -15,13 +15,10 @@ from cyclopts import Parameter
 from ...geometry.common import InputError
 from . import options
 from .console import note
-from .options import Answer, Flag, Models, Output, Place, SceneFile, Spin, Workers
+from .options import Answer, Flag, Models, Output, Place, ResultFile, SceneFile, Spin, Workers
 
 if TYPE_CHECKING:
     from ...geometry.scene.contents import Scene
-
-ReactionModel = Literal["slab", "fem", "reduced", "auto"]
-Plane = Literal["xy", "xz", "yz"]
 
 
 def _loaded(scene: Path) -> "Scene":
@@ -78,7 +75,7 @@ def field(
     scene: SceneFile,
     *,
     points: Path | None = None,
-    plane: Plane | None = None,
+    plane: Literal["xy", "xz", "yz"] | None = None,
     extent_mm: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     offset_mm: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0,
     steps: int = 121,
@@ -117,14 +114,14 @@ def field(
             f"Input --points must be given, or --plane, or --working-point; instead received {given or 'none'} of them."
         )
     if working_point:
-        from ..demagnetising import working_point_job
+        from ..fields import working_point_job
         from ..levitation import Levitation
 
         return working_point_job(Levitation(_loaded(scene), requested), output.folder)
     if plane is not None:
         extent = None if extent_mm is None else options.map_extent(extent_mm)
         options.check_between("--steps", steps, options.STEPS)
-        from ..exchange import field_map_job
+        from ..fields import field_map_job
 
         return field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)
     assert points is not None
@@ -235,7 +232,7 @@ def plate(
     *,
     at: Place,
     frequency_hz: float,
-    model: ReactionModel = "auto",
+    model: Literal["slab", "fem", "reduced", "auto"] = "auto",
     rtol: float = 1e-3,
     output: Output = Output(),
 ) -> Answer:
@@ -349,14 +346,8 @@ def design(goals: Path, *, requested: Models = Models(), output: Output = Output
     return design_job(goals, requested.checked(), output.folder)
 
 
-def figure(result: Path, *, output: Output = Output()) -> Answer:
-    """The figures of a result as PNG and PDF, from its file alone; beside it, unless --out is given.
-
-    Parameters
-    ----------
-    result
-        A netCDF file that spinlev has written.
-    """
+def figure(result: ResultFile, *, output: Output = Output()) -> Answer:
+    """The figures of a result as PNG and PDF, from its file alone; beside it, unless --out is given."""
     from ..catalogue.runner import draw_result
 
     files = draw_result(result, output.out or result.parent)
@@ -393,14 +384,8 @@ def report(folder: Path, *, output: Output = Output()) -> Answer:
     return {"report": str(page), "results": names}, [f"Report in {page}"]
 
 
-def cite(result: Path, *, output: Output = Output()) -> Answer:
-    """The papers behind what a result used, as BibTeX.
-
-    Parameters
-    ----------
-    result
-        A netCDF file that spinlev has written.
-    """
+def cite(result: ResultFile, *, output: Output = Output()) -> Answer:
+    """The papers behind what a result used, as BibTeX."""
     from ..catalogue.report import cite_job
 
     references = cite_job(result)
@@ -430,7 +415,7 @@ def export(scene: SceneFile, file: Path, *, requested: Models = Models(), output
         File to write, OUT.vtu.
     """
     loaded = _loaded(scene)
-    from ..exchange import export_job
+    from ..fields import export_job
 
     return export_job(loaded, requested.checked(), file)
 

@@ -31,6 +31,11 @@ FARTHEST = 1e9  # largest coordinate, mm: beyond, powers of it overflow
 SPINS, STEPS, PORTS = (-1000, 1000), (5, 1001), (0, 65535)  # body spins, points along a map's longer side, ports
 
 
+def refused(name: str, rule: str, value: object, way_out: str = "") -> InputError:
+    """The error of an input `name` whose `value` breaks a `rule`, the words behind must; a `way_out` may follow."""
+    return InputError(f"Input {name} must {rule}; instead received {shown(value)}.{way_out}")
+
+
 def _floats(text: str, separator: str = ",") -> list[float]:
     """The numbers of a text; none where one is no finite number."""
     try:
@@ -44,9 +49,7 @@ def three_numbers(name: str, text: str) -> Array:
     """(3,) from X,Y,Z. Raises InputError where they are not three finite numbers."""
     numbers = _floats(text)
     if len(numbers) != 3 or max(map(abs, numbers)) > FARTHEST:
-        raise InputError(
-            f"Input {name} must be three numbers X,Y,Z of at most {FARTHEST:g} mm; instead received {shown(text)}."
-        )
+        raise refused(name, f"be three numbers X,Y,Z of at most {FARTHEST:g} mm", text)
     return np.array(numbers)
 
 
@@ -68,10 +71,7 @@ def map_extent(text: str) -> Array:
     if len(numbers) == 1:
         numbers = [-numbers[0], numbers[0]] * 2
     if not (len(numbers) == 4 and numbers[0] < numbers[1] and numbers[2] < numbers[3]):
-        raise InputError(
-            "Input --extent-mm must be one positive number, or LEFT,RIGHT,LOWER,UPPER in rising order; instead "
-            f"received {shown(text)}."
-        )
+        raise refused("--extent-mm", "be one positive number, or LEFT,RIGHT,LOWER,UPPER in rising order", text)
     return np.array(numbers) * 1e-3
 
 
@@ -88,13 +88,13 @@ def is_number(value: Any) -> bool:
 def positive(name: str, value: float) -> None:
     """Raises InputError where the value is no positive finite number."""
     if not (is_number(value) and value > 0):
-        raise InputError(f"Input {name} must be a positive number; instead received {shown(value)}.")
+        raise refused(name, "be a positive number", value)
 
 
 def finite(name: str, value: float) -> float:
     """The value. Raises InputError where it is no finite number."""
     if not is_number(value):
-        raise InputError(f"Input {name} must be a finite number; instead received {shown(value)}.")
+        raise refused(name, "be a finite number", value)
     return float(value)
 
 
@@ -102,7 +102,7 @@ def check_between(name: str, value: float, ends: tuple[int, int], whole: bool = 
     """Raises InputError about `name` where the value is no number between `ends`, or none that is `whole`."""
     low, high = ends
     if not is_number(value) or not low <= value <= high or (whole and value != int(value)):
-        raise InputError(f"Input {name} must be between {low} and {high}; instead received {shown(value)}.")
+        raise refused(name, f"be between {low} and {high}", value)
 
 
 def read_points(path: Path) -> Array:
@@ -146,6 +146,7 @@ def _number(path: Path, line: int, row: list[str], column: int) -> float:
 Flag = Annotated[bool, Parameter(negative="")]
 Place = Annotated[str, Parameter(allow_leading_hyphen=True)]
 SceneFile = Annotated[Path, Parameter(help="Scene file.")]
+ResultFile = Annotated[Path, Parameter(help="A netCDF file that spinlev has written.")]
 Spin = Annotated[float, Parameter(help="Body spin S = Ω·m̂/ω of the floater about its own moment.")]
 FieldModel = Literal["dipole", "cuboid", "surface", "fem", "map", "auto"]
 InteractionModel = Literal["rigid", "mutual", "auto"]
@@ -195,14 +196,14 @@ class Models:
         for name, known in NAMES.items():
             value = getattr(self, name)
             if not isinstance(value, str) or value not in known:
-                raise InputError(f"Input {name} must be one of {', '.join(known)}; instead received {shown(value)}.")
+                raise refused(name, f"be one of {', '.join(known)}", value)
         for name, least, most, rule in (
             ("rtol", 1e-13, math.nextafter(1, 0), "at least 1e-13 and less than 1"),
             ("plate_rtol", 1e-5, 0.1, "at least 1e-5 and at most 0.1"),
         ):
             if not is_number(value := getattr(self, name)) or not least <= value <= most:
                 option = f"--{name.replace('_', '-')}"
-                raise InputError(f"Input {option} must be {rule}; instead received {shown(value)}.")
+                raise refused(option, f"be {rule}", value)
         return self
 
 
@@ -357,10 +358,8 @@ def parse_vary(requested: Sequence[str]) -> dict[str, list[Any]]:
         key, equals, values = text.partition("=")
         given = [part.strip() for part in values.split(",")] if key in NAMES else _numbers(values)
         if not (key and equals and given):
-            raise InputError(
-                "Input --vary must be KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,... with a key of the scene file, such as "
-                f"rotor.displacement_mm=1:4:0.5; instead received {shown(text)}.{_decimal_point(text)}"
-            )
+            rule = "be KEY=FIRST:LAST:STEP or KEY=VALUE,VALUE,... with a key of the scene file, such as "
+            raise refused("--vary", f"{rule}rotor.displacement_mm=1:4:0.5", text, _decimal_point(text))
         if key in found:
             raise InputError(f"Input --vary must give each key once; instead received {shown(key)} twice.")
         found[key] = given
@@ -373,7 +372,7 @@ def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") ->
     Raises InputError: no key, no value, one that is no finite number, one that is given twice, or too many points.
     """
     if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
-        raise InputError(f"Input {name} must be lists of values by key; instead received {shown(values)}.")
+        raise refused(name, "be lists of values by key", values)
     if not values:
         raise InputError(f"Input {name} must have at least one key; instead received none.")
     found = {}
@@ -383,13 +382,13 @@ def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") ->
         fine = all(isinstance(v, str) if key in NAMES else is_number(v) for v in listed)
         if not listed or not fine:
             what = "names" if key in NAMES else "finite numbers"
-            raise InputError(f"Input {key} must be varied over {what}; instead received {shown(given)}.")
+            raise refused(key, f"be varied over {what}", given)
         if len(set(listed)) < len(listed):
-            raise InputError(f"Input {name} must give {key} each value once; instead received {shown(given)}.")
+            raise refused(name, f"give {key} each value once", given)
         found[key] = listed if key in NAMES else [float(value) for value in listed]
     points = math.prod(len(each) for each in found.values())
     if points > MOST_VALUES:
-        raise InputError(f"Input {name} must make at most {MOST_VALUES} points; instead received {points}.")
+        raise refused(name, f"make at most {MOST_VALUES} points", points)
     return found
 
 
@@ -402,10 +401,8 @@ def frequency_grid(text: str) -> Array:
     """(n,) Hz, rising, from FIRST:LAST:STEP or VALUE,VALUE,... Raises InputError unless all are positive."""
     numbers = sorted(set(_numbers(text)))
     if not numbers or numbers[0] <= 0:
-        raise InputError(
-            "Input --frequency-hz must be FIRST:LAST:STEP or VALUE,VALUE,... of positive numbers, such as 100:180:5; "
-            f"instead received {shown(text)}.{_decimal_point(text)}"
-        )
+        rule = "be FIRST:LAST:STEP or VALUE,VALUE,... of positive numbers, such as 100:180:5"
+        raise refused("--frequency-hz", rule, text, _decimal_point(text))
     return np.array(numbers)
 
 

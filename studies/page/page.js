@@ -15,9 +15,11 @@
   };
 
   // Elements of the page and of its charts
+  const say = (id, text) => { at(id).textContent = text; };
+  const set = (element, values) => { for (const [key, value] of Object.entries(values)) element.setAttribute(key, value); };
   const grow = (parent, tag, values = {}, text = null) => {
     const made = parent instanceof SVGElement ? document.createElementNS("http://www.w3.org/2000/svg", tag) : document.createElement(tag);
-    for (const [key, value] of Object.entries(values)) made.setAttribute(key, value);
+    set(made, values);
     if (text !== null) made.textContent = text;
     return parent.appendChild(made);
   };
@@ -43,14 +45,13 @@
       const clip = grow(grow(this.axes, "clipPath", { id: `${this.svg.id}_clip` }), "rect", frame);
       this.plane.setAttribute("clip-path", `url(#${clip.parentNode.id})`);
       grow(this.axes, "rect", { ...frame, fill: "none", stroke: "#8390a8" });
-      for (const value of this.ticks(x)) {
-        grow(this.axes, "line", { x1: this.px(value), x2: this.px(value), y1: this.bottom, y2: this.bottom + 4, stroke: "#8390a8" });
-        grow(this.axes, "text", { x: this.px(value), y: this.bottom + 15, "text-anchor": "middle" }, value);
-      }
-      for (const value of this.ticks(y)) {
-        grow(this.axes, "line", { x1: this.left - 4, x2: this.left, y1: this.py(value), y2: this.py(value), stroke: "#8390a8" });
-        grow(this.axes, "text", { x: this.left - 6, y: this.py(value) + 4, "text-anchor": "end" }, value);
-      }
+      const tick = (value, x1, x2, y1, y2, x, y, anchor) => {
+        grow(this.axes, "line", { x1, x2, y1, y2, stroke: "#8390a8" });
+        grow(this.axes, "text", { x, y, "text-anchor": anchor }, value);
+      };
+      const { left, bottom } = this;
+      for (const [value, p] of this.ticks(x).map(one => [one, this.px(one)])) tick(value, p, p, bottom, bottom + 4, p, bottom + 15, "middle");
+      for (const [value, p] of this.ticks(y).map(one => [one, this.py(one)])) tick(value, left - 4, left, p, p, left - 6, p + 4, "end");
       grow(this.axes, "text", { x: (this.left + this.right) / 2, y: this.height - 4, "text-anchor": "middle" }, this.across);
       const middle = (this.top + this.bottom) / 2;
       grow(this.axes, "text", { x: 10, y: middle, "text-anchor": "middle", transform: `rotate(-90 10 ${middle})` }, this.upwards);
@@ -87,12 +88,12 @@
   let playing = false, asked = false, last = 0, pending = 0;  // `last`, `pending`: since when a piece or the answer is waited for
   let pose = { position: [0, 0, -20], moment: [0, 0, 1], seen: [0, 0, -20], angle: 0, plate: 0 };
 
-  const drawHere = () => { here.setAttribute("cx", map.px(point[0])); here.setAttribute("cy", map.py(point[1])); };
+  const drawHere = () => set(here, { cx: map.px(point[0]), cy: map.py(point[1]) });
   const drawBall = ([x, , z]) => {
     if (!drawn) return;
     const low = Math.min(-60, z - 2 * drawn.radius), half = 34 * (15 - low) / 75;  // of one scale
     if (side.y[0] !== low) { side.range([-half, half], [low, 15]); drawSide(); }
-    for (const [key, value] of Object.entries({ cx: side.px(x), cy: side.py(z), r: side.px(drawn.radius) - side.px(0) })) ball.setAttribute(key, value);
+    set(ball, { cx: side.px(x), cy: side.py(z), r: side.px(drawn.radius) - side.px(0) });
     ball.place = [x, z];
     const [moment] = turned([pose.moment], pose.flying ? -pose.angle : 0);
     shape.setAttribute("d", drawn.floater.map(body => outline(body.faces, moved(body.at, [x, 0, z], moment))).join(""));
@@ -115,8 +116,8 @@
     const [from, to] = [[0, side.y[0]], [0, side.y[1]]].map(([x, z]) => [side.px(x), side.py(z)]);
     grow(grow(bodies, "line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], stroke: COLORS.ink, "stroke-width": 0.8, "stroke-dasharray": "9 3 2 3" }), "title", {}, "Axis of rotation");
     if (ghost) grow(bodies, "circle", { cx: side.px(ghost[0]), cy: side.py(ghost[2]), r: side.px(drawn.radius) - side.px(0), fill: "none", stroke: COLORS.dipole, "stroke-width": 1.5, "stroke-dasharray": "4 3" });
-    if (field) for (const [key, value] of Object.entries({ href: field.url, x: side.px(field.x[0]), y: side.py(field.z[1]),
-      width: side.px(field.x[1]) - side.px(field.x[0]), height: side.py(field.z[0]) - side.py(field.z[1]) })) slice.setAttribute(key, value);
+    if (field) set(slice, { href: field.url, x: side.px(field.x[0]), y: side.py(field.z[1]),
+      width: side.px(field.x[1]) - side.px(field.x[0]), height: side.py(field.z[0]) - side.py(field.z[1]) });
     crosses.setAttribute("d", places.map(([x, z]) => [[-1, -1], [1, 1], [-1, 1], [1, -1]]
       .map(([a, b], k) => `${k % 2 ? "L" : "M"}${side.px(x) + 4 * a} ${side.py(z) + 4 * b}`).join("")).join(""));
   };
@@ -251,8 +252,8 @@
   // Nothing that takes long goes on without a word.
   const since = start => `${Math.round((performance.now() - start) / 1000)} s`;
   setInterval(() => {
-    if (asked && performance.now() - last > SILENCE) at("says").textContent = `The next piece of the trajectory is being computed (${since(last)}) ...`;
-    if (pending && performance.now() - pending > SILENCE) at("sign").textContent = `${at("sign").dataset.text} The selected models are being computed (${since(pending)}) ...`;
+    if (asked && performance.now() - last > SILENCE) say("says", `The next piece of the trajectory is being computed (${since(last)}) ...`);
+    if (pending && performance.now() - pending > SILENCE) say("sign", `${at("sign").dataset.text} The selected models are being computed (${since(pending)}) ...`);
   }, 500);
 
   const choose = (id, options, value) => {
@@ -269,11 +270,10 @@
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   };
   let copies = {};
-  const texts = id => text => { at(id).textContent = text; };
   const show = {
-    message: text => { at("message").textContent = text; if (text) pending = 0; },
-    says: texts("says"), map_says: texts("map_says"),
-    copies: found => { copies = found; at("command").textContent = found.line; at("copied").textContent = ""; },
+    message: text => { say("message", text); if (text) pending = 0; },
+    says: text => say("says", text), map_says: text => say("map_says", text),
+    copies: found => { copies = found; say("command", found.line); say("copied", ""); },
     controls: known => {
       at("sliders").replaceChildren();
       loaded("sliders");
@@ -297,10 +297,10 @@
         grow(cell, "span", {}, there ? `${angle.toFixed(1)}°, ${stability}` : known ? stability : "computed when you release");
       });
       ghost = found.models.find(({ name, pose: there }, n) => n && there && name === "point dipole")?.pose[0] || null;
-      at("headline").textContent = found.headline;
-      at("comparison").textContent = found.comparison.join(" ");
+      say("headline", found.headline);
+      say("comparison", found.comparison.join(" "));
       pending = found.complete ? 0 : pending || performance.now();
-      at("sign").dataset.text = at("sign").textContent = `${found.complete ? "All models under the same conditions" : "Preview"}${found.conditions && ": "}${found.conditions}.`;
+      say("sign", at("sign").dataset.text = `${found.complete ? "All models under the same conditions" : "Preview"}${found.conditions && ": "}${found.conditions}.`);
       at("sign").dataset.number = found.number;
       ["table", "modes"].forEach(loaded);
       table("table", found.rows, found.left_out);
@@ -326,7 +326,7 @@
     map: found => {
       [stable, border].forEach(path => path.setAttribute("d", ""));
       article.replaceChildren();
-      at("map_article").textContent = "";
+      say("map_article", "");
       at("map").classList.toggle("loading", Boolean(found));
       at("map").style.display = found ? "" : "none";
       if (!found) return;
@@ -342,7 +342,7 @@
         const mark = { x: map.px(frequency) - 4, y: map.py(value) - 4, width: 8, height: 8, fill: /^lev/.test(what) ? COLORS.ink : "white", stroke: COLORS.ink };
         grow(grow(article, "rect", mark), "title", {}, `Article, ${frequency} Hz: ${what}`);
       }
-      at("map_article").textContent = `Article's experiment: rotors that levitated (●) or did not (○), on the right as it gives no frequency${flights.length ? "; squares: its trajectories, filled if they levitated" : ""}.`;
+      say("map_article", `Article's experiment: rotors that levitated (●) or did not (○), on the right as it gives no frequency${flights.length ? "; squares: its trajectories, filled if they levitated" : ""}.`);
     },
     regions: ({ model, cells, border: pieces }) => {
       loaded("map");
@@ -369,7 +369,7 @@
     },
     playing: is => {
       playing = is;
-      at("play").textContent = is ? "Pause" : "Play";
+      say("play", is ? "Pause" : "Play");
       last = performance.now() - FRAME;
       fly();
     },
@@ -382,22 +382,21 @@
     },
   };
   line.onmessage = event => { for (const [name, value] of Object.entries(JSON.parse(event.data))) show[name](value); };
-  line.onclose = () => { if (!at("message").textContent) at("message").textContent = "The connection to spinlev was closed. Load the page again, or start spinlev explore again."; };
+  line.onclose = () => { if (!at("message").textContent) say("message", "The connection to spinlev was closed. Load the page again, or start spinlev explore again."); };
 
   for (const name of ["model", "plate_model"]) at(name).addEventListener("change", () => send("choose", name, at(name).value));
   for (const kind of ["toml", "json", "nc"]) at(`get_${kind}`).addEventListener("click", () => send("get", kind));
   for (const kind of ["command", "python"]) at(`copy_${kind}`).addEventListener("click", () => navigator.clipboard.writeText(copies[kind])
-    .then(() => "Copied.", () => "The browser does not let pages copy.").then(texts("copied")));
+    .then(() => "Copied.", () => "The browser does not let pages copy.").then(text => say("copied", text)));
   at("preset").addEventListener("change", () => { if (at("preset").value) send("preset", at("preset").value); });
   at("figure").addEventListener("click", () => {  // the charts as they are, with the text above them
     const charts = [map, side, running.height, running.tilt], whole = grow(document.createElementNS("http://www.w3.org/2000/svg", "g"), "svg");
     const places = [[10, 30], [450, 30], [10, 420], [450, 420]];
-    for (const [key, value] of Object.entries({ viewBox: "0 0 880 580", width: 880, height: 580 })) whole.setAttribute(key, value);
+    set(whole, { viewBox: "0 0 880 580", width: 880, height: 580 });
     grow(whole, "style", {}, "text { font: 11px sans-serif; fill: #2e3440; }");
     grow(whole, "text", { x: 10, y: 18 }, `${at("headline").textContent} ${at("sign").textContent}`);
     charts.forEach((chart, k) => {
-      const copy = whole.appendChild(chart.svg.cloneNode(true));
-      for (const [key, value] of Object.entries({ x: places[k][0], y: places[k][1], width: chart.width, height: chart.height })) copy.setAttribute(key, value);
+      set(whole.appendChild(chart.svg.cloneNode(true)), { x: places[k][0], y: places[k][1], width: chart.width, height: chart.height });
     });
     save("explore.svg", new Blob([new XMLSerializer().serializeToString(whole)], { type: "image/svg+xml" }));
   });
@@ -418,15 +417,15 @@
     held = true;
     at("side").setPointerCapture(event.pointerId);
     show.playing(false);
-    at("says").textContent = "Let go where the floater shall begin, at rest in the frame that turns with the rotor.";
+    say("says", "Let go where the floater shall begin, at rest in the frame that turns with the rotor.");
     event.preventDefault();
   });
   at("side").addEventListener("pointermove", event => { if (held) { const [x, z] = side.under(event); drawBall([x, 0, z]); } });
   for (const kind of ["pointercancel", "pointerup", "lostpointercapture"]) at("side").addEventListener(kind, event => {
     if (!held) return;
     held = false;
-    if (kind === "pointercancel") { at("says").textContent = "The browser ended the drag; nothing was changed."; drawBall(pose.seen); return; }
-    at("says").textContent = `Putting the floater at x = ${ball.place[0].toFixed(1)} mm, z = ${ball.place[1].toFixed(1)} mm ...`;
+    if (kind === "pointercancel") { say("says", "The browser ended the drag; nothing was changed."); drawBall(pose.seen); return; }
+    say("says", `Putting the floater at x = ${ball.place[0].toFixed(1)} mm, z = ${ball.place[1].toFixed(1)} mm ...`);
     send("put", ...ball.place);
   });
   at("bar").style.background = `linear-gradient(90deg, ${VIRIDIS.join()})`;

@@ -220,10 +220,9 @@ class Page:
         self._show_rest()
 
     def _show_rest(self) -> None:
-        places = self.shown.places if self.shown else []
-        self.tell(equilibria=[[position[0], position[2]] for position, _ in places])
-        if places:
-            position, moment = places[0]
+        self.tell(equilibria=[[position[0], position[2]] for position, _ in self.near])
+        if self.near:
+            position, moment = self.near[0]
             self._sample(np.array([[0.0], [position[2]], [np.degrees(polar_angle(np.array(moment)))]]), fresh=True)
             pose = {"position": position, "moment": moment, "seen": position, "angle": 0.0, "plate": 0.0}
             self.tell(pose={**pose, "flying": False})

@@ -9,12 +9,12 @@ from urllib.parse import urlencode
 
 import numpy as np
 
-from ...geometry.common import InputError, shown
+from ...geometry.common import InputError
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import changed, parse_scene, scene_keys, scene_text
 from ...geometry.scene.making import assemble
 from ...geometry.scene.messages import SceneError
-from ..cli.options import SPINS, FieldModel, Models, PlateModel, check_between, finite
+from ..cli.options import SPINS, FieldModel, Models, PlateModel, check_between, finite, refused
 
 CHOICES = ("model", "plate_model", "spin")  # Keys of an address that are none of the scene file
 LONGEST, LARGEST = 20_000, 200_000  # Characters of an address's state; bytes of a scene file that is opened in a page
@@ -88,7 +88,7 @@ class PageState:
         try:
             spin = finite("spin", float(chosen["spin"]))
         except ValueError:
-            raise InputError(f"Input spin must be a number; instead received {shown(chosen['spin'])}.") from None
+            raise refused("spin", "be a number", chosen["spin"]) from None
         check_between("spin", spin, SPINS)
         if not (given := {key: value for key, value in asked.items() if key not in CHOICES}):
             return replace(self, **{**chosen, "spin": spin})

@@ -13,16 +13,7 @@ import numpy as np
 from ...dynamics.continuation.map import EquilibriumMap, equilibrium_map
 from ...dynamics.continuation.rotor_family import RotorFamily, rotor_family
 from ...dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
-from ...dynamics.equilibria.equilibrium import (
-    MARGINAL,
-    MODE_NAMES,
-    STABILITIES,
-    Equilibrium,
-    Survey,
-    is_stable,
-    nearest_of,
-    spectra,
-)
+from ...dynamics.equilibria.equilibrium import MARGINAL, STABILITIES, Equilibrium, is_stable, nearest_of, spectra
 from ...dynamics.equilibria.path import NEAR, NEWTON_STEPS
 from ...dynamics.equilibria.search import survey
 from ...dynamics.flights.live import LiveFlight, Piece
@@ -43,7 +34,7 @@ from ..figures.view import field_lines
 from ..levitation import Levitation
 from ..plan import sources
 from ..result import Result, write_dataset
-from ..words import comparison_words, equilibria_rows, headline, left_out_words, worth_a_row
+from ..words import comparison_words, equilibria_rows, headline, left_out_words, mode_words, worth_a_row
 from .state import MEASURES, PageState
 
 SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)  # The box in which field lines are drawn, m
@@ -136,7 +127,10 @@ def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -
         levitation = Levitation(state.scene, Models(model, "none"), state.spin)
         try:
             with nullcontext() if patient or model not in PERMEABLE else kept_only():
-                found = _survey_near(levitation, near) or _survey_near(levitation, fresh)
+                found = None
+                for poses in filter(len, (near, fresh)):
+                    places, moments = map(np.array, zip(*poses, strict=True))
+                    found = found or survey_near(levitation, 1e-3 * places, moments)
                 # Not from the cache, which would get a file for every step of a slider.
                 found = found or survey(state.scene, levitation.interaction, state.spin, rates=levitation.rates)
         except NotKeptError:
@@ -145,11 +139,6 @@ def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -
         known[model] = levitation
         fresh = fresh or [_pose(e) for e in found.equilibria]
     return _shown(state, known)
-
-
-def _survey_near(levitation: Levitation, near: Sequence[Any]) -> Survey | None:
-    places, moments = (np.array([pair[k] for pair in near]) for k in (0, 1))
-    return survey_near(levitation, 1e-3 * places, moments) if len(near) else None
 
 
 def complete(state: PageState) -> Shown:
@@ -197,7 +186,7 @@ def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
     conditions = [PLATE_WORDS[felt]] if state.scene.plate is not None else []
     if any(one.interaction_model == "mutual" for one in known.values()):
         conditions.append("finite elements with mutual magnetisation of rotor and floater")
-    modes = [(MODE_NAMES.get(m.name, m.name), f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in leading]
+    modes = [(mode_words(m.name), f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in leading]
     z, x = np.meshgrid(*(np.arange(low, high + PIXEL / 2, PIXEL) for low, high in SLICE[::-1]), indexing="ij")
     with np.errstate(divide="ignore"):
         places = 1e-3 * np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)

@@ -16,7 +16,7 @@ from spinlev.fem.closed_forms.uniform import fields_of_sphere
 from spinlev.geometry.common import MU_0, InputError
 from spinlev.geometry.meshes.solids import part_rule
 from spinlev.studies.cli.options import KINDS, Models, new_scene
-from spinlev.studies.exchange import export_job
+from spinlev.studies.fields import export_job
 from spinlev.studies.magpylib import from_magpylib, to_magpylib
 
 POINTS = np.random.default_rng(0).normal(size=(50, 3)) * 0.01 + [0.0, 0.0, -0.04]

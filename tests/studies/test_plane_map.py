@@ -14,7 +14,7 @@ from spinlev.geometry.common import MU_0, InputError
 from spinlev.geometry.scene.files import scene_text
 from spinlev.studies.cli.main import run
 from spinlev.studies.cli.options import map_extent
-from spinlev.studies.exchange import field_map
+from spinlev.studies.fields import field_map
 
 SPHERE = sl.tilt(angle_deg=5.0, shape="sphere", diameter_mm=10.0, remanence_T=1.3)
 
