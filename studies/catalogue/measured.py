@@ -29,12 +29,13 @@ from ...fem.plate.slab import Slab, drag_and_lift
 from ...geometry.common import MU_0, Array
 from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Coil, Plate, Scene
-from ...geometry.scene.files import parse_scene
+from ...geometry.scene.making import assemble, sphere
 from ...geometry.shapes import Box, Sphere, ring
 from ..figures.style import PALETTE, drawn, panels
 from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .plates import FREQUENCIES, compute_line, measured_line, team7_mesh
+from .showing import records
 
 DURATION, GRAVITY = 1.72, 9.81
 GAUSS = 5e-7  # Half of the last digit of problem 7's table, T
@@ -43,33 +44,17 @@ READING, TABLES = (5e-5, 5e-5), 100  # Half of the last digit of its times (s) a
 PHASES = 12  # Start phases of the current that are tried, in half a turn: the force has twice its frequency
 COPPER, ALUMINIUM = 5.96e7, 3.4e7  # S/m
 WARMING = 4e-3  # Part of its resistivity that aluminium gains in a kelvin at room temperature
-TEAM28 = """
-[floater]
-shape = "cylinder"
-diameter_mm = 130.0
-height_mm = 3.0
-remanence_T = 0.0
-density_kg_m3 = 2687.095
-conductivity_S_m = 3.4e7
-[start]
-position_mm = [0.0, 0.0, 5.3]
-[[coils]]
-radius_mm = 41.0
-width_mm = 28.0
-height_mm = 52.0
-center_mm = [0.0, 0.0, -26.0]
-turns = 960.0
-current_A = 20.0
-frequency_hz = 50.0
-[[coils]]
-radius_mm = 87.5
-width_mm = 15.0
-height_mm = 52.0
-center_mm = [0.0, 0.0, -26.0]
-turns = 576.0
-current_A = -20.0
-frequency_hz = 50.0
-"""
+
+
+def team28(thickness_mm: float = 3.0) -> Scene:
+    """Problem 28: the disc, or one of another thickness and the same mass, over its two coils."""
+    disc = {"shape": "cylinder", "diameter_mm": 130.0, "height_mm": thickness_mm, "remanence_T": 0.0}
+    disc |= {"density_kg_m3": 2687.095 * 3.0 / thickness_mm, "conductivity_S_m": ALUMINIUM}
+    wound = {"height_mm": 52.0, "center_mm": [0.0, 0.0, -26.0], "frequency_hz": 50.0}
+    inner = {"radius_mm": 41.0, "width_mm": 28.0, "turns": 960.0, "current_A": 20.0}
+    outer = {"radius_mm": 87.5, "width_mm": 15.0, "turns": 576.0, "current_A": -20.0}
+    start = {"position_mm": [0.0, 0.0, 5.3]}
+    return assemble({"floater": disc, "start": start, "coils": [wound | inner, wound | outer]}, "TEAM problem 28")
 
 
 def measured_heights() -> tuple[Array, Array]:
@@ -88,7 +73,11 @@ def resting_height(scene: Scene, modes: FloatingModes) -> float:
 
 def in_phase(scene: Scene, phase: float) -> Scene:
     """The scene with another phase (rad) of all currents at the start."""
-    return replace(scene, coils=tuple(replace(coil, phase=phase) for coil in scene.coils))
+    return _with_coils(scene, *(replace(coil, phase=phase) for coil in scene.coils))
+
+
+def _with_coils(scene: Scene, *coils: Coil) -> Scene:
+    return replace(scene, coils=coils)
 
 
 def _modes(scene: Scene, order: int, heights: tuple[float, float] | None = None) -> FloatingModes:
@@ -101,40 +90,28 @@ def _modes(scene: Scene, order: int, heights: tuple[float, float] | None = None)
 
 def _sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple[str, float]]:
     """What changes of one thing do to the height at rest, m; those that need other modes if not `quick`."""
-    floater, base = scene.floater, resting_height(scene, modes)
-    low, high = modes.heights
-    raised = low + 1e-4, high + 1e-4
-
-    def with_rates(factor: float) -> float:
-        return resting_height(scene, replace(modes, rates=factor * modes.rates)) - base
-
-    def with_coils(*coils: Coil) -> Scene:
-        return replace(scene, coils=coils)
-
-    stronger = with_coils(*(replace(coil, current=1.01 * coil.current) for coil in scene.coils))
-    lighter = replace(scene, floater=replace(floater, density=0.99 * floater.density))
-    found = [
-        ("conductivity of the disc +1 %", with_rates(1 / 1.01)),
-        ("disc 10 K warmer", with_rates(1 + 10 * WARMING)),
-        ("mass of the disc -1 %", resting_height(lighter, modes) - base),
-        ("both currents +1 %", resting_height(stronger, modes) - base),
-        ("windings 0.1 mm higher in their frame", resting_height(scene, replace(modes, heights=raised)) - base),
-        ("phase of the current at the start +90°", resting_height(in_phase(scene, np.pi / 2), modes) - base),
-    ]
+    floater, (inner, outer), base = scene.floater, scene.coils, resting_height(scene, modes)
+    raised = modes.heights[0] + 1e-4, modes.heights[1] + 1e-4
+    changes: dict[str, tuple[Scene, FloatingModes]] = {
+        "conductivity of the disc +1 %": (scene, replace(modes, rates=1 / 1.01 * modes.rates)),
+        "disc 10 K warmer": (scene, replace(modes, rates=(1 + 10 * WARMING) * modes.rates)),
+        "mass of the disc -1 %": (replace(scene, floater=replace(floater, density=0.99 * floater.density)), modes),
+        "both currents +1 %": (_with_coils(scene, *(replace(c, current=1.01 * c.current) for c in scene.coils)), modes),
+        "windings 0.1 mm higher in their frame": (scene, replace(modes, heights=raised)),
+        "phase of the current at the start +90°": (in_phase(scene, np.pi / 2), modes),
+    }
+    found = [(name, resting_height(*changed) - base) for name, changed in changes.items()]
     if quick:
         return found
-    inner, outer = scene.coils
-    thicker = parse_scene(TEAM28.replace("height_mm = 3.0\n", "height_mm = 3.03\n"))
-    thicker = replace(thicker, floater=replace(thicker.floater, density=floater.density / 1.01))  # of the same mass
     variants = {
         "finite elements of order 3 instead of 4": scene,
-        "thickness of the disc +1 %": thicker,
-        "radius of the inner coil +0.1 mm": with_coils(replace(inner, radius=inner.radius + 1e-4), outer),
-        "windings a tenth as wide": with_coils(*(replace(coil, width=coil.width / 10) for coil in scene.coils)),
+        "thickness of the disc +1 %": team28(3.03),
+        "radius of the inner coil +0.1 mm": _with_coils(scene, replace(inner, radius=inner.radius + 1e-4), outer),
+        "windings a tenth as wide": _with_coils(scene, *(replace(c, width=c.width / 10) for c in scene.coils)),
     }
     rests = [resting_height(other, _modes(other, 3, modes.heights)) for other in variants.values()]
     before = [base, *[rests[0]] * (len(rests) - 1)]  # the others are compared on the same order
-    return [*found, *zip(variants, (a - b for a, b in zip(rests, before, strict=True)), strict=True)]
+    return [*found, *zip(variants, np.subtract(rests, before).tolist(), strict=True)]
 
 
 def swing(time: Array, height: Array) -> tuple[float, float]:
@@ -166,7 +143,7 @@ def swing_errors(time: Array, height: Array) -> Array:
 
 def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     """Rows of problem 28, and the trajectory's data."""
-    scene = parse_scene(TEAM28)
+    scene = team28()
     modes = _modes(scene, 3 if quick else 4)
     half = float(scene.floater.bodies[0].half_edges[2])
     time, measured = measured_heights()
@@ -224,31 +201,14 @@ def losses(quick: bool) -> list[Row]:
     return rows
 
 
-FALL = """
-frequency_hz = 0.0
-gravity_m_s2 = [0.0, 0.0, 9.81]
-[floater]
-diameter_mm = 12.7
-remanence_T = 1.3
-recoil_permeability = 1.0
-density_kg_m3 = 7500.0
-[drag]
-linear_N_s_m = 0.0
-angular_N_m_s = 0.0
-[start]
-position_mm = [0.0, 0.0, -15.0]
-[[coils]]
-radius_mm = 1.0
-width_mm = 1.0
-height_mm = 1.0
-center_mm = [0.0, 0.0, -100.0]
-current_A = 1.0
-"""
-
-
 def falling_magnet() -> tuple[Row, conductor.ConductorMotion]:
     """The terminal speed of a spherical magnet that falls in a copper tube, and its fall."""
-    scene, inner, outer, travel = parse_scene(FALL), 0.01, 0.0125, 0.015
+    inner, outer, travel = 0.01, 0.0125, 0.015
+    ball = sphere(diameter_mm=12.7, remanence_T=1.3, recoil_permeability=1.0, density_kg_m3=7500.0)
+    coil = {"radius_mm": 1.0, "width_mm": 1.0, "height_mm": 1.0, "center_mm": [0.0, 0.0, -100.0], "current_A": 1.0}
+    begin, still = {"position_mm": [0.0, 0.0, -15.0]}, {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}
+    keys = {"frequency_hz": 0.0, "gravity_m_s2": [0.0, 0.0, GRAVITY], "floater": ball, "drag": still, "start": begin}
+    scene = assemble(keys | {"coils": [coil]}, "a magnet that falls")
     scene = replace(scene, coils=(replace(scene.coils[0], current=scene.floater.moment),))
     tube, way = ring(outer, inner, 12 * inner), np.linspace(-travel, travel, 4)
     mesh = plate_mesh(tube, COPPER, np.outer(way, [0, 0, 1]), 50.0, MeshRule(distance_share=0.8))
@@ -406,12 +366,10 @@ def gather(parts: Sequence[xr.Dataset]) -> xr.Dataset:
 def measured_numbers(result: xr.Dataset) -> dict[str, Any]:
     """What was measured and computed of each experiment, and of TEAM problem 28 its motion and sensitivities."""
     keys = "name", "kind", "unit", "measured", "measured_error", "measured_error_from", "computed", "error"
-    rows = zip(*(result[key].values.tolist() for key in keys), strict=True)
-    found: dict[str, Any] = {"experiments": [dict(zip(keys, row, strict=True)) for row in rows]}
+    found: dict[str, Any] = {"experiments": records(result, {key: key for key in keys})}
     if "rms" not in result:  # problem 28 failed
         return found
     rms = 1e3 * result["rms"].values
-    shifts = zip(result["change"].values.tolist(), result["shift"].values.tolist(), strict=True)
     found["team28"] = {
         "height_mm": 1e3 * float(result.attrs["height"]),
         "rms_mm": float(rms[0]),
@@ -421,7 +379,7 @@ def measured_numbers(result: xr.Dataset) -> dict[str, Any]:
         "processor_s": float(result.attrs["seconds"]),
         "heat_J": float(result.attrs["heat"]),
         "missing_mm": 1e3 * float(result.attrs["missing"]),
-        "sensitivities": [{"change": change, "shift_mm": 1e3 * shift} for change, shift in shifts],
+        "sensitivities": records(result.assign(shift=1e3 * result["shift"]), {"change": "change", "shift_mm": "shift"}),
     }
     return found
 

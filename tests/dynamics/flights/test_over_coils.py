@@ -27,9 +27,9 @@ from spinlev.geometry.scene.contents import AbsoluteStart, Plate
 from spinlev.geometry.scene.files import parse_scene
 from spinlev.geometry.scene.making import assemble
 from spinlev.geometry.shapes import Box
-from spinlev.studies.catalogue.measured import TEAM28
+from spinlev.studies.catalogue.measured import team28
 
-SCENE = parse_scene(TEAM28)
+SCENE = team28()
 BODY, WEIGHT = SCENE.floater.bodies[0], SCENE.floater.mass * 9.81
 
 

@@ -12,7 +12,6 @@ from spinlev.studies.catalogue.measured import (
     EXPERIMENTS,
     MEASURED,
     READING,
-    TEAM28,
     compute,
     falling_magnet,
     gather,
@@ -24,6 +23,7 @@ from spinlev.studies.catalogue.measured import (
     resting_height,
     swing,
     swing_errors,
+    team28,
 )
 from spinlev.studies.coils import coils_figure, coils_summary, modes_of
 
@@ -119,7 +119,7 @@ def test_magnet_falls_in_a_tube_as_it_does_by_the_series():
 @pytest.mark.slow
 def test_team28_levitates_at_its_height_and_is_told():
     """The best open code has 11.055 mm; measured are 11.3."""
-    scene = parse_scene(TEAM28)
+    scene = team28()
     modes, _ = modes_of(scene)
     assert resting_height(scene, modes) == pytest.approx(11.055e-3, abs=0.02e-3)
     result, values = coils_summary(in_phase(scene, 1.0), 0.05, modes)
@@ -131,7 +131,7 @@ def test_team28_levitates_at_its_height_and_is_told():
 
 
 def test_coils_are_written_as_they_were_read():
-    scene = parse_scene(TEAM28)
+    scene = team28()
     again = parse_scene(scene_text(in_phase(scene, 0.5)))
     assert [coil.phase for coil in again.coils] == pytest.approx([0.5, 0.5])
     assert [coil.current for coil in again.coils] == [20.0, -20.0]
