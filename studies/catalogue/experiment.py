@@ -9,6 +9,7 @@ from the prior gives the evidence of every single fact, of every pair and of all
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from textwrap import fill
 from typing import Any
 
@@ -23,27 +24,19 @@ from ...geometry.common import Array
 from ..figures.style import PALETTE, drawn, panels, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
+from . import experiment_model as model
 from .experiment_design import design_row
 from .experiment_model import (
     EVEN,
-    FACTS,
     FITTED,
     LONGEST,
     NAMES,
-    QUICK_FACTS,
     UNKNOWNS,
     Fact,
-    Flight,
     Models,
-    Surrogate,
-    corrected,
-    courses,
-    ended,
-    ends,
-    fitted,
+    Trials,
     log_likelihoods,
     prior_values,
-    quantile,
 )
 from .showing import records, text_table, uncertain
 
@@ -133,7 +126,7 @@ TRUTH: dict[str, float] = {u.name: (u.first + u.second) / 2 if u.prior == EVEN e
 TRUTH |= {"displacement": 1.2, "tilt": 1.6, "stack": 14.2, "stack_tilt": 1.0}
 TRUTH |= {"magnets": 7.5e5, "steel": 3.0, "motion": 9.0}
 """Unknowns of which facts are made up: off the prior's middle by up to 1.5 of its deviations."""
-FLIGHTS: tuple[Flight, ...] = (
+FLIGHTS: tuple[model.Flight, ...] = (
     *(("single", 1.0, frequency, LONGEST) for frequency in np.arange(95.0, 185.0, 10.0)),
     *(("stack", 14.0, frequency, LONGEST) for frequency in np.arange(52.0, 68.0, 3.0)),
 )
@@ -141,14 +134,14 @@ FLIGHTS: tuple[Flight, ...] = (
 
 def synthetic_facts(models: Models) -> dict[str, Fact]:
     """How each of `FLIGHTS` of the true rotors most probably ends, and the times of falls, by the models themselves."""
-    values, facts = {name: np.array([value]) for name, value in TRUTH.items()}, {}
-    for flight, course in courses(models, values, FLIGHTS).items():
-        found = ends(models, flight, course, values)
+    trials, facts = Trials.of(models, {name: np.array([value]) for name, value in TRUTH.items()}, FLIGHTS), {}
+    for flight, course in trials.courses.items():
+        found = trials.ends(flight)
         way = max(found, key=lambda name: float(found[name][0]))
         lasted = float(course["fall"][0]) if way == "falls" else None
         when = "" if lasted is None else f" after {lasted:.3g} s"
         says = f"{flight[0]} of {flight[1]:g} mm, {flight[2]:g} Hz: {way}{when}"
-        facts[says] = Fact(says, (flight,), ended(flight, way, lasted))
+        facts[says] = Fact(says, (flight,), model.ended(flight, way, lasted))
     return facts
 
 
@@ -190,11 +183,11 @@ def _designs(settings: Point, mutual: bool) -> dict[tuple[str, str], list[Point]
     counts |= {("single", "mutual"): "better"} if mutual else {}
     nodes = {"heights": settings["heights"], "spins": settings["spins"]}
     return {
-        (kind, model): [
-            {"rotor": kind, "model": model, "number": number, **nodes, "steel": settings["steel"] and kind == "single"}
+        (kind, field): [
+            {"rotor": kind, "model": field, "number": number, **nodes, "steel": settings["steel"] and kind == "single"}
             for number in range(settings[count])
         ]
-        for (kind, model), count in counts.items()
+        for (kind, field), count in counts.items()
         if settings[count]
     }
 
@@ -205,7 +198,7 @@ def experiment(point: Point) -> xr.Dataset:
         return xr.Dataset({"hanging": design_row(point)["hanging"]}).expand_dims("design")
     name, settings, effects = point["variant"], SETTINGS[point["quick"]], VARIANTS[point["variant"]]
     models = Models(surrogates_of(settings, effects), effects)
-    facts = {fact: FACTS[fact] for fact in (QUICK_FACTS if point["quick"] else FACTS)}
+    facts = dict(list(model.FACTS.items())[: 4 if point["quick"] else None])
     if name == SYNTHETIC:
         facts = synthetic_facts(models)
     found = posterior(models, facts, settings["live"], settings["walks"], SEED)
@@ -221,7 +214,7 @@ def experiment(point: Point) -> xr.Dataset:
     return xr.Dataset(columns(COLUMNS, found), labels).expand_dims(variant=[name])
 
 
-def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, Surrogate]:
+def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, model.Surrogate]:
     """Fitted to the designs of closed forms, then corrected by finite elements, and by mutual magnetisation.
 
     The stack keeps its closed form: mutual magnetisation moves its fold by 0.1 Hz.
@@ -230,14 +223,11 @@ def surrogates_of(settings: Point, effects: Sequence[str]) -> dict[str, Surrogat
         name: xr.concat(map(design_row, points), "rotor", data_vars="all", coords="minimal", compat="override")
         for name, points in _designs(settings, "mutual" in effects).items()
     }
-    closed = {kind: design for (kind, model), design in designs.items() if model == "cuboid"}
-    found = {kind: fitted(kind, design, settings[f"{kind}_degree"]) for kind, design in closed.items()}
-    before = designs["single", "cuboid"]
-    for model in ("fem", "mutual"):
-        if ("single", model) in designs:
-            better = designs["single", model]
-            found["single"] = corrected(found["single"], before, better, settings["better_degree"])
-            before = better
+    closed = {kind: design for (kind, field), design in designs.items() if field == "cuboid"}
+    found = {kind: model.fitted(kind, design, settings[f"{kind}_degree"]) for kind, design in closed.items()}
+    single = [design for (kind, _), design in designs.items() if kind == "single"]  # each better than the last
+    for design, better in pairwise(single):
+        found["single"] = model.corrected(found["single"], design, better, settings["better_degree"])
     return found
 
 
@@ -275,7 +265,7 @@ def quantiles(one: xr.Dataset) -> Array:
 def prior_quantiles(result: xr.Dataset) -> Array:
     """The same of the prior."""
     priors = zip(result["prior"].values, result["prior_numbers"].values, strict=True)
-    return np.array([quantile(kind, first, second, SHARES) for kind, (first, second) in priors])
+    return np.array([model.quantile(kind, first, second, SHARES) for kind, (first, second) in priors])
 
 
 def facts_weighed(one: xr.Dataset) -> tuple[xr.Dataset, Array]:

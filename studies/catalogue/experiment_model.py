@@ -10,11 +10,11 @@ each has a probability, soft by the surrogate's error and by how the residual mo
 trajectory in fifty may end for a reason that nobody thought of, so that no fact can rule out everything.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
-from typing import NamedTuple
+from itertools import product, starmap
+from typing import NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -294,7 +294,6 @@ NOT_CAPTURED = 0.05
 """Probability that all launches fail below a rotor that can levitate a floater: about half are captured (`capture`)."""
 Values = Mapping[str, Array]
 Flight = tuple[str, float, float, float]  # Kind of rotor, its δx or δz (mm), frequency (Hz) and longest time (s)
-Known = Mapping[Flight, Course]
 PARTS = (("floater", "floater"), ("magnets", "rotor"), ("steel", "rotor"), ("air", "air"))
 """Strengths, and the effect that each belongs to."""
 
@@ -320,31 +319,49 @@ class Models:
         return float(self.surrogates[kind].errors[PLACE[quantity]])
 
 
-def ends(models: Models, flight: Flight, course: Course, values: Values) -> dict[str, Array]:
-    """Probabilities (n,) of how a `flight` with this `course` ends, for unknowns `values` (n,), by the `models`.
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """What becomes of rotors with drawn unknowns."""
 
-    "nothing" (no equilibrium), "falls", "stays", "oscillates".
-    """
-    kind, _, _, longest = flight
-    there = ndtr(course["margin"] / np.hypot(models.error(kind, "frequency"), SOFT))
-    grown = ndtr((course["growth"] - needed(values)) / np.hypot(SCATTER, course["doubt"]))
-    loose = 1 - (1 - grown) * (1 - _before(models, kind, course["perturbed"], longest))
-    falls, up = _before(models, kind, course["fall"], longest), there * (1 - loose)
-    return {"nothing": 1 - there, "falls": up * falls, "stays": up * (1 - falls), "oscillates": there * loose}
+    models: Models
+    values: Values  # unknowns (n,) by name
+    courses: Mapping[Flight, Course]
 
+    @classmethod
+    def of(cls, models: Models, values: Values, flights: Iterable[Flight]) -> Self:
+        """Trajectories of all rotors, those of one kind simulated in one call."""
+        found: dict[Flight, Course] = {}
+        for kind, surrogate in models.surrogates.items():
+            if own := [flight for flight in dict.fromkeys(flights) if flight[0] == kind]:
+                requested = zip(*(models.conditions(values, flight) for flight in own), strict=True)
+                together = simulated(surrogate, *map(np.concatenate, requested))
+                parts = {name: np.split(each, len(own)) for name, each in together.items()}
+                found |= {flight: {name: each[k] for name, each in parts.items()} for k, flight in enumerate(own)}
+        return cls(models, values, found)
 
-def _before(models: Models, kind: str, time: Array, limit: float) -> Array:
-    """Probability (n,) that something computed for `time` (n,) happens before a limit, s."""
-    return np.asarray(ndtr((np.log(limit) - _logarithm(time)) / np.hypot(TIMES, models.error(kind, "eddy"))))
+    def ends(self, flight: Flight) -> dict[str, Array]:
+        """Probabilities (n,) of how a trajectory ends: "nothing" (no equilibrium), "falls", "stays", "oscillates"."""
+        kind, _, _, longest = flight
+        course = self.courses[flight]
+        there = ndtr(course["margin"] / np.hypot(self.models.error(kind, "frequency"), SOFT))
+        grown = ndtr((course["growth"] - self.needed) / np.hypot(SCATTER, course["doubt"]))
+        loose = 1 - (1 - grown) * (1 - self.before(flight, "perturbed", longest))
+        falls, up = self.before(flight, "fall", longest), there * (1 - loose)
+        return {"nothing": 1 - there, "falls": up * falls, "stays": up * (1 - falls), "oscillates": there * loose}
+
+    def before(self, flight: Flight, what: str, limit: float) -> Array:
+        """Probability (n,) that what happens at a computed time does so before a limit, s."""
+        late = np.log(limit) - _logarithm(self.courses[flight][what])
+        return np.asarray(ndtr(late / np.hypot(TIMES, self.models.error(flight[0], "eddy"))))
+
+    @property
+    def needed(self) -> Array:
+        """Logarithmic growth (n,) from the motion at release to that with which a floater is lost."""
+        return np.asarray(np.log(LARGE / (1e-6 * self.values["motion"])))
 
 
 def _logarithm(time: Array) -> Array:
     return np.log(np.clip(time, 1e-3, 1e9))
-
-
-def needed(values: Values) -> Array:
-    """Logarithmic growth (n,) from the motion at release to that with which a floater is lost."""
-    return np.asarray(np.log(LARGE / (1e-6 * values["motion"])))
 
 
 def _rotor(values: Values, kind: str, distance: float) -> dict[str, Array]:
@@ -364,27 +381,14 @@ def _rotor(values: Values, kind: str, distance: float) -> dict[str, Array]:
 
 def log_likelihoods(models: Models, values: Values, facts: "Mapping[str, Fact]") -> dict[str, Array]:
     """Logarithm of the likelihood (n,) of each of the facts, for unknowns (n,) by name."""
-    known = courses(models, values, tuple(dict.fromkeys(flight for fact in facts.values() for flight in fact.flights)))
+    trials = Trials.of(models, values, [flight for fact in facts.values() for flight in fact.flights])
     # now and then a fact has a reason outside of the model
     return {
-        name: np.log((1 - UNFORESEEN) * fact.likelihood(models, values, known) + UNFORESEEN / WAYS)
-        for name, fact in facts.items()
+        name: np.log((1 - UNFORESEEN) * fact.likelihood(trials) + UNFORESEEN / WAYS) for name, fact in facts.items()
     }
 
 
-def courses(models: Models, values: Values, flights: Sequence[Flight]) -> dict[Flight, Course]:
-    """Trajectories of all rotors, for unknowns (n,) by name; those of one kind are simulated in one call."""
-    found: dict[Flight, Course] = {}
-    for kind, surrogate in models.surrogates.items():
-        if own := [flight for flight in flights if flight[0] == kind]:
-            requested = zip(*(models.conditions(values, flight) for flight in own), strict=True)
-            together = simulated(surrogate, *map(np.concatenate, requested))
-            parts = {name: np.split(each, len(own)) for name, each in together.items()}
-            found |= {flight: {name: each[k] for name, each in parts.items()} for k, flight in enumerate(own)}
-    return found
-
-
-Likelihood = Callable[[Models, Values, Known], Array]
+Likelihood = Callable[[Trials], Array]
 
 
 class Fact(NamedTuple):
@@ -392,7 +396,7 @@ class Fact(NamedTuple):
 
     says: str  # what is reported
     flights: tuple[Flight, ...]  # that it is about
-    likelihood: Likelihood  # its probability (n,) from the surrogates, the unknowns (n,) and these trajectories
+    likelihood: Likelihood  # its probability (n,) from trials of these
 
 
 LOW, MIDDLE, HIGH, BEYOND = (("single", 1.0, frequency, LONGEST) for frequency in (115.0, 140.0, 150.0, 165.0))
@@ -403,40 +407,31 @@ LOWEST = ("stack", 10.0, 50.0, LONGEST)
 def ended(flight: Flight, way: str, lasted: float | None = None) -> Likelihood:
     """That a trajectory ended in one of the ways of `ends`, and for a fall after which time (s), if it is known."""
 
-    def likelihood(models: Models, values: Values, known: Known) -> Array:
-        found = ends(models, flight, known[flight], values)[way]
+    def likelihood(trials: Trials) -> Array:
+        found = trials.ends(flight)[way]
         if lasted is None:
             return found
-        return np.asarray(found * np.exp(-0.5 * ((_logarithm(known[flight]["fall"]) - np.log(lasted)) / REPORTED) ** 2))
+        off = _logarithm(trials.courses[flight]["fall"]) - np.log(lasted)
+        return np.asarray(found * np.exp(-0.5 * (off / REPORTED) ** 2))
 
     return likelihood
 
 
-def _falls(models: Models, values: Values, known: Known) -> Array:
-    long_enough = 1 - _before(models, "single", known[LOW]["fall"], SHORTEST)
-    return ends(models, LOW, known[LOW], values)["falls"] * long_enough
-
-
-def _lowest(models: Models, values: Values, known: Known) -> Array:
-    return 1 - ends(models, LOWEST, known[LOWEST], values)["nothing"]
-
-
-def _third(models: Models, values: Values, known: Known) -> Array:
-    ratio = 115.0 / 50.0 * np.exp(known[LOWEST]["margin"] - known[LOW]["margin"])
+def _third(trials: Trials) -> Array:
+    ratio = 115.0 / 50.0 * np.exp(trials.courses[LOWEST]["margin"] - trials.courses[LOW]["margin"])
     return np.asarray(np.exp(-0.5 * ((ratio - 3.0) / 0.3) ** 2))
 
 
-def _circle(models: Models, values: Values, known: Known) -> Array:
-    inside = [1e3 * known[flight]["circle"] for flight in (MIDDLE, ENDLESS)]
-    each = [ndtr((a - 0.1) / 0.03) * ndtr((0.3 - a) / 0.03) for a in inside]
-    return np.asarray(each[0] * each[1])
+def _circle(trials: Trials) -> Array:
+    inside = np.array([1e3 * trials.courses[flight]["circle"] for flight in (MIDDLE, ENDLESS)])
+    return np.asarray(np.prod(ndtr((inside - 0.1) / 0.03) * ndtr((0.3 - inside) / 0.03), axis=0))
 
 
-def _peak(models: Models, values: Values, known: Known) -> Array:
+def _peak(trials: Trials) -> Array:
     """The time falls off faster above 140 Hz than it rises below: 25 Hz above it is shorter than 25 Hz below."""
     times = []
-    for course in (known[LOW], known[BEYOND]):
-        over = course["folds"] >= needed(values)[:, None]
+    for course in (trials.courses[LOW], trials.courses[BEYOND]):
+        over = course["folds"] >= trials.needed[:, None]
         loose = np.where(over.any(axis=1), _first(course["clock"], over), np.inf)
         lasts = np.minimum(np.minimum(course["fall"], course["perturbed"]), loose)
         times.append(np.log(np.clip(lasts, 1.0, LONGEST)))
@@ -445,20 +440,20 @@ def _peak(models: Models, values: Values, known: Known) -> Array:
 
 def _never(distance: float) -> Fact:
     flight = ("stack", distance, 200.0, LONGEST)
-
-    def likelihood(models: Models, values: Values, known: Known) -> Array:
-        nothing = ends(models, flight, known[flight], values)["nothing"]
-        return nothing + (1 - nothing) * NOT_CAPTURED
-
-    return Fact(f"δz = {distance:g} mm never levitated (up to 200 Hz)", (flight,), likelihood)
+    says = f"δz = {distance:g} mm never levitated (up to 200 Hz)"
+    return Fact(says, (flight,), lambda t: (no := t.ends(flight)["nothing"]) + (1 - no) * NOT_CAPTURED)
 
 
 FACTS = {
-    "falls at 115 Hz": Fact("δx = 1 mm falls linearly at 115 Hz, after more than 3 s", (LOW,), _falls),
+    "falls at 115 Hz": Fact(
+        "δx = 1 mm falls linearly at 115 Hz, after more than 3 s",
+        (LOW,),
+        lambda t: t.ends(LOW)["falls"] * (1 - t.before(LOW, "fall", SHORTEST)),
+    ),
     "stays at 140 Hz": Fact("δx = 1 mm stays at 140 Hz for 250 s", (MIDDLE,), ended(MIDDLE, "stays")),
     "oscillates at 150 Hz": Fact("δx = 1 mm is lost in oscillations at 150 Hz", (HIGH,), ended(HIGH, "oscillates")),
     "24 h at 60 Hz": Fact("δz = 14 mm levitated for 24 hours at 60 Hz", (ENDLESS,), ended(ENDLESS, "stays")),
-    "below 50 Hz": Fact("levitation below 50 Hz (δz = 10 mm)", (LOWEST,), _lowest),
+    "below 50 Hz": Fact("levitation below 50 Hz (δz = 10 mm)", (LOWEST,), lambda t: 1 - t.ends(LOWEST)["nothing"]),
     "a third": Fact(
         "the lowest frequency is lowered by a factor of 3 (δz = 10 mm against δx = 1 mm)", (LOW, LOWEST), _third
     ),
@@ -469,8 +464,7 @@ FACTS = {
     "never at 18 mm": _never(18.0),
     "never at 20 mm": _never(20.0),
 }
-QUICK_FACTS = tuple(FACTS)[:4]
-EVEN, NORMAL, POSITIVE = "even", "normal", "positive"
+EVEN, NORMAL, LOG = "even", "normal", "positive"
 """Kinds of priors: even between two ends; normal with mean and deviation; logarithm normal, by median and deviation."""
 
 
@@ -494,37 +488,32 @@ def quantile(prior: str, first: float, second: float, share: Array) -> Array:
     return np.asarray(first + deviation if prior == NORMAL else first * np.exp(deviation))
 
 
-UNKNOWNS = (
-    Unknown("displacement", "mm", "δx", NORMAL, 1.0, 0.3, "1 mm stated; 'sub-millimeter precision is required'"),
-    Unknown("tilt", "deg", "tilt of δx", NORMAL, 0.0, 2.0, "printed holder, glue, and magnetisation against the cube"),
-    Unknown("direction", "deg", "direction of δx", NORMAL, 0.0, 10.0, "of the displacement against the magnetisation"),
-    Unknown("stack", "mm", "δz", NORMAL, 14.0, 0.3, "14 mm stated, as δx"),
-    Unknown("stack_displacement", "mm", "δx of δz", NORMAL, 0.0, 0.3, "of the lower cube, as δx"),
-    Unknown("stack_tilt", "deg", "tilt of δz", NORMAL, 0.0, 2.0, "of the lower cube, as that of δx"),
-    Unknown("rotor_remanence", "T", "Br rotor", EVEN, 1.29, 1.32, "stated"),
-    Unknown("floater_remanence", "T", "Br floater", EVEN, 1.29, 1.32, "stated: identical to the rotor's"),
-    Unknown("density", "kg/m3", "density", NORMAL, 7500.0, 75.0, "makers: 7400 to 7600"),
-    Unknown("edge", "mm", "edge", NORMAL, 10.0, 0.05, "makers: 0.1 mm"),
-    Unknown("diameter", "mm", "diameter", NORMAL, 12.7, 0.05, "makers: 0.1 mm"),
-    Unknown("magnets", "S/m", "σ magnets", POSITIVE, 6.7e5, 0.15, "makers: 6.2e5 to 9e5"),
-    Unknown(
-        *("floater", "1", "floater's σ (plating)", POSITIVE, 1.2, 0.15),
+ROWS: tuple[tuple[str, str, str, str, float, float, str], ...] = (
+    ("displacement", "mm", "δx", NORMAL, 1.0, 0.3, "1 mm stated; 'sub-millimeter precision is required'"),
+    ("tilt", "deg", "tilt of δx", NORMAL, 0.0, 2.0, "printed holder, glue, and magnetisation against the cube"),
+    ("direction", "deg", "direction of δx", NORMAL, 0.0, 10.0, "of the displacement against the magnetisation"),
+    ("stack", "mm", "δz", NORMAL, 14.0, 0.3, "14 mm stated, as δx"),
+    ("stack_displacement", "mm", "δx of δz", NORMAL, 0.0, 0.3, "of the lower cube, as δx"),
+    ("stack_tilt", "deg", "tilt of δz", NORMAL, 0.0, 2.0, "of the lower cube, as that of δx"),
+    ("rotor_remanence", "T", "Br rotor", EVEN, 1.29, 1.32, "stated"),
+    ("floater_remanence", "T", "Br floater", EVEN, 1.29, 1.32, "stated: identical to the rotor's"),
+    ("density", "kg/m3", "density", NORMAL, 7500.0, 75.0, "makers: 7400 to 7600"),
+    ("edge", "mm", "edge", NORMAL, 10.0, 0.05, "makers: 0.1 mm"),
+    ("diameter", "mm", "diameter", NORMAL, 12.7, 0.05, "makers: 0.1 mm"),
+    ("magnets", "S/m", "σ magnets", LOG, 6.7e5, 0.15, "makers: 6.2e5 to 9e5"),
+    (
+        *("floater", "1", "floater's σ (plating)", LOG, 1.2, 0.15),
         "of the floater's currents: copper and nickel add up to a half",
     ),
-    Unknown(
-        *("steel", "1", "steel over block", POSITIVE, 1.0, 1.0),
-        "its losses over those of the balancing block: amount unknown",
-    ),
-    Unknown(
-        *("motion", "um", "residual motion", POSITIVE, 5.0, 1.2),
-        "left of the launch when the plate is down: 1 to 100 µm",
-    ),
-    Unknown("spin", "1", "spin at release", NORMAL, 0.02, 0.05, "at release: 0 to 0.05 in settling over the plate"),
-    Unknown("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5, "of the stack of 10 mm, with its displacement"),
-    Unknown("tilt_18", "deg", "tilt at 18 mm", NORMAL, 0.0, 2.5, "of that of 18 mm"),
-    Unknown("tilt_20", "deg", "tilt at 20 mm", NORMAL, 0.0, 2.5, "of that of 20 mm"),
-    Unknown("lean", "deg", "tilt of the shaft", NORMAL, 0.0, 3.0, "of the shaft"),
+    ("steel", "1", "steel over block", LOG, 1.0, 1.0, "its losses over those of the balancing block: amount unknown"),
+    ("motion", "um", "residual motion", LOG, 5.0, 1.2, "left of the launch when the plate is down: 1 to 100 µm"),
+    ("spin", "1", "spin at release", NORMAL, 0.02, 0.05, "at release: 0 to 0.05 in settling over the plate"),
+    ("tilt_10", "deg", "tilt at 10 mm", NORMAL, 0.0, 2.5, "of the stack of 10 mm, with its displacement"),
+    ("tilt_18", "deg", "tilt at 18 mm", NORMAL, 0.0, 2.5, "of that of 18 mm"),
+    ("tilt_20", "deg", "tilt at 20 mm", NORMAL, 0.0, 2.5, "of that of 20 mm"),
+    ("lean", "deg", "tilt of the shaft", NORMAL, 0.0, 3.0, "of the shaft"),
 )
+UNKNOWNS = tuple(starmap(Unknown, ROWS))
 NAMES = tuple(unknown.name for unknown in UNKNOWNS)
 
 

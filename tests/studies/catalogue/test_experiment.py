@@ -42,8 +42,8 @@ from spinlev.studies.catalogue.experiment_model import (
     UNKNOWNS,
     Models,
     Surrogate,
+    Trials,
     at_spin,
-    ends,
     exponents,
     fitted,
     likeness,
@@ -178,7 +178,8 @@ def test_ends_of_flights_are_probabilities_that_add_to_one():
     margin, fall, growth = np.array([0.1, 0.1, -0.1]), np.array([20.0, np.inf, 5.0]), np.array([3.0, 9.0, 0.0])
     course = {"margin": margin, "fall": fall, "growth": growth, "doubt": rest, "perturbed": np.full(3, np.inf)}
     surrogate = Surrogate("single", np.zeros((1, 6), int), np.zeros((1, len(FITTED))), np.full(len(FITTED), 0.01), 1)
-    found = ends(Models({"single": surrogate}), MIDDLE, course, {"motion": np.full(3, 5.0)})
+    trials = Trials(Models({"single": surrogate}), {"motion": np.full(3, 5.0)}, {MIDDLE: course})
+    found = trials.ends(MIDDLE)
     np.testing.assert_allclose(sum(found.values()), 1.0, atol=1e-12)
     assert found["falls"][0] > 0.99
     assert found["oscillates"][1] > 0.99
