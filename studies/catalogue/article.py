@@ -54,15 +54,11 @@ class Configuration:
 
 
 CONFIGURATIONS = {
-    "horizontal": Configuration(
-        horizontal, "δx", "mm", 1e-3, tuple(float(x) for x in range(1, 9)), (1.0, 2.0, 3.0, 4.0)
-    ),
+    "horizontal": Configuration(horizontal, "δx", "mm", 1e-3, tuple(map(float, range(1, 9))), (1.0, 2.0, 3.0, 4.0)),
     "vertical": Configuration(
-        vertical, "δz", "mm", 1e-3, (10.0, 12.0, 14.0, 16.0, 18.0, 20.0), (10.0, 12.0, 14.0, 16.0)
+        vertical, "δz", "mm", 1e-3, tuple(map(float, range(10, 21, 2))), (10.0, 12.0, 14.0, 16.0)
     ),
-    "tilt": Configuration(
-        tilt, "δθ", "°", np.pi / 180, tuple(float(x) for x in range(5, 50, 5)), (5.0, 10.0, 15.0, 20.0)
-    ),
+    "tilt": Configuration(tilt, "δθ", "°", np.pi / 180, tuple(map(float, range(5, 50, 5))), (5.0, 10.0, 15.0, 20.0)),
 }
 QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
 """One rotor of each configuration, for the quick settings of studies."""
@@ -182,16 +178,6 @@ class AxialForce:
         return self.attracting + self.repelling
 
 
-def field(configuration: str, value: float, distance: Array) -> tuple[Array, Array]:
-    """|B⊥| and B_z (T) on the axis at distances (n,) m, by the formulas of the polar angle without a side mode.
-
-    Rotor as of `force`.
-    """
-    across, along, _, _ = PARTS[configuration](CONFIGURATIONS[configuration].scale * value, distance, 0 * distance)
-    unit = INTERACTION / FLOATER.moment
-    return np.abs(unit * across), unit * along
-
-
 def side_radius(distance: ArrayLike, frequency: ArrayLike) -> Array:
     """Radius a = 𝒢/(μ_f ω²) of the side mode, m (equation 5)."""
     distance, rate = np.asarray(distance, float), 2 * np.pi * np.asarray(frequency, float)
@@ -211,39 +197,29 @@ def force(configuration: str, value: float, distance: ArrayLike, frequency: floa
         angle = INTERACTION / (d**3 * stiffness)
         attracting = {"horizontal": 4 * (parameter - a) / d, "tilt": 2 * parameter + 0 * d}[configuration]
         return AxialForce(scale * attracting, -scale * angle, angle, a if configuration == "horizontal" else 0 * a)
-    across, along, with_cosine, with_sine = PARTS[configuration](parameter, d, a)
+    across, along, with_cosine, with_sine = parts(configuration, value, d, a)
     slack = stiffness - INTERACTION * along
     angle = np.where(slack > 0, INTERACTION * across / np.where(slack > 0, slack, 1.0), np.nan)
     return AxialForce(scale * with_cosine * np.cos(angle), scale * with_sine * np.sin(angle), angle, a)
 
 
-def _horizontal(displacement: float, d: Array, a: Array) -> tuple[Array, Array, Array, Array]:
-    u = (displacement - a) / d
-    return (1 - 3 * u**2) / d**3, 3 * u / d**3, 4 * u, 5 * u**2 - 1
+def parts(configuration: str, value: float, d: Array, a: Array | float) -> Array:
+    """B⊥ and B_z by μ0 m_r/4π (1/m³), and the factors of cos θ and sin θ in the force, by 𝒢 (equations 7, 11 and 13).
 
+    Rotor as of `force`, at distances `d` with radii `a` of the side mode, (n,) m.
+    """
+    parameter = CONFIGURATIONS[configuration].scale * value
 
-def _vertical(displacement: float, d: Array, a: Array) -> tuple[Array, Array, Array, Array]:
-    u, far = a / d, d + displacement
-    return (
-        (1 - 3 * u**2) / d**3 + 3 * a / far**4,
-        2 / far**3 - 3 * u / d**3,
-        2 * (d / far) ** 4 - 4 * u,
-        5 * u**2 - 1 - 4 * a * d**4 / far**5,
-    )
+    def cube(angle: float, away: Array, offset: Array | float) -> Array:
+        """Of a cube tilted by an angle, so far away along the axis from a floater at a lateral offset."""
+        u, cosine, sine = offset / away, np.cos(angle), np.sin(angle)
+        field = cosine - 3 * u * (u * cosine - sine), 2 * sine - 3 * u * cosine
+        factors = 2 * sine - 4 * u * cosine, (5 * u**2 - 1) * cosine - 4 * u * sine
+        return np.array([*(part / away**3 for part in field), *(part * (d / away) ** 4 for part in factors)])
 
-
-def _tilt(angle: float, d: Array, a: Array) -> tuple[Array, Array, Array, Array]:
-    u, cosine, sine = a / d, np.cos(angle), np.sin(angle)
-    return (
-        (cosine - 3 * u * (u * cosine - sine)) / d**3,
-        (2 * sine - 3 * u * cosine) / d**3,
-        2 * sine - 4 * u * cosine,
-        (5 * u**2 - 1) * cosine - 4 * u * sine,
-    )
-
-
-PARTS = {"horizontal": _horizontal, "vertical": _vertical, "tilt": _tilt}
-"""B⊥ and B_z by μ0 m_r/4π (1/m³), and the factors of cos θ and sin θ in the force, by 𝒢 (equations 7, 11 and 13)."""
+    if configuration == "vertical":  # the second cube's moment points along the axis
+        return cube(0.0, d, a) + cube(np.pi / 2, d + parameter, a)
+    return cube(0.0, d, a - parameter) if configuration == "horizontal" else cube(parameter, d, a)
 
 
 def balanced(configuration: str, value: float, frequency: float, load: float) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from ..plan import sources
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, recorded
 from . import article, showing
-from .article import field, force, side_radius
+from .article import force, side_radius
 
 # On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
 DISTANCES = np.array([15e-3, 20e-3, 25e-3, 30e-3, 40e-3])
@@ -37,7 +37,8 @@ def field_components(point: Point) -> xr.Dataset:
     """Field of one rotor by one model over `distance`, with the model's own error (0 for the article's formula)."""
     rotor = point["configuration"], point["value"]
     if point["model"] == "article":
-        across, along, error = *field(*rotor, DISTANCES), np.zeros_like(DISTANCES)
+        across, along = article.INTERACTION / article.FLOATER.moment * article.parts(*rotor, DISTANCES, 0.0)[:2]
+        across, error = np.abs(across), 0 * DISTANCES
     else:
         model = sources(article.levitation_of(article.rotor_scene(*rotor), point["model"]).table)
         places = DISTANCES[:, None] * np.array([0.0, 0.0, -1.0])
@@ -365,21 +366,18 @@ def orbit_figure(result: xr.Dataset) -> Figure:
     return figure
 
 
-@drawn
-def radius_figure(result: xr.Dataset) -> Figure:
+@showing.each(showing.rotor_panels, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")
+def radius_figure(axes: Axes, rotor: xr.Dataset, color: Any) -> None:
     """The radius of the side mode against frequency for every rotor, and the article's formula."""
-    figure, rotors = showing.rotor_panels(result, 3.2, "frequency of the rotor (Hz)", "radius of the side mode (mm)")
-    for axes, rotor, color in rotors:
-        axes.axhspan(*TYPICAL, color="0.92", lw=0, label="called typical in the article")
-        found = case_with(rotor, model="fem")
-        frequency, stable = found["frequency"], article.stable_in_flight(found["growth"])
-        plot_branch(axes, frequency, 1e3 * found["radius"], stable, color=color)
-        axes.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
-        axes.set_xlim(35, 255)
-        plain_log(axes.yaxis)
+    axes.axhspan(*TYPICAL, color="0.92", lw=0, label="called typical in the article")
+    found = case_with(rotor, model="fem")
+    frequency, stable = found["frequency"], article.stable_in_flight(found["growth"])
+    plot_branch(axes, frequency, 1e3 * found["radius"], stable, color=color)
+    axes.plot(frequency, 1e3 * found["article_radius"], ":", lw=1.6, color=color)
+    axes.set_xlim(35, 255)
+    plain_log(axes.yaxis)
     key = {"stable": "-", "unstable": "--", "$\\mathcal{G}/\\mu_f\\omega^2$ of the article": ":"}
-    showing.explain(rotors[0][0], key)
-    return figure
+    showing.explain(axes, key)
 
 
 def _side_lines(result: xr.Dataset) -> list[str]:

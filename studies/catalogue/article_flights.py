@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy.stats import binned_statistic
 
@@ -18,13 +18,13 @@ from ...dynamics.motion.state import Scales, polar_angle
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ..figures.style import PALETTE, drawn, plot_branch
+from ..figures.style import PALETTE, plot_branch
 from ..levitation import Levitation
 from ..result import Columns, variable
 from ..study import Point, Study, case_with, cases_with, each_case, recorded
-from . import article
+from . import article, showing
 from .article import analytic_distance, balanced
-from .showing import by_configuration, by_rotor, explain, rotor_panels, small_multiples, span, text_table
+from .showing import each, small_multiples
 
 # Distance at which the floater levitates against frequency, for every rotor of the article: its third figure.
 #
@@ -107,43 +107,41 @@ def _smooth_mean(values: Array) -> float:
 AXES = "frequency of the rotor (Hz)", "levitation distance (mm)"
 
 
-@drawn
-def models_figure(result: xr.Dataset) -> Figure:
-    """The levitation distance of every rotor by finite elements and by the dipole."""
-    figure, rotors = rotor_panels(result, 4.0, *AXES, sharex=True)
-    for axes, rotor, color in rotors:
-        frequency, distance, stable = _branch(rotor, "fem")
-        plot_branch(axes, frequency, distance, stable, color=color, lw=1.8 if _levitated(rotor) else 0.8)
-        axes.plot(*_branch(rotor, "dipole")[:2], ":", color=color, lw=0.8)
-        found = case_with(rotor, model="fem")
-        axes.plot(found["fold_frequency"], 1e3 * found["fold_distance"], "o", color=color, ms=3)
-        axes.set_ylim(8, 52)
-    key = {"finite elements, stable": "-", "unstable": "--", "point dipole": ":", "lowest frequency (fold)": "o"}
-    explain(rotors[0][0], key, ms=3)
-    explain(rotors[0][0], {"thick: levitated in the experiment": "-"}, lw=1.8)
-    return figure
-
-
-@drawn
-def formulas_figure(result: xr.Dataset) -> Figure:
-    """The article's formulas and simulated trajectories beside the dipole's equilibrium, for rotors that levitated."""
-    levitated = [k for k, one in enumerate(each_case(result)) if _levitated(one.expand_dims("case"))]
-    figure, rotors = rotor_panels(result.isel(case=levitated), 3.4, *AXES, sharex=True)
-    for axes, rotor, color in rotors:
-        plot_branch(axes, *_side(rotor, "dipole", "near"), lw=0.8, color=color)
-        for model, style in (("semi-analytic", ":"), ("analytic", "-.")):
-            if model in rotor["model"]:
-                axes.plot(*_side(rotor, model, "near")[:2], style, color=color)
-        simulated = case_with(rotor, model=SIMULATED)
-        axes.plot(simulated["flight_frequency"], 1e3 * simulated["flight_distance"], "x", ms=4, color=color)
-        axes.set_ylim(8, 62)
-    key = {"point dipole, stable": "-", "unstable": "--", "semi-analytic formula": ":"}
-    explain(rotors[0][0], key | {"analytic formula, no gravity": "-.", "simulated trajectory, mean": "x"})
-    return figure
-
-
 def _levitated(rotor: xr.Dataset) -> bool:
-    return float(rotor["value"][0]) in article.CONFIGURATIONS[str(rotor["configuration"].values[0])].levitated
+    configuration, value = (rotor[name].values.flat[0] for name in ("configuration", "value"))
+    return value in article.CONFIGURATIONS[configuration].levitated
+
+
+def _levitated_rotors(result: xr.Dataset) -> xr.Dataset:
+    return result.isel(case=np.flatnonzero([_levitated(one) for one in each_case(result)]))
+
+
+@each(showing.rotor_panels, 4.0, *AXES, sharex=True)
+def models_figure(axes: Axes, rotor: xr.Dataset, color: Any) -> None:
+    """The levitation distance of every rotor by finite elements and by the dipole."""
+    frequency, distance, stable = _branch(rotor, "fem")
+    plot_branch(axes, frequency, distance, stable, color=color, lw=1.8 if _levitated(rotor) else 0.8)
+    axes.plot(*_branch(rotor, "dipole")[:2], ":", color=color, lw=0.8)
+    found = case_with(rotor, model="fem")
+    axes.plot(found["fold_frequency"], 1e3 * found["fold_distance"], "o", color=color, ms=3)
+    axes.set_ylim(8, 52)
+    key = {"finite elements, stable": "-", "unstable": "--", "point dipole": ":", "lowest frequency (fold)": "o"}
+    showing.explain(axes, key, ms=3)
+    showing.explain(axes, {"thick: levitated in the experiment": "-"}, lw=1.8)
+
+
+@each(showing.rotor_panels, 3.4, *AXES, of=_levitated_rotors, sharex=True)
+def formulas_figure(axes: Axes, rotor: xr.Dataset, color: Any) -> None:
+    """The article's formulas and simulated trajectories beside the dipole's equilibrium, for rotors that levitated."""
+    plot_branch(axes, *_side(rotor, "dipole", "near"), lw=0.8, color=color)
+    for model, style in (("semi-analytic", ":"), ("analytic", "-.")):
+        if model in rotor["model"]:
+            axes.plot(*_side(rotor, model, "near")[:2], style, color=color)
+    simulated = case_with(rotor, model=SIMULATED)
+    axes.plot(simulated["flight_frequency"], 1e3 * simulated["flight_distance"], "x", ms=4, color=color)
+    axes.set_ylim(8, 62)
+    key = {"point dipole, stable": "-", "unstable": "--", "semi-analytic formula": ":"}
+    showing.explain(axes, key | {"analytic formula, no gravity": "-.", "simulated trajectory, mean": "x"})
 
 
 def _side(rotor: xr.Dataset, model: str, side: str) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -163,7 +161,7 @@ def _branch(rotor: xr.Dataset, model: str) -> tuple[Array, Array, NDArray[np.boo
 
 def _distance_lines(result: xr.Dataset) -> list[str]:
     rows, lines = [], []
-    for label, rotor in by_rotor(result):
+    for label, rotor in showing.by_rotor(result):
         frequency, near, stable = _side(rotor, "dipole", "near")
         other = {name: _side(rotor, name, "near")[1] for name in rotor["model"].values}
         apart = [near - other["fem"], *(other.get(name, np.nan) - near for name in FORMULAS)]
@@ -171,9 +169,18 @@ def _distance_lines(result: xr.Dataset) -> list[str]:
             _, distance, good = _side(rotor, model, "near")
             power = np.polyfit(np.log(frequency[good]), np.log(distance[good]), 1)[0] if good.sum() > 2 else np.nan
             lowest = f"{float(case_with(rotor, model=model)['fold_frequency']):.2f}"
-            off = [span(by[stable], "+.2f") for by in apart] if model == "dipole" else [""] * 3
-            rows.append((f"{label}, {model}", lowest, span(frequency[good]), span(distance[good], ".2f"), power, *off))
-    for configuration, part in by_configuration(result):
+            off = [showing.span(by[stable], "+.2f") for by in apart] if model == "dipole" else [""] * 3
+            rows.append(
+                (
+                    f"{label}, {model}",
+                    lowest,
+                    showing.span(frequency[good]),
+                    showing.span(distance[good], ".2f"),
+                    power,
+                    *off,
+                )
+            )
+    for configuration, part in showing.by_configuration(result):
         levitated = article.CONFIGURATIONS[configuration].levitated
         for model in FIELDS:
             found = cases_with(part, model=model)
@@ -192,7 +199,7 @@ def _distance_lines(result: xr.Dataset) -> list[str]:
         lines.append(f"Means of simulated trajectories agree with the equilibria within {worst:.3g} µm.")
     head = ("rotor, model", "lowest (Hz)", "stable (Hz)", "distance (mm)", "power of f")
     last = "Last columns: point dipole less finite elements, and each formula less the point dipole, in mm."
-    return [*text_table((*head, "- fem (mm)", "semi-an.", "analytic"), rows), last, *lines]
+    return [*showing.text_table((*head, "- fem (mm)", "semi-an.", "analytic"), rows), last, *lines]
 
 
 LEVITATION_DISTANCE = Study(
@@ -286,29 +293,25 @@ def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, second
     }
 
 
-@drawn
-def flight_figure(result: xr.Dataset) -> Figure:
+@each(small_multiples, 3.6, 3, "time (s)", "levitation distance (mm)", of=showing.rotor_cases, sharey=True)
+def flight_figure(panel: Axes, rotor: xr.Dataset) -> None:
     """The distance in each trajectory, one panel for each displacement."""
-    rotors = {article.rotor_label("horizontal", float(rotor["value"])): rotor for rotor in each_case(result)}
-    figure, rows = small_multiples(rotors, 3.6, 3, "time (s)", "levitation distance (mm)", sharey=True)
-    explain(rows[0][0], {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(result["frequency"].values)})
-    for panel, rotor in rows:
-        for k, color in zip(range(rotor.sizes["frequency"]), PALETTE, strict=False):
-            one = rotor.isel(frequency=k)
-            if one["kind"] == NONE:
-                continue
-            time, mean = one["time"], 1e3 * one["mean"]
-            panel.fill_between(time, 1e3 * one["lowest"], 1e3 * one["highest"], color=color, alpha=0.3, lw=0)
-            panel.plot(time, mean, color=color)
-            panel.plot(one["averaged_time"], 1e3 * one["averaged_distance"], "--", color="k", lw=0.7)
-            # an averaged trajectory that ends at the fold falls; what is lost otherwise is lost in an oscillation
-            if one["kind"] not in ("stable", "drifting"):
-                last = int(np.flatnonzero(np.isfinite(mean))[-1])
-                mark = "v" if one["averaged_end"] == "fold" else "x"
-                panel.plot(time[last], np.clip(mean[last], 12, 34), mark, color=color, ms=5)
-        panel.set_ylim(11, 40)
-    explain(rows[0][0], {"averaged trajectory": "--", "lost at the fold": "v", "lost in oscillations": "x"}, ms=4)
-    return figure
+    showing.explain(panel, {f"{frequency:g} Hz": f"C{k}-" for k, frequency in enumerate(rotor["frequency"].values)})
+    for k, color in zip(range(rotor.sizes["frequency"]), PALETTE, strict=False):
+        one = rotor.isel(frequency=k)
+        if one["kind"] == NONE:
+            continue
+        time, mean = one["time"], 1e3 * one["mean"]
+        panel.fill_between(time, 1e3 * one["lowest"], 1e3 * one["highest"], color=color, alpha=0.3, lw=0)
+        panel.plot(time, mean, color=color)
+        panel.plot(one["averaged_time"], 1e3 * one["averaged_distance"], "--", color="k", lw=0.7)
+        # an averaged trajectory that ends at the fold falls; what is lost otherwise is lost in an oscillation
+        if one["kind"] not in ("stable", "drifting"):
+            last = int(np.flatnonzero(np.isfinite(mean))[-1])
+            mark = "v" if one["averaged_end"] == "fold" else "x"
+            panel.plot(time[last], np.clip(mean[last], 12, 34), mark, color=color, ms=5)
+    panel.set_ylim(11, 40)
+    showing.explain(panel, {"averaged trajectory": "--", "lost at the fold": "v", "lost in oscillations": "x"}, ms=4)
 
 
 def _flight_lines(result: xr.Dataset) -> list[str]:
@@ -324,7 +327,7 @@ def _flight_lines(result: xr.Dataset) -> list[str]:
             rows.append((name, *cells, REPORTED.get(float(frequency), "")))
     head = ("rotor", "simulated", "for (s)", "mean distance (mm)", "averaged", "for (s)", "growth (s⁻¹)", "energy")
     last = "Energy: violation of its balance. Article: what it reports for δx = 1 mm."
-    return [*text_table((*head, "article"), rows), last]
+    return [*showing.text_table((*head, "article"), rows), last]
 
 
 TRAJECTORIES = Study(

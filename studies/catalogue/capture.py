@@ -30,12 +30,12 @@ from ...fem.plate.tables import PlateAround
 from ...fem.rotor.table import RotorTable
 from ...geometry.common import Array
 from ...geometry.scene.contents import Lowering, Scene
-from ..figures.style import PALETTE, colour_bar, drawn, panels, styled, titled
+from ..figures.style import PALETTE, colour_bar, panels, styled, titled
 from ..result import Columns
 from ..study import Point, Study, cases_with, recorded
 from . import article
 from .floater_shape import CUBE, SPHERE, body_of
-from .showing import by_rotor, configuration_panels, text_table
+from .showing import by_rotor, configuration_panels, each, text_table
 
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
 """From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m."""
@@ -62,18 +62,10 @@ class Place:
 
 @cache
 def place_of(configuration: str, measure: float, part: float) -> Place:
-    """A rotor of the article at a `part` (0 to 1) of its stable frequencies; floater and air as they are.
+    """A rotor of the article (mm, degrees) at a `part` (0 to 1) of its stable frequencies; floater and air as they are.
 
-    Field: closed form, μr = 1, which the ranges of frequencies are of as well.
-
-    Parameters
-    ----------
-    configuration, measure : of the rotor; mm or degrees
-    part : of the way from the lowest to the highest stable frequency
-
-    Raises
-    ------
-    EquilibriumError : it levitates stably at no frequency
+    Field: closed form, μr = 1, which the ranges of frequencies are of as well. Raises EquilibriumError where it
+    levitates stably at no frequency.
     """
     scene = article.rotor_scene(configuration, measure, permeability=1.0)
     levitation = article.levitation_of(scene, "cuboid")
@@ -106,15 +98,8 @@ def plate_under(place: Place, lowered: bool = False) -> PlateMemory:
 def launches(place: Place, count: int, seed: list[int]) -> tuple[dict[str, Array], State]:
     """Launches drawn evenly over heights, a disc, a cap of directions and spins; let go with a hand's speed.
 
-    Parameters
-    ----------
-    place : below which
-    count : how many, n
-    seed : the same gives the same launches, to the last bit
-
-    Returns
-    -------
-    How each is let go (n,) by the names of `COLUMNS`, and its state (n, 3) at t = 0, along the rotor's axes
+    Returns of a `count` of them below a `place` how each is let go (n,) by the names of `COLUMNS`, and its state (n, 3)
+    at t = 0, along the rotor's axes. The same `seed` gives the same launches, to the last bit.
     """
     draws = np.random.default_rng(seed)
     height, area, cap, along = draws.uniform(size=(4, count))
@@ -142,6 +127,7 @@ def seed_of(configuration: str, measure: float, part: float, batch: int) -> list
 CAPTURED, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)
 """Up at the end; touched the plate; touched the rotor; far away; never simulated, as no frequency is stable."""
 WORDS = ("captured", "touched the plate", "touched the rotor", "lost to the side", "no stable frequency")
+OTHERS = {word.replace(" ", "_"): word for word in WORDS[1:]}
 PARTS = (1 / 6, 1 / 2, 5 / 6)  # Places in the range of stable frequencies
 TOGETHER, BATCHES = 2000, 5  # Trajectories of a point, and points for each rotor and frequency: 10 000 in all
 CHECKED = 8  # Launches of each rotor and frequency that are simulated on while the plate goes down
@@ -196,10 +182,11 @@ def capture(point: Point) -> xr.Dataset:
     try:
         place = place_of(*rotor)
     except EquilibriumError:
-        found["outcome"] = np.full(count, float(NO_EQUILIBRIUM))
-        return recorded(point, COLUMNS, found, {}, flight=count)
+        return recorded(point, COLUMNS, found | {"outcome": np.full(count, float(NO_EQUILIBRIUM))}, {}, flight=count)
     how, states = launches(place, count, seed_of(*rotor, point["batch"]))
-    place = place if shape == SPHERE else _with_floater(place, shape)
+    if shape != SPHERE:  # of the same volume and material
+        floater = replace(body_of(*SHAPES[shape]), conductivity=place.scene.floater.conductivity)
+        place = replace(place, scene=replace(place.scene, floater=floater))
     ended = _simulated(place, states, SETTLED)
     low = ended.last.position[:, 2] < -(place.distance + BELOW) / 2
     outcome = np.where(ended.ended_by == CONTACT, np.where(low, PLATE, ROTOR), LOST)
@@ -212,12 +199,6 @@ def capture(point: Point) -> xr.Dataset:
         later = _simulated(place, first, SETTLED + LOWERED / LOWERING_SPEED + AFTER, lowered=True)
         found |= {"settled": np.sum(later.levitated_s >= SETTLED), "stayed": np.sum(later.ended_by == DURATION)}
     return recorded(point, COLUMNS, found, {}, flight=count)
-
-
-def _with_floater(place: Place, shape: str) -> Place:
-    """A place with another floater of the same volume and material."""
-    floater = replace(body_of(*SHAPES[shape]), conductivity=place.scene.floater.conductivity)
-    return replace(place, scene=replace(place.scene, floater=floater))
 
 
 def _simulated(place: Place, states: State, seconds: float, lowered: bool = False) -> Endings:
@@ -253,9 +234,8 @@ def each_place(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
             flights = some[[name for name, (dims, *_) in COLUMNS.items() if dims]].stack(trial=("case", "flight"))
             one = flights.isel(trial=np.isfinite(flights["outcome"].values)).drop_vars(["trial", "case", "flight"])
             one = one.assign(some[["configuration", "measure", "part", "shape", "rotor_frequency"]].isel(case=0))
-            found.append(
-                (label if shape == SPHERE else f"{label}, {shape}", one.assign(some[["settled", "stayed"]].sum()))
-            )
+            name = label if shape == SPHERE else f"{label}, {shape}"
+            found.append((name, one.assign(some[["settled", "stayed"]].sum())))
     return found
 
 
@@ -264,26 +244,17 @@ SHOWN = ("δx = 2 mm", "δz = 14 mm", "δz = 18 mm", "δθ = 10°")
 BINS = 6
 
 
-@drawn
-def share_figure(result: xr.Dataset) -> Figure:
+@each(configuration_panels, 2.7, ylabel="capture probability (%)")
+def share_figure(axes: Axes, name: str, own: xr.Dataset) -> None:
     """The capture probability of each rotor at each part of its frequencies; bars: one standard deviation."""
-    figure, rows = configuration_panels(result, 2.7, ylabel="capture probability (%)")
-    for axes, name, own in rows:
-        every = [one for _, one in each_place(own) if one["shape"] == SPHERE]
-        for part, color in zip(np.unique(own["part"]), PALETTE, strict=False):
-            some = [one for one in every if one["part"] == part]
-            label = f"{part:.0%} of the stable range"
-            _shares(
-                axes,
-                [one["measure"].item() for one in some],
-                [one["outcome"] == CAPTURED for one in some],
-                color,
-                label,
-            )
-        for measure in article.CONFIGURATIONS[name].levitated:
-            axes.axvline(measure, color="0.85", lw=4, zorder=0, label="levitated in the article")
-        axes.set(xlabel=article.label_of(name), ylim=(-2, 102))
-    return figure
+    every = [one for _, one in each_place(own) if one["shape"] == SPHERE]
+    for part, color in zip(np.unique(own["part"]), PALETTE, strict=False):
+        some = [one for one in every if one["part"] == part]
+        measures, hits = [one["measure"].item() for one in some], [one["outcome"] == CAPTURED for one in some]
+        _shares(axes, measures, hits, color, f"{part:.0%} of the stable range")
+    for measure in article.CONFIGURATIONS[name].levitated:
+        axes.axvline(measure, color="0.85", lw=4, zorder=0, label="levitated in the article")
+    axes.set(xlabel=article.label_of(name), ylim=(-2, 102))
 
 
 def _shares(axes: Axes, x: ArrayLike, hits: Sequence[ArrayLike], color: str, label: str) -> None:
@@ -320,11 +291,11 @@ def place_figure(result: xr.Dataset) -> Figure:
 
 def _capture_lines(result: xr.Dataset) -> list[str]:
     found, rows = each_place(result), []
-    for label, one in found:
+    for (label, one), numbers in zip(found, capture_numbers(result)["shares"], strict=True):
         after = f"{int(one['stayed'])} of {int(one['settled'])}" if one["settled"] else ""
-        seen = "levitated" if _levitated(one) else "did not levitate"
-        rest = sorted(_others(one).items(), key=lambda other: -other[1])
-        ends = ", ".join(f"{100 * part:.0f} % {word}" for word, part in rest if part > 0)
+        seen = "levitated" if numbers["levitated_in_article"] else "did not levitate"
+        rest = sorted(((numbers[key], word) for key, word in OTHERS.items()), key=lambda other: -other[0])
+        ends = ", ".join(f"{100 * part:.0f} % {word}" for part, word in rest if part > 0)
         name, held = f"{label}, {float(one['rotor_frequency']):.1f} Hz", share_text(one["outcome"] == CAPTURED)
         rows.append((name, held, str(one.sizes["trial"]), seen, after, ends))
     head = ("rotor", "captured", "launches", "article", "stay, plate lowered", "others")
@@ -346,32 +317,23 @@ def _capture_lines(result: xr.Dataset) -> list[str]:
     return lines
 
 
-def _levitated(one: xr.Dataset) -> bool:
-    return float(one["measure"]) in article.CONFIGURATIONS[one["configuration"].item()].levitated
-
-
-def _others(one: xr.Dataset) -> dict[str, float]:
-    """Shares of launches that ended otherwise, by name."""
-    return {word: float((one["outcome"] == k).mean()) for k, word in enumerate(WORDS) if k != CAPTURED}
-
-
 def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
     """The shares as numbers: `shares`, one entry for each rotor and frequency; and what the plate's lowering loses."""
     rows = []
     for _, one in each_place(result):
         value, low, high = share(one["outcome"] == CAPTURED)
-        frequency = float(one["rotor_frequency"])
+        frequency, name, measure = (one[key].item() for key in ("rotor_frequency", "configuration", "measure"))
         rows.append({
-            "configuration": one["configuration"].item(),
-            "value": float(one["measure"]),
+            "configuration": name,
+            "value": measure,
             "shape": one["shape"].item(),
-            "levitated_in_article": _levitated(one),
+            "levitated_in_article": measure in article.CONFIGURATIONS[name].levitated,
             "frequency_hz": None if np.isnan(frequency) else frequency,
             "flights": one.sizes["trial"],
             "captured": value,
             "captured_error": (high - low) / 2,
             "left_plate_table": float((one["left_plate_table"] == 1).mean()),
-            **{word.replace(" ", "_"): part for word, part in _others(one).items()},
+            **{key: float((one["outcome"] == k).mean()) for k, key in enumerate(OTHERS, 1)},
         })  # fmt: skip
     return {
         "shares": rows,

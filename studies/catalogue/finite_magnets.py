@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...dynamics.continuation.frequencies import StableRange, at_frequency, reference_state, stable_range
@@ -74,10 +75,9 @@ def dipole_vs_fem(point: Point) -> xr.Dataset:
     rows = {name: _levitation(*each, ranges[name], grid) for name, each in made.items()}
     middle, answers = ranges["mutual"].near(float(grid[len(grid) // 2])), together.answers[0]
     doubt = max(float(part[0]) for part in answers.relative_error(middle.position)) if answers else 0.0
-    errors = {name: {key: ROUND_OFF * np.abs(value) for key, value in rows[name].items()} for name in MODELS[:3]}
-    errors["fem"] = {key: np.abs(value - rows["coarse"][key]) for key, value in rows["fem"].items()}
-    by_mutual = {key: doubt * np.abs(value - rows["fem"][key]) for key, value in rows["mutual"].items()}
-    errors["mutual"] = {key: value + errors["fem"][key] for key, value in by_mutual.items()}
+    errors = {name: ROUND_OFF * abs(rows[name]) for name in MODELS[:3]}
+    errors["fem"] = abs(rows["fem"] - rows["coarse"])
+    errors["mutual"] = doubt * abs(rows["mutual"] - rows["fem"]) + errors["fem"]
     found: dict[str, Any] = {"frequency": grid}
     for name in QUANTITIES:
         found |= {name: [rows[m][name] for m in MODELS], f"{name}_error": [errors[m][name] for m in MODELS]}
@@ -86,13 +86,13 @@ def dipole_vs_fem(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, found, {"model": list(MODELS), "mode": list(MODES)})
 
 
-def _levitation(scene: Scene, rates: Rates, stable: StableRange, grid: Array) -> dict[str, Array]:
+def _levitation(scene: Scene, rates: Rates, stable: StableRange, grid: Array) -> xr.Dataset:
     found = [at_frequency(scene, rates, stable.near(float(f)), float(f)) for f in grid]
     modes = [[mode.frequency_hz for mode in named_modes(point.motion, point.time_unit)] for point in found]
     angles = np.degrees(polar_angle(np.array([point.state[6:9] for point in found])))
-    ends = np.array([stable.low.parameter, stable.high.parameter])
-    values = (np.array([point.distance for point in found]), angles, np.array(modes), *ends)
-    return dict(zip(QUANTITIES, values, strict=True))
+    values = ([point.distance for point in found], angles, modes, stable.low.parameter, stable.high.parameter)
+    own = {name: (dims[1:], unit, label) for name, (dims, unit, label) in QUANTITIES.items()}
+    return xr.Dataset(columns(own, values))
 
 
 CAUSES = {
@@ -117,57 +117,48 @@ PAIR = {"article": ("--", PALETTE[5], "point dipoles"), "mutual": ("-", PALETTE[
 """Models that are compared in figures: line, colour, name."""
 
 
-@drawn
-def distances_figure(result: xr.Dataset) -> Figure:
+@showing.each(showing.rotor_panels, 3.0, "frequency of the rotor (Hz)", "levitation distance (mm)")
+def distances_figure(axes: Axes, rotor: xr.Dataset, color: Any) -> None:
     """The levitation distance by point dipoles and in the field of the finite magnets."""
-    figure, rotors = showing.rotor_panels(result, 3.0, "frequency of the rotor (Hz)", "levitation distance (mm)")
-    for axes, rotor, color in rotors:
-        one = rotor.isel(case=0)
-        for model, (style, _, name) in PAIR.items():
-            mfc = None if model == "mutual" else "white"
-            distance = 1e3 * one["distance"].sel(model=model)
-            axes.plot(one["frequency"], distance, f"o{style}", color=color, ms=3, mfc=mfc)
-            showing.explain(axes, {name: f"o{style}"}, ms=3, mfc=mfc)
-    return figure
+    one = rotor.isel(case=0)
+    for model, (style, _, name) in PAIR.items():
+        mfc = None if model == "mutual" else "white"
+        distance = 1e3 * one["distance"].sel(model=model)
+        axes.plot(one["frequency"], distance, f"o{style}", color=color, ms=3, mfc=mfc)
+        showing.explain(axes, {name: f"o{style}"}, ms=3, mfc=mfc)
 
 
-@drawn
-def causes_figure(result: xr.Dataset) -> Figure:
+@showing.each(showing.configuration_panels, 2.8, ylabel="change of the distance (mm)")
+def causes_figure(axes: Axes, configuration: str, part: xr.Dataset) -> None:
     """By how much each cause changes the distance: mean and range over the frequencies."""
-    figure, rows = showing.configuration_panels(result, 2.8, ylabel="change of the distance (mm)")
     width = 0.8 / (len(CAUSES) + 1)
-    for axes, configuration, part in rows:
-        places = showing.rotor_places(axes, configuration, part)
-        for k, (cause, models) in enumerate([*CAUSES.items(), ("all together", TOTAL)]):
-            value, error = (1e3 * values.values for values in change(part, "distance", models))
-            mean = value.mean(axis=1)
-            spread = np.array([mean - (value - error).min(axis=1), (value + error).max(axis=1) - mean])
-            color = "0.3" if models == TOTAL else PALETTE[k]
-            style: Any = {"color": color, "label": cause, "error_kw": {"lw": 0.7, "capsize": 1.5}}
-            axes.bar(places + (k - len(CAUSES) / 2) * width, mean, width, yerr=spread, **style)
-        axes.axhline(0.0, color="0.3", lw=0.8)
-    showing.explain(rows[0][0], {"range over the frequencies, with errors": "|"})
-    return figure
+    places = showing.rotor_places(axes, configuration, part)
+    for k, (cause, models) in enumerate([*CAUSES.items(), ("all together", TOTAL)]):
+        value, error = (1e3 * values.values for values in change(part, "distance", models))
+        mean = value.mean(axis=1)
+        spread = np.array([mean - (value - error).min(axis=1), (value + error).max(axis=1) - mean])
+        color = "0.3" if models == TOTAL else PALETTE[k]
+        style: Any = {"color": color, "label": cause, "error_kw": {"lw": 0.7, "capsize": 1.5}}
+        axes.bar(places + (k - len(CAUSES) / 2) * width, mean, width, yerr=spread, **style)
+    axes.axhline(0.0, color="0.3", lw=0.8)
+    showing.explain(axes, {"range over the frequencies, with errors": "|"})
 
 
-@drawn
-def ranges_figure(result: xr.Dataset) -> Figure:
+@showing.each(showing.configuration_panels, 2.8, ylabel="stable frequencies (Hz)")
+def ranges_figure(axes: Axes, configuration: str, part: xr.Dataset) -> None:
     """The frequencies of stable levitation by point dipoles and in the field of the finite magnets."""
-    figure, rows = showing.configuration_panels(result, 2.8, ylabel="stable frequencies (Hz)")
-    for axes, configuration, part in rows:
-        for (model, (_, color, name)), offset in zip(PAIR.items(), (-0.2, 0.2), strict=True):
-            places = showing.rotor_places(axes, configuration, part) + offset
-            low, high = (part[end].sel(model=model).values for end in ("lowest", "highest"))
-            axes.bar(places, high - low, 0.35, bottom=low, color=color, label=name)
-            for end, values in (("lowest", low), ("highest", high)):
-                axes.errorbar(places, values, part[f"{end}_error"].sel(model=model), fmt="none", ecolor="0.1", lw=1)
-            for kind, (marker, _) in ENDS.items():
-                ends = part["high_kind"].sel(model=model).values == kind
-                axes.plot(places[ends], high[ends], marker, color="k", ms=4)
-        axes.use_sticky_edges = False
-        axes.margins(y=0.08)
-    showing.explain(rows[0][0], {words: marker for marker, words in ENDS.values()}, color="k", ms=4)
-    return figure
+    for (model, (_, color, name)), offset in zip(PAIR.items(), (-0.2, 0.2), strict=True):
+        places = showing.rotor_places(axes, configuration, part) + offset
+        low, high = (part[end].sel(model=model).values for end in ("lowest", "highest"))
+        axes.bar(places, high - low, 0.35, bottom=low, color=color, label=name)
+        for end, values in (("lowest", low), ("highest", high)):
+            axes.errorbar(places, values, part[f"{end}_error"].sel(model=model), fmt="none", ecolor="0.1", lw=1)
+        for kind, (marker, _) in ENDS.items():
+            ends = part["high_kind"].sel(model=model).values == kind
+            axes.plot(places[ends], high[ends], marker, color="k", ms=4)
+    axes.use_sticky_edges = False
+    axes.margins(y=0.08)
+    showing.explain(axes, {words: marker for marker, words in ENDS.values()}, color="k", ms=4)
 
 
 def _dipole_lines(result: xr.Dataset) -> list[str]:

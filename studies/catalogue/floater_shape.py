@@ -10,16 +10,17 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 from ...dynamics.continuation.frequencies import levitating_ranges
 from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import Box, Cylinder
-from ..figures.style import PALETTE, drawn
+from ..figures.style import PALETTE
 from ..result import Columns
 from ..study import Point, Study, recorded
 from . import article, showing
+from .showing import each, small_multiples
 
 ASPECTS = (1 / 4, 1 / 3, 1 / 2, 2 / 3, 3**0.5 / 2, 1.0, 1.5, 2.0, 3.0, 4.0)  # height over diameter
 QUICK = (1 / 2, 1.0, 2.0)
@@ -72,28 +73,23 @@ def limits(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, (*row, *of), {})
 
 
-@drawn
-def shape_figure(result: xr.Dataset) -> Figure:
+@each(small_multiples, 2.6, 3, "height / diameter of the floater", "frequency (Hz)", of=showing.by_rotor)
+def shape_figure(panel: Axes, rotor: xr.Dataset) -> None:
     """Range of stable frequencies against the aspect of the floater, one panel for each rotor."""
-    rotors = dict(showing.by_rotor(result))
-    words = "height / diameter of the floater", "frequency (Hz)"
-    figure, rows = showing.small_multiples(rotors, 2.6, 3, *words)
-    for panel, rotor in rows:
-        parts = {shape: rotor.isel(case=rotor["shape"].values == shape) for shape in ("cylinder", CUBE, SPHERE)}
-        round_ones = parts["cylinder"].sortby("aspect")
-        low, high, aspect = (round_ones[name].values for name in ("low", "high", "aspect"))
-        panel.fill_between(aspect, low, high, color=PALETTE[0], alpha=0.2, lw=0, label="stable: discs and rods")
-        for end in (low, high):
-            panel.plot(aspect, end, "o-", color=PALETTE[0], ms=3, lw=1)
-        for shape, marker, color in ((CUBE, "s", PALETTE[1]), (SPHERE, "o", "k")):
-            one = parts[shape]
-            ends = [float(one[name].values[0]) for name in ("low", "high")]
-            where = [1.0, 1.0] if shape == SPHERE else [1.12, 1.12]
-            panel.plot(where, ends, marker + "-", color=color, mfc="white", ms=5, lw=1, label=f"stable: {shape}")
-        panel.set_xscale("log")
-        panel.set_xticks([0.25, 0.5, 1, 2, 4], ["1:4", "1:2", "1:1", "2:1", "4:1"])
-        panel.minorticks_off()
-    return figure
+    parts = {shape: rotor.isel(case=rotor["shape"].values == shape) for shape in ("cylinder", CUBE, SPHERE)}
+    round_ones = parts["cylinder"].sortby("aspect")
+    low, high, aspect = (round_ones[name].values for name in ("low", "high", "aspect"))
+    panel.fill_between(aspect, low, high, color=PALETTE[0], alpha=0.2, lw=0, label="stable: discs and rods")
+    for end in (low, high):
+        panel.plot(aspect, end, "o-", color=PALETTE[0], ms=3, lw=1)
+    for shape, marker, color in ((CUBE, "s", PALETTE[1]), (SPHERE, "o", "k")):
+        one = parts[shape]
+        ends = [float(one[name].values[0]) for name in ("low", "high")]
+        where = [1.0, 1.0] if shape == SPHERE else [1.12, 1.12]
+        panel.plot(where, ends, marker + "-", color=color, mfc="white", ms=5, lw=1, label=f"stable: {shape}")
+    panel.set_xscale("log")
+    panel.set_xticks([0.25, 0.5, 1, 2, 4], ["1:4", "1:2", "1:1", "2:1", "4:1"])
+    panel.minorticks_off()
 
 
 def _shape_lines(result: xr.Dataset) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...dynamics.continuation.branch import Family, follow_branch, frequencies, spins
@@ -14,12 +15,12 @@ from ...dynamics.continuation.slow_drift import E_FOLDS, Drift, drift
 from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...dynamics.motion.state import Scales
 from ...geometry.common import MAGNET_CONDUCTIVITY
-from ...geometry.scene.contents import Drag, Scene
-from ..figures.style import PALETTE, drawn, styled
+from ...geometry.scene.contents import Scene
+from ..figures.style import PALETTE, styled
 from ..result import Columns, columns, variable
 from ..study import Point, Study
 from .article import FLOATER, PERMEABILITY, REMANENCE, levitation_of, losses, rotor_label, rotor_scene
-from .showing import small_multiples, span, text_table
+from .showing import each, small_multiples, span, text_table
 
 
 class DriftCase(NamedTuple):
@@ -81,16 +82,14 @@ VARIANTS = {
 QUICK_VARIANTS = ("nominal", "spin -0.1", "spin +0.1", "displacement smaller", "displacement larger", "Stokes drag")
 
 
-def scene_of(case: DriftCase, variant: Variant) -> Scene:
-    """The scene of a case at its reference frequency."""
-    measure = case.measure + variant.misplaced * TOLERANCES[case.configuration]
+def scenes_of(case: DriftCase, variant: Variant) -> tuple[Scene, Scene]:
+    """The scene of a case at its reference frequency, and that scene without losses."""
+    rotor = case.configuration, case.measure + variant.misplaced * TOLERANCES[case.configuration], case.reference
+    ball, remanence = replace(FLOATER, remanence=variant.remanence), variant.remanence
     permeability = 1.0 if variant.rotor == "rigid" else PERMEABILITY
-    scene = rotor_scene(
-        case.configuration, measure, case.reference,
-        remanence=variant.remanence, permeability=permeability, floater=replace(FLOATER, remanence=variant.remanence),
-    )  # fmt: skip
-    scene = replace(scene, **losses(scene, variant.rotor == "conducting", False))
-    return replace(scene, floater=replace(scene.floater, conductivity=variant.conductivity))
+    still = rotor_scene(*rotor, drag=False, remanence=remanence, permeability=permeability, floater=ball)
+    scene = replace(still, **losses(still, variant.rotor == "conducting", False))
+    return replace(scene, floater=replace(scene.floater, conductivity=variant.conductivity)), still
 
 
 CAP, SHORTEST = 250.0, 3.0  # The article stopped a trajectory after 250 s, and did not count one of less than 3 s
@@ -125,11 +124,9 @@ def levitation_times(point: Point) -> xr.Dataset:
     They are at those frequencies that the branch of equilibria reaches, from that of point dipoles both ways.
     """
     case, variant, model = CASES[point["case"]], VARIANTS[point["variant"]], point["model"]
-    grid, scene = np.linspace(case.lowest, case.highest, point["steps"]), scene_of(case, variant)
+    grid, (scene, still) = np.linspace(case.lowest, case.highest, point["steps"]), scenes_of(case, variant)
     levitation = levitation_of(scene, model, interaction="rigid" if model != "fem" else "mutual")
     rates = levitation.rates
-    magnets = tuple(replace(magnet, conductivity=None) for magnet in scene.rotor)
-    still = replace(scene, rotor=magnets, floater=replace(scene.floater, conductivity=None), drag=Drag(0.0, 0.0))
     at_rest, spun = (Family(rates, frequencies(scene, spin), UNIT) for spin in (0.0, variant.spin))
     start = follow_branch(at_rest, *reference_state(still), scene.frequency, LONG_STEPS, tolerated=np.inf)[-1].state
     if variant.spin:
@@ -183,9 +180,8 @@ def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     return xr.concat(cases, "case", data_vars="all", coords="different", compat="equals", join="outer")
 
 
-MARKS = dict(zip(OUTCOMES, ("v", "o", "X", "^", "|"), strict=True))
+MARKS = "voX^|"  # Of the outcomes, and what these are called in a legend
 MEANINGS = ("touches the rotor", "lost at the fold", "lost in oscillations", "levitates for 250 s", "no equilibrium")
-"""Of the outcomes, in a legend."""
 BANDS = {
     "displacement": "displacement ±0.2 mm, ±0.5 mm or ±0.5°",
     "spin": "spin at release ±0.1",
@@ -206,31 +202,33 @@ REPORTED = {
 ENDS = {"linear fall": ":", "stable": "-", "oscillating loss": "--", "24 hours": "-."}
 
 
-@drawn
-def times_figure(result: xr.Dataset) -> Figure:
+def _rotors(result: xr.Dataset) -> dict[str, xr.Dataset]:
+    cases = sorted(result["case"].values.tolist(), key=lambda name: CASES[name][:2])
+    return {rotor_label(*CASES[case][:2]): result.sel(case=case) for case in cases}
+
+
+@each(small_multiples, 2.2, 3, "frequency (Hz)", "levitation time (s)", of=_rotors)
+def times_figure(panel: Axes, rotor: xr.Dataset) -> None:
     """Levitation time of each rotor against frequency, with the bands of what is not known well."""
-    figure, rows = small_multiples(_rotors(result), 2.2, 3, "frequency (Hz)", "levitation time (s)")
-    variants = result["variant"].values.tolist()
-    for panel, rotor in rows:
-        frequency, time = rotor["frequency"].values, rotor["levitation_time"]
-        for (start, label), color in zip(BANDS.items(), ("0.6", *PALETTE[1:]), strict=False):
-            names = ["nominal", *(v for v in variants if v.startswith(start))]
-            if len(names) > 1:
-                band = time.sel(variant=names)
-                low, high = band.min("variant"), band.max("variant")
-                panel.fill_between(frequency, low, high, color=color, alpha=0.28, lw=0, label=label)
-        for name, (dashes, label) in LINES.items():
-            if name in variants:
-                panel.plot(frequency, time.sel(variant=name), dashes, color="0.25", lw=1, label=label)
-        nominal, outcome = (rotor[name].sel(variant="nominal") for name in ("levitation_time", "outcome"))
-        panel.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
-        for number, (mark, words) in enumerate(zip(MARKS.values(), MEANINGS, strict=True)):
-            if (outcome == number).any():
-                panel.plot(frequency, nominal.where(outcome == number), mark, color=PALETTE[0], ms=3.5, label=words)
-        for there, end in REPORTED.get(rotor["case"].item(), {}).items():
-            panel.axvline(there, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
-        panel.set(ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
-    return figure
+    variants = rotor["variant"].values.tolist()
+    frequency, time = rotor["frequency"].values, rotor["levitation_time"]
+    for (start, label), color in zip(BANDS.items(), ("0.6", *PALETTE[1:]), strict=False):
+        names = ["nominal", *(v for v in variants if v.startswith(start))]
+        if len(names) > 1:
+            band = time.sel(variant=names)
+            low, high = band.min("variant"), band.max("variant")
+            panel.fill_between(frequency, low, high, color=color, alpha=0.28, lw=0, label=label)
+    for name, (dashes, label) in LINES.items():
+        if name in variants:
+            panel.plot(frequency, time.sel(variant=name), dashes, color="0.25", lw=1, label=label)
+    nominal, outcome = (rotor[name].sel(variant="nominal") for name in ("levitation_time", "outcome"))
+    panel.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
+    for number, (mark, words) in enumerate(zip(MARKS, MEANINGS, strict=True)):
+        if (outcome == number).any():
+            panel.plot(frequency, nominal.where(outcome == number), mark, color=PALETTE[0], ms=3.5, label=words)
+    for there, end in REPORTED.get(rotor["case"].item(), {}).items():
+        panel.axvline(there, ls=ENDS[end], color=PALETTE[3], lw=1.0, label=f"article: {end}")
+    panel.set(ylim=(-8, 262), xlim=(frequency[0], frequency[-1]))
 
 
 @styled
@@ -244,17 +242,12 @@ def flights_figure(result: xr.Dataset) -> Figure:
         for k, color in zip(shown, PALETTE, strict=False):
             time, distance = nominal["flight_time"][k], 1e3 * nominal["flight_distance"][k]
             panel.plot(time, distance, color=color, label=f"{frequency[k]:.3g} Hz")
-            panel.plot(time[-1], distance[-1], MARKS[OUTCOMES[int(nominal["outcome"][k])]], color=color, ms=4)
+            panel.plot(time[-1], distance[-1], MARKS[int(nominal["outcome"][k])], color=color, ms=4)
         if len(shown):
             panel.legend(ncols=2)
         low, high = panel.get_ylim()
         panel.set_ylim(low, high + 0.6 * (high - low))  # room for the legend
     return figure
-
-
-def _rotors(result: xr.Dataset) -> dict[str, xr.Dataset]:
-    cases = sorted(result["case"].values.tolist(), key=lambda name: CASES[name][:2])
-    return {rotor_label(*CASES[case][:2]): result.sel(case=case) for case in cases}
 
 
 def time_lines(result: xr.Dataset) -> list[str]:

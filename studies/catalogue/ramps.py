@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
 from ...dynamics.continuation.frequencies import at_frequency, kicked
 from ...dynamics.flights.flight import simulate
 from ...geometry.scene.contents import DriveStep
-from ..figures.style import PALETTE, drawn
+from ..figures.style import PALETTE
 from ..result import Columns
 from ..study import Point, Study, each_case, recorded
 from ..words import ENDS
@@ -53,19 +53,16 @@ def ramps(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, found, {"way": list(WAYS), "rate": ("rate", list(RATES), {"units": "Hz/s"})})
 
 
-@drawn
-def ramps_figure(result: xr.Dataset) -> Figure:
+@showing.each(showing.configuration_panels, 3.4, ylabel="frequency of the rotor (Hz)")
+def ramps_figure(axes: Axes, configuration: str, part: xr.Dataset) -> None:
     """The stable range of each rotor as a bar, and where its floater is lost on the way down and up."""
-    figure, rows = showing.configuration_panels(result, 3.4, ylabel="frequency of the rotor (Hz)")
-    for axes, configuration, part in rows:
-        places = showing.rotor_places(axes, configuration, part)
-        span = (part["highest"] - part["lowest"]).values
-        axes.bar(places, span, 0.5, part["lowest"].values, color="0.85", label="stable at steady frequency")
-        for way, marker in zip(WAYS, "v^", strict=True):
-            for rate, color in zip(result["rate"].values, PALETTE, strict=False):
-                label = f"lost on the way {way}, {rate:g} Hz/s"
-                axes.plot(places, part["lost_at"].sel(way=way, rate=rate), marker, color=color, ms=4, label=label)
-    return figure
+    places = showing.rotor_places(axes, configuration, part)
+    span = (part["highest"] - part["lowest"]).values
+    axes.bar(places, span, 0.5, part["lowest"].values, color="0.85", label="stable at steady frequency")
+    for way, marker in zip(WAYS, "v^", strict=True):
+        for rate, color in zip(part["rate"].values, PALETTE, strict=False):
+            label = f"lost on the way {way}, {rate:g} Hz/s"
+            axes.plot(places, part["lost_at"].sel(way=way, rate=rate), marker, color=color, ms=4, label=label)
 
 
 def _ramps_lines(result: xr.Dataset) -> list[str]:

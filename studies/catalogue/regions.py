@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ...dynamics.continuation.branch import OSCILLATORY, REAL
 from ...dynamics.continuation.frequencies import HIGHEST, StableRange, at_frequency, levitating_ranges
@@ -17,11 +16,12 @@ from ...geometry.magnets import Conductor
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box
 from ..cli.console import note
-from ..figures.style import COLORS, NAMES, PALETTE, drawn
+from ..figures.style import COLORS, NAMES, PALETTE
 from ..levitation import Levitation
 from ..result import Columns
 from ..study import Point, Study, cases_with, each_case, recorded
 from . import article, showing
+from .showing import each, small_multiples
 
 # Regions of stable levitation in frequency and displacement, what bounds them, and what a plate makes of them.
 #
@@ -139,28 +139,25 @@ MARKS = {
 }
 
 
-@drawn
-def map_figure(result: xr.Dataset) -> Figure:
+@each(showing.configuration_panels, 3.9, ylabel="frequency of the rotor (Hz)")
+def map_figure(axes: Axes, configuration: str, rotors: xr.Dataset) -> None:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
-    figure, rows = showing.configuration_panels(result, 3.9, ylabel="frequency of the rotor (Hz)")
-    for axes, configuration, rotors in rows:
-        for model in article.MODELS:
-            _region(axes, cases_with(rotors, model=model), COLORS[model])
-            showing.explain(axes, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
-        true = cases_with(rotors, model="fem")
-        growth, frequency = true["plate_growth"].values, true["plate_frequency"].values
-        measure = np.broadcast_to(true["measure"].values[:, None], growth.shape)
-        stable = article.stable_in_flight(growth)
-        found = (stable, np.isfinite(growth) & ~stable, np.isnan(growth) & np.isfinite(frequency))
-        for here, (marker, color, words) in zip(found, VERDICTS, strict=True):
-            if here.any():
-                label = f"{words}, face {-1e3 * FACE:g} mm below"
-                axes.plot(measure[here], frequency[here], marker, color=color, ms=4, mew=0.8, label=label)
-        for metal, (marker, words) in MARKS.items() if "high" in true else ():
-            axes.plot(true["measure"], true["high"].sel(metal=metal), marker, color="k", ms=5, label=words)
-        axes.set(xlabel=article.label_of(configuration), ylim=(20, 410))
-        axes.margins(x=0.08)
-    return figure
+    for model in article.MODELS:
+        _region(axes, cases_with(rotors, model=model), COLORS[model])
+        showing.explain(axes, {f"stable: {NAMES[model]}": "s"}, color=COLORS[model], alpha=0.5)
+    true = cases_with(rotors, model="fem")
+    growth, frequency = true["plate_growth"].values, true["plate_frequency"].values
+    measure = np.broadcast_to(true["measure"].values[:, None], growth.shape)
+    stable = article.stable_in_flight(growth)
+    found = (stable, np.isfinite(growth) & ~stable, np.isnan(growth) & np.isfinite(frequency))
+    for here, (marker, color, words) in zip(found, VERDICTS, strict=True):
+        if here.any():
+            label = f"{words}, face {-1e3 * FACE:g} mm below"
+            axes.plot(measure[here], frequency[here], marker, color=color, ms=4, mew=0.8, label=label)
+    for metal, (marker, words) in MARKS.items() if "high" in true else ():
+        axes.plot(true["measure"], true["high"].sel(metal=metal), marker, color="k", ms=5, label=words)
+    axes.set(xlabel=article.label_of(configuration), ylim=(20, 410))
+    axes.margins(x=0.08)
 
 
 def _region(axes: Axes, part: xr.Dataset, color: str) -> None:
@@ -271,19 +268,15 @@ def upper_limit(point: Point) -> xr.Dataset:
     return recorded(point, COLUMNS, found, {})
 
 
-@drawn
-def limit_figure(result: xr.Dataset) -> Figure:
+@each(small_multiples, 1.9, 4, "frequency (Hz)", "levitation time (s)", of=showing.by_rotor, sharey=True)
+def limit_figure(panel: Axes, rotor: xr.Dataset) -> None:
     """Levitation time against frequency of each rotor, one line for each variant."""
-    rotors, words = dict(showing.by_rotor(result)), ("frequency (Hz)", "levitation time (s)")
-    figure, rows = showing.small_multiples(rotors, 1.9, 4, *words, sharey=True)
-    for panel, rotor in rows:
-        for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
-            frequency, time = one["rotor_frequency"], one["levitated"]
-            panel.semilogy(frequency, time, style, ms=3, color=color, label=one["variant"].item())
-        longest = f"longest of the experiment, {article.FLIGHT:g} s"
-        panel.axhline(article.FLIGHT, color="0.6", lw=0.8, zorder=0, label=longest)
-        panel.axhline(LONGEST, color="0.6", lw=0.8, ls=":", zorder=0, label=f"followed no longer, {LONGEST:g} s")
-    return figure
+    for one, style, color in zip(each_case(rotor), ("o-", "s--", "^:"), PALETTE, strict=False):
+        frequency, time = one["rotor_frequency"], one["levitated"]
+        panel.semilogy(frequency, time, style, ms=3, color=color, label=one["variant"].item())
+    longest = f"longest of the experiment, {article.FLIGHT:g} s"
+    panel.axhline(article.FLIGHT, color="0.6", lw=0.8, zorder=0, label=longest)
+    panel.axhline(LONGEST, color="0.6", lw=0.8, ls=":", zorder=0, label=f"followed no longer, {LONGEST:g} s")
 
 
 def _limit_lines(result: xr.Dataset) -> list[str]:

@@ -1,7 +1,8 @@
 """What figures and reports of several studies share: panels, legends, colours of rotors; tables and numbers."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, SupportsFloat, TypeVar
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import wraps
+from typing import Any, SupportsFloat
 
 import matplotlib as mpl
 import numpy as np
@@ -14,23 +15,44 @@ from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
 from ..cli.console import aligned
-from ..figures.style import PALETTE, panels, titled
+from ..figures.style import PALETTE, drawn, panels, titled
 from ..study import cases_with, each_case
 from .article import CONFIGURATIONS, label_of, rotor_label
 
+Drawing = Callable[[xr.Dataset], Figure]
 TITLES = {"horizontal": "displaced cube", "vertical": "two cubes", "tilt": "tilted cube"}
-Shown = TypeVar("Shown")
+
+
+def each(
+    panels: Callable[..., tuple[Figure, Any]], *how: Any, of: Callable[[xr.Dataset], Any] | None = None, **shared: Any
+) -> Callable[[Callable[..., None]], Drawing]:
+    """Make what draws one panel a function of a joined result that draws the figure.
+
+    Its `panels` are arranged by a function below that takes the result, or what is made `of` it, with `how` and
+    `shared`; what it gives of each of them is handed on.
+    """
+
+    def decorated(draw: Callable[..., None]) -> Drawing:
+        def figure_of(result: xr.Dataset) -> Figure:
+            figure, rows = panels(of(result) if of else result, *how, **shared)
+            for row in rows:
+                draw(*row)
+            return figure
+
+        return drawn(wraps(draw)(figure_of))
+
+    return decorated
 
 
 def small_multiples(
-    parts: Mapping[str, Shown], height: float, columns: int = 3, xlabel: str = "", ylabel: str = "", **shared: Any
-) -> tuple[Figure, list[tuple[Axes, Shown]]]:
+    parts: Any, height: float, columns: int = 3, xlabel: str = "", ylabel: str = "", **shared: Any
+) -> tuple[Figure, list[tuple[Axes, Any]]]:
     """A panel for each of `parts` (by title, behind its letter), beside what it shows.
 
     Rows have `columns` panels at most and a `height` in inches; the lowest panel of a column has `xlabel`, the first of
     a row `ylabel`; `shared` are options of `Figure.subplots`.
     """
-    count = len(parts)
+    count = len(parts := dict(parts))
     figure, ((*axes,),) = panels(1, count, height + 0.3, min(columns, count), **shared)
     for k, (panel, title) in enumerate(zip(axes, parts, strict=True)):
         titled(panel, title)
