@@ -79,18 +79,19 @@ def dipole_validity(quick: bool, rotors: Mapping[str, tuple[Magnet, ...]] = ROTO
 def models(magnets: tuple[Magnet, ...], factor: float) -> dict[str, RotorTable]:
     """Models from the article's dipole to the closed form; `factor` is true over remanent moment."""
     true = tuple(replace(magnet, polarization=factor * magnet.polarization) for magnet in magnets)
-
-    def moments(sources: tuple[Magnet, ...], degree: int) -> RotorTable:
-        return RotorTable("moments", sources, (), tuple(uniform_moments(magnet, degree) for magnet in sources))
-
     return {
-        "dipole": moments(magnets, 1),
-        "dipole, true moment": moments(true, 1),
-        "moments to 5, true moment": moments(true, 5),
-        "moments to 13, true moment": moments(true, 13),
+        "dipole": moments_table(magnets, 1),
+        "dipole, true moment": moments_table(true, 1),
+        "moments to 5, true moment": moments_table(true, 5),
+        "moments to 13, true moment": moments_table(true, 13),
         "cuboid": RotorTable("cuboid", magnets, magnets),
         "cuboid, true moment": RotorTable("cuboid", true, true),
     }
+
+
+def moments_table(magnets: tuple[Magnet, ...], degree: int) -> RotorTable:
+    """The field of each magnet's moments up to a degree."""
+    return RotorTable("moments", magnets, (), tuple(uniform_moments(magnet, degree) for magnet in magnets))
 
 
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4)
@@ -181,10 +182,6 @@ def _magnet(
     return Magnet(box, np.array(polarization, float), PERMEABILITY, across)
 
 
-def _round(body: Cylinder, *polarization: float) -> tuple[Magnet, ...]:
-    return (Magnet(body, np.array(polarization, float), PERMEABILITY),)
-
-
 def _cube(permeability: float) -> tuple[Magnet, ...]:
     return horizontal(0.002, EDGE, REMANENCE, permeability)
 
@@ -201,6 +198,7 @@ EIGHT = tuple(
 )
 OBLIQUE = (_magnet(CUBE, (1, 0, 0), angles=(15, 40, 70), across=1.15),)
 FLAT, LONG = (0.02, 0.02, 0.0005), (0.005, 0.005, 0.04)
+ALONG, _, UP = np.eye(3)
 DISC, THIN_RING = Cylinder(10e-3, 1e-3), ring(10e-3, 9e-3, 5e-3)
 CASES = {
     "contact distance": HardCase(_cube(PERMEABILITY), CONTACT, quick=True),
@@ -212,9 +210,9 @@ CASES = {
     "flat, across": HardCase((_magnet(FLAT, (0, 0, 1.3)),), CONTACT, order=4),
     "flat, along": HardCase((_magnet(FLAT, (1.3, 0, 0)),), CONTACT, order=4),
     "long": HardCase((_magnet(LONG, (1.3, 0, 0)),), CONTACT),
-    "disc of 20 : 1, across": HardCase(_round(DISC, 0, 0, 1.3), CONTACT, order=4),
-    "disc of 20 : 1, along": HardCase(_round(DISC, 1.3, 0, 0), CONTACT, order=4),
-    "thin ring": HardCase(_round(THIN_RING, 1.3, 0, 0), CONTACT, order=4),
+    "disc of 20 : 1, across": HardCase((Magnet(DISC, 1.3 * UP, PERMEABILITY),), CONTACT, order=4),
+    "disc of 20 : 1, along": HardCase((Magnet(DISC, 1.3 * ALONG, PERMEABILITY),), CONTACT, order=4),
+    "thin ring": HardCase((Magnet(THIN_RING, 1.3 * ALONG, PERMEABILITY),), CONTACT, order=4),
     "touching": HardCase(_pair(0.01)),
     "gap of 1 µm": HardCase(_pair(0.010001)),
     "gap of 50 µm": HardCase(_pair(0.01005), order=4),
@@ -263,17 +261,15 @@ def field_hard_cases(quick: bool, cases: Mapping[str, HardCase] = CASES, places:
 def case_errors(case: HardCase, places: int) -> xr.Dataset:
     """Largest errors of a case's table at `places` distances, relative to the field that is typical there."""
     start = time.process_time()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AccuracyWarning)
+    with warnings.catch_warnings(action="ignore", category=AccuracyWarning):
         field = fem_table(case.magnets, Accuracy(RTOL, case.nearest))
     seconds = time.process_time() - start
     distance = np.geomspace(case.clearance, FARTHEST, places)
     points = [extensions(case, d) if case.extensions else points_around(case.magnets, d) for d in distance]
     before, truth = reference(case, np.concatenate(points))
     ends = np.cumsum([len(p) for p in points])[:-1]
-    parts = zip(points, np.split(before, ends), np.split(truth, ends), strict=True)
     rows = []
-    for places_there, lower, exact in parts:
+    for places_there, lower, exact in zip(points, np.split(before, ends), np.split(truth, ends), strict=True):
         scale = typical_field(case.magnets, places_there)
         true, own = (np.linalg.norm(b - exact, axis=1) / scale for b in (field.evaluate(places_there)[0], lower))
         stated = field.absolute_error(places_there)[0] / scale + ROUND_OFF
@@ -340,11 +336,11 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
 
 def hard_case_lines(result: xr.Dataset) -> list[str]:
     """Errors of each rotor near and far, and whether they are as stated, as a table."""
-    keys, rows = tuple(LINES)[1::-1] + tuple(LINES)[2:], []
+    rows = []
     for name in result["case"].values:
         row = result.sel(case=name)
         near, far = row.isel(place=0), row.where(row["distance"] >= 0.1).max()
-        errors = [" / ".join(f"{float(at[key]):.1e}" for key in keys) for at in (near, far)]
+        errors = [" / ".join(f"{float(at[key]):.1e}" for key in ERRORS[:3]) for at in (near, far)]
         cover, order, seconds = float(row["shortfall"].max()), int(row["order"]), float(row["seconds"])
         rows.append((name, f"{1e3 * float(near['distance']):.2f}", *errors, f"{cover:.2f}", order, f"{seconds:.1f}"))
     head = ("case", "nearest (mm)", "errors there", "10 cm and farther", "cover", "order", "CPU (s)")

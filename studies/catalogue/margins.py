@@ -38,18 +38,20 @@ class Known(NamedTuple):
     words: str
     nominal: float
     spread: float  # half the width of an even distribution, or the standard deviation of a normal one
+    key: str  # of the scene file, and its unit by that of the parameter
+    unit: float = 1.0
     normal: bool = False
 
 
 PARAMETERS = {
-    "measure": Known("displacement or tilt", np.nan, 0.1, True),
-    "rotor_remanence": Known("rotor's remanence", 1.305, 0.015),
-    "floater_remanence": Known("floater's remanence", 1.305, 0.015),
-    "density": Known("density", 7500.0, 100.0),
-    "edge": Known("edge of the cube", 10e-3, 0.1e-3),
-    "diameter": Known("diameter of the sphere", 12.7e-3, 0.05e-3),
-    "gravity": Known("gravity", 9.81, 0.0),
-    "frequency": Known("frequency", np.nan, 0.5, True),
+    "measure": Known("displacement or tilt", np.nan, 0.1, "", normal=True),
+    "rotor_remanence": Known("rotor's remanence", 1.305, 0.015, "rotor.remanence_T"),
+    "floater_remanence": Known("floater's remanence", 1.305, 0.015, "floater.remanence_T"),
+    "density": Known("density", 7500.0, 100.0, "floater.density_kg_m3"),
+    "edge": Known("edge of the cube", 10e-3, 0.1e-3, "rotor.edge_mm", 1e3),
+    "diameter": Known("diameter of the sphere", 12.7e-3, 0.05e-3, "floater.diameter_mm", 1e3),
+    "gravity": Known("gravity", 9.81, 0.0, "gravity_m_s2.2", -1.0),
+    "frequency": Known("frequency", np.nan, 0.5, "frequency_hz", normal=True),
 }  # Remanence: the article's 1.29 to 1.32 T. Size: what makers of magnets give. Place of the cube: 0.1 mm, tilt 0.5°
 NORMAL = np.array([known.normal for known in PARAMETERS.values()])
 TILT_SPREAD = 0.5
@@ -97,25 +99,16 @@ def nominal(configuration: str, measure: float, model: FieldModel = "cuboid") ->
     return Nominal(configuration, model, values | {"frequency": float(grid[1])}, stable, grid)
 
 
-def _keyed(configuration: str) -> dict[str, tuple[str, float]]:
-    """Key of the scene file of each parameter, and its unit by that of the parameter."""
+def _units(configuration: str) -> dict[str, float]:
+    """The unit of each parameter by its key of the scene file."""
     measure = "rotor.angle_deg" if configuration == "tilt" else "rotor.displacement_mm"
-    return {
-        "measure": (measure, 1.0),
-        "rotor_remanence": ("rotor.remanence_T", 1.0),
-        "floater_remanence": ("floater.remanence_T", 1.0),
-        "density": ("floater.density_kg_m3", 1.0),
-        "edge": ("rotor.edge_mm", 1e3),
-        "diameter": ("floater.diameter_mm", 1e3),
-        "gravity": ("gravity_m_s2.2", -1.0),
-        "frequency": ("frequency_hz", 1.0),
-    }
+    return {known.key or measure: known.unit for known in PARAMETERS.values()}
 
 
 def scene_of(configuration: str, values: Mapping[str, float], frequency: float = 100.0) -> Scene:
     """The scene of a rotor in vacuum with all parameters given by name (SI; measure: mm or °), at a frequency in Hz."""
     cube = {"edge_mm": 1e3 * values["edge"], "remanence_T": values["rotor_remanence"], "recoil_permeability": 1.0}
-    measure = _keyed(configuration)["measure"][0].removeprefix("rotor.")
+    measure = next(iter(_units(configuration))).removeprefix("rotor.")
     rotor = {"configuration": configuration, measure: values["measure"], **cube}
     size, remanence = 1e3 * values["diameter"], values["floater_remanence"]
     ball = sphere(diameter_mm=size, remanence_T=remanence, density_kg_m3=values["density"])
@@ -135,32 +128,31 @@ class Slopes:
     @classmethod
     def of(cls, base: Nominal) -> Self:
         levitation = article.levitation_of(scene_of(base.configuration, base.values, float(base.grid[1])), base.model)
-        keys, found, ways = _keyed(base.configuration), np.zeros((2, len(PARAMETERS), len(QUANTITIES))), []
+        units, found, ways = _units(base.configuration), np.zeros((2, len(PARAMETERS), len(QUANTITIES))), []
         for k, end in enumerate((base.stable.low, base.stable.high)):
             gradient = Gradient(levitation.elsewhere(frequency=end.parameter))
-            for number, (key, unit) in enumerate(keys.values()):
+            for number, (key, unit) in enumerate(units.items()):
                 found[:, number, k] = 0.0 if end.kind == BORDER else unit * np.array(gradient.end_by(end, key))
         for k, frequency in enumerate(base.grid, 2):
             there = levitation.elsewhere(frequency=float(frequency))
             middle = base.stable.near(frequency)
             known = equilibrium_at(there, at_frequency(there.scene, there.rates, middle, float(frequency), LONG_STEPS))
             gradient = Gradient(there)
-            ways.append((known, *gradient.ways(known, [key for key, _ in keys.values()])))
-            for number, (key, unit) in enumerate(keys.values()):
+            ways.append((known, *gradient.ways(known, list(units))))
+            for number, (key, unit) in enumerate(units.items()):
                 value, error = gradient.with_errors(known, ways[-1][1][key], ["distance"], key)
                 found[:, number, k] = unit * np.array([value[0], error[0]])
         return cls(base, found[0], np.abs(found[1]), tuple(ways))
 
     def off(self, draw: Array) -> Array:
         """Quantities with parameters off by a `draw`: ends to first order, distances of whole equilibria."""
-        base, keys = self.base, _keyed(self.base.configuration)
+        base, units = self.base, _units(self.base.configuration)
         ends = [base.stable.low.parameter, base.stable.high.parameter] + draw @ self.derivatives[:, :2]
         row = np.append(ends, [np.nan] * 3)
-        values = {name: base.values[name] + by for name, by in zip(PARAMETERS, draw, strict=True)}
-        offsets = {key: unit * float(by) for (key, unit), by in zip(keys.values(), draw, strict=True)}
+        offsets = {key: unit * float(by) for (key, unit), by in zip(units.items(), draw, strict=True)}
         for k, (frequency, (_, tangents, implicit, nearby)) in enumerate(zip(base.grid, self.ways, strict=True), 2):
             if row[0] < frequency + offsets["frequency_hz"] < row[1]:
-                scene = scene_of(base.configuration, values, float(frequency) + offsets["frequency_hz"])
+                scene = changed(nearby.scene, {key: nearby.numbers[key] + by for key, by in offsets.items()})
                 steps = [(by, tangents[key]) for key, by in offsets.items()]
                 moved = implicit.moved(nearby.at(scene, offsets), steps, False)
                 row[k] = np.nan if moved is None else moved.distance
@@ -317,8 +309,8 @@ def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """The cubes with the largest margin by the closed form, and their measure in the field of the finite magnets."""
     name, frequency = point["configuration"], point["frequency"]
     measure, begun, bounds = BEGUN[name]
-    key = _keyed(name)["measure"][0]
-    values = {known: PARAMETERS[known].nominal for known in PARAMETERS} | {"measure": measure}
+    key = next(iter(_units(name)))
+    values = {parameter: known.nominal for parameter, known in PARAMETERS.items()} | {"measure": measure}
     scene = scene_of(name, values, begun)
     free = {key: bounds, "rotor.edge_mm": EDGES, "frequency_hz": (min(begun, frequency), max(begun, frequency))}
     search, elements, parts = Search(article.levitation_of(scene, "cuboid"), free), None, []

@@ -56,10 +56,8 @@ class PlateCase:
 
     def plate(self, place: Array) -> Plate:
         size, away = np.array([*article.PLATE_SIZE[:2], self.thickness]), self.distance + self.thickness / 2
-        if self.upright:
-            center = np.array([away, 0.0, place[2]])
-            return Plate(Box(size, center, rotation_matrix((0.0, 90.0, 0.0))), self.conductivity)
-        return Plate(Box(size, np.array([0.0, 0.0, place[2] - away])), self.conductivity)
+        center = np.array([away, 0.0, place[2]] if self.upright else [0.0, 0.0, place[2] - away])
+        return Plate(Box(size, center, rotation_matrix((0.0, 90.0 * self.upright, 0.0))), self.conductivity)
 
 
 def cases(quick: bool) -> list[PlateCase]:
@@ -190,10 +188,8 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
                 showing.explain(panel, {showing.mode_label(mode): "-"}, color=color)
             showing.explain(panel, {words: style}, mfc=fill, ms=4)
         panel.set_xlabel(SWEEPS[sweep][1])
-        if sweep in PLACES:
-            plain_log(panel.xaxis, DISTANCES)
-        elif sweep != "frequency":
-            plain_log(panel.xaxis)
+        if sweep != "frequency":
+            plain_log(panel.xaxis, DISTANCES if sweep in PLACES else ())
     return figure
 
 
@@ -249,12 +245,12 @@ def _damping_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for sweep in (*PLACES, *(place + REAL_PLATE for place in PLACES), "frequency", *ROTORS):
         for one in each_case(part_of(result, sweep)):
-            where = f"plate {sweep}, face at {1e3 * float(one['value']):.1f} mm"
+            where, value = f"plate {1e3 * DISTANCE:g} mm below", float(one["value"])
             if sweep in ROTORS:
-                rotor = article.rotor_label(one["configuration"].item(), float(one["value"]))
+                rotor = article.rotor_label(one["configuration"].item(), value)
                 where = f"{rotor}, plate {sweep.split(', ')[1]}"
-            elif sweep == "frequency":
-                where = f"plate {1e3 * DISTANCE:g} mm below"
+            elif sweep != "frequency":
+                where = f"plate {sweep}, face at {1e3 * value:.1f} mm"
             cells, worst = ["no equilibrium", "", *[""] * len(MEANS)], float(one["growth"].max("mode"))
             if np.isfinite(worst):
                 mode = showing.mode_label(one["mode"].values[int(one["growth"].argmax("mode"))])

@@ -22,7 +22,7 @@ from ...fem.closed_forms.moments import added_by_closed_form, carrier
 from ...fem.compiled_code import compiled
 from ...fem.elements.ladder import Refinement, refinement_of, solve_rotor
 from ...fem.elements.magnetostatics import magnet_dipoles
-from ...fem.harmonics.expansion import uniform_moments, without_noise
+from ...fem.harmonics.expansion import without_noise
 from ...fem.maps_of_B.columns import FieldMap
 from ...fem.maps_of_B.table import fit_field_map
 from ...fem.rotor.choice import rotor_table
@@ -37,6 +37,7 @@ from ..processes import safe_path
 from ..result import Columns, columns, variable
 from ..study import study_of_one
 from .article import EDGE, REMANENCE
+from .field_quality import moments_table
 from .showing import explain, small_multiples, text_table
 
 Magnets = tuple[Magnet, ...]
@@ -54,8 +55,7 @@ class Method(NamedTuple):
 
 
 def _moments(degree: int, magnets: Magnets) -> tuple[FieldTable, int]:
-    table = RotorTable("moments", magnets, (), tuple(uniform_moments(magnet, degree) for magnet in magnets))
-    return table, degree * (degree + 2)
+    return moments_table(magnets, degree), degree * (degree + 2)
 
 
 def _closed_form(_: int, magnets: Magnets) -> tuple[FieldTable, int]:
@@ -81,8 +81,7 @@ def _split(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
 
 def _table(rtol: float, magnets: Magnets) -> tuple[FieldTable, int]:
     """What a user gets: the ladder until the estimated error meets the tolerance."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AccuracyWarning)  # the study measures what is reached
+    with warnings.catch_warnings(action="ignore", category=AccuracyWarning):  # the study measures what is reached
         table = rotor_table(magnets, "fem", rtol)
     return table, int(table.provenance.get("unknowns", 0))
 
@@ -171,8 +170,12 @@ def cube(problem: str) -> tuple[Magnet, ...]:
 
 def sphere_points() -> Array:
     """Points (d, 200, 3) m at the distances, all around the cube."""
-    way = np.random.default_rng(5).normal(size=(200, 3))
-    return np.asarray(np.array(DISTANCES)[:, None, None] * way / np.linalg.norm(way, axis=1)[:, None])
+    return np.array(DISTANCES)[:, None, None] * _directions(5, 200)
+
+
+def _directions(seed: int, number: int) -> Array:
+    way = np.random.default_rng(seed).normal(size=(number, 3))
+    return np.asarray(way / np.linalg.norm(way, axis=1)[:, None])
 
 
 def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measured:
@@ -186,10 +189,7 @@ def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measure
     field, gradient, stated = _at_points(table)
     seconds, cpu_seconds = time.perf_counter() - began, time.process_time() - processor
     grown = _peak_memory() - memory
-    many = _many(timed_points)
-    table.evaluate(many)
-    pace = min(timeit.repeat(lambda: table.evaluate(many), timer=time.process_time, number=1)) / timed_points
-    costs = dict(zip(COSTS, (unknowns, seconds, cpu_seconds, grown, pace), strict=True))
+    costs = dict(zip(COSTS, (unknowns, seconds, cpu_seconds, grown, _pace(table.evaluate, timed_points)), strict=True))
     return Measured(field, gradient, stated, costs)
 
 
@@ -205,15 +205,18 @@ def _peak_memory() -> float:
     return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
-def _many(number: int) -> Array:
-    """Where a floater may be: all around, 13 to 40 mm from the cube's centre."""
-    rng = np.random.default_rng(0)
-    way = rng.normal(size=(number, 3))
-    return np.asarray(rng.uniform(0.013, 0.04, (number, 1)) * way / np.linalg.norm(way, axis=1)[:, None])
+def _pace(evaluate: Callable[[Array], Any], number: int = TIMED_POINTS) -> float:
+    """Processor time of a point, of a number of them where a floater may be: 13 to 40 mm from the cube's centre."""
+    many = np.linspace(0.013, 0.04, number)[:, None] * _directions(0, number)
+    evaluate(many[:10])
+    return min(timeit.repeat(lambda: evaluate(many), timer=time.process_time, number=1)) / number
 
 
 def apart(name: str, quick: bool) -> Measured:
-    """`measure` in a process of its own with an empty cache, forked from one that has only imported the libraries."""
+    """`measure` in a process of its own with an empty cache, forked from one that has only imported the libraries.
+
+    `processes.mapped` begins processes that inherit this one's largest memory, and that give memory back all the time.
+    """
     fresh = get_context("forkserver")
     fresh.set_forkserver_preload([__name__])
     with safe_path(), tempfile.TemporaryDirectory() as cache, ProcessPoolExecutor(1, mp_context=fresh) as pool:
@@ -240,10 +243,8 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
     requested = truth or (QUICK_TRUTH if quick else TRUTH_TOLERANCE)
     truths = {}
     for problem in PERMEABILITIES:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", AccuracyWarning)  # its own error is stored, whatever it is
-            table = rotor_table(cube(problem), "auto", requested)
-        truths[problem] = _at_points(table)
+        with warnings.catch_warnings(action="ignore", category=AccuracyWarning):  # its own error is stored
+            truths[problem] = _at_points(rotor_table(cube(problem), "auto", requested))
     errors, costs = [], []
     for name, method in catalogue.items():
         note(f"  {name} ...")
@@ -257,10 +258,8 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
         "problem": ("approach", [method.problem for method in catalogue.values()]),
         "distance": variable(("distance",), np.array(DISTANCES), "m", "distance from the cube's centre"),
     }
-    peer, many = magpylib.magnet.Cuboid(polarization=(1.305, 0, 0), dimension=(0.01,) * 3), _many(TIMED_POINTS)
-    peer.getB(many[:10])
-    pace = min(timeit.repeat(lambda: peer.getB(many), timer=time.process_time, number=1)) / TIMED_POINTS
-    return xr.Dataset(data, coords, {"magpylib_seconds_per_point": pace})  # of B alone, for the same cube
+    peer = magpylib.magnet.Cuboid(polarization=(1.305, 0, 0), dimension=(0.01,) * 3)
+    return xr.Dataset(data, coords, {"magpylib_seconds_per_point": _pace(peer.getB)})  # of B alone, for the same cube
 
 
 def _largest(values: Array, truth: Array, rank: int) -> Array:
@@ -299,10 +298,10 @@ def speed_figure(result: xr.Dataset) -> Figure:
     for panel, problem in panels:
         for family, color in zip(families, [*PALETTE, "0.4"], strict=False):
             rows = at.isel(approach=np.flatnonzero((at["family"] == family) & (at["problem"] == problem)))
-            panel.loglog(rows["cpu_seconds"], np.maximum(rows["field_error"], 1e-16), "o-", ms=4, color=color)
+            look: dict[str, Any] = {"ms": 4, "color": color}
+            panel.loglog(rows["cpu_seconds"], np.maximum(rows["field_error"], 1e-16), "o-", label=family, **look)
             stated = rows["stated_error"].where(rows["stated_error"] > ROUND_OFF)
-            panel.loglog(rows["cpu_seconds"], stated, "o", mfc="none", ms=4, color=color)
-            explain(panel, {family: "o-"}, color=color, ms=4)
+            panel.loglog(rows["cpu_seconds"], stated, "o", mfc="none", **look)
         own = float(at["truth_error"].where(at["problem"] == problem).max())
         panel.axhspan(1e-17, max(own, 1e-16), facecolor="0.9", edgecolor="0.6", label="error of the reference")
         panel.set_ylim(1e-17, None)
