@@ -1,6 +1,6 @@
 """How exactly a rotor must be made, and which rotor leaves the largest margin."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple, Self
@@ -33,28 +33,27 @@ FRACTIONS = (0.1, 0.5, 0.9)  # Places in the range of stable frequencies at whic
 
 
 class Known(NamedTuple):
-    """A parameter, SI units (measure: mm or °), and how well it is known."""
+    """A number of the scene file, and how well it is known as a parameter in SI units (measure: mm or °)."""
 
     words: str
-    nominal: float
+    key: str
     spread: float  # half the width of an even distribution, or the standard deviation of a normal one
-    key: str  # of the scene file, and its unit by that of the parameter
-    unit: float = 1.0
+    unit: float = 1.0  # of the key by the parameter's
     normal: bool = False
 
 
 PARAMETERS = {
-    "measure": Known("displacement or tilt", np.nan, 0.1, "", normal=True),
-    "rotor_remanence": Known("rotor's remanence", 1.305, 0.015, "rotor.remanence_T"),
-    "floater_remanence": Known("floater's remanence", 1.305, 0.015, "floater.remanence_T"),
-    "density": Known("density", 7500.0, 100.0, "floater.density_kg_m3"),
-    "edge": Known("edge of the cube", 10e-3, 0.1e-3, "rotor.edge_mm", 1e3),
-    "diameter": Known("diameter of the sphere", 12.7e-3, 0.05e-3, "floater.diameter_mm", 1e3),
-    "gravity": Known("gravity", 9.81, 0.0, "gravity_m_s2.2", -1.0),
-    "frequency": Known("frequency", np.nan, 0.5, "frequency_hz", normal=True),
+    "measure": Known("displacement or tilt", "rotor.displacement_mm", 0.1, normal=True),
+    "rotor_remanence": Known("rotor's remanence", "rotor.remanence_T", 0.015),
+    "floater_remanence": Known("floater's remanence", "floater.remanence_T", 0.015),
+    "density": Known("density", "floater.density_kg_m3", 100.0),
+    "edge": Known("edge of the cube", "rotor.edge_mm", 0.1e-3, 1e3),
+    "diameter": Known("diameter of the sphere", "floater.diameter_mm", 0.05e-3, 1e3),
+    "gravity": Known("gravity", "gravity_m_s2.2", 0.0, -1.0),
+    "frequency": Known("frequency", "frequency_hz", 0.5, normal=True),
 }  # Remanence: the article's 1.29 to 1.32 T. Size: what makers of magnets give. Place of the cube: 0.1 mm, tilt 0.5°
+TILT = {"measure": PARAMETERS["measure"]._replace(key="rotor.angle_deg", spread=0.5)}
 NORMAL = np.array([known.normal for known in PARAMETERS.values()])
-TILT_SPREAD = 0.5
 TILTS = (0.0, 1.0, 2.0)  # Of the axis from the vertical, degrees
 ENDS = ("lowest", "highest")
 QUANTITIES = (*ENDS, *(f"distance at {f:.0%}" for f in FRACTIONS))
@@ -71,86 +70,64 @@ COLUMNS: Columns = {
 }
 
 
-class Nominal(NamedTuple):
-    """A rotor with all parameters as they should be."""
-
-    configuration: str
-    model: FieldModel  # of its field
-    values: dict[str, float]  # of the parameters
-    stable: StableRange
-    grid: Array  # frequencies at which the distance is asked for, Hz
+def parameters_of(configuration: str) -> list[Known]:
+    """How well each parameter of a rotor is known (parameter,)."""
+    return list((PARAMETERS | (TILT if configuration == "tilt" else {})).values())
 
 
-def spreads(configuration: str) -> Array:
-    """How well each parameter is known (parameter,), as of `Known`."""
-    found = np.array([known.spread for known in PARAMETERS.values()])
-    return np.append(TILT_SPREAD, found[1:]) if configuration == "tilt" else found
-
-
-def nominal(configuration: str, measure: float, model: FieldModel = "cuboid") -> Nominal:
-    """The rotor as it should be, its field by `model`. Raises EquilibriumError where it does not levitate."""
-    values = {name: known.nominal for name, known in PARAMETERS.items()} | {"measure": measure}
-    scene = scene_of(configuration, values)
-    levitation = article.levitation_of(scene, model)
-    if not (found := levitating_ranges(scene, levitation.table, levitation.rates)):
-        raise EquilibriumError("The rotor levitates stably at no frequency.")
-    stable = found[0]
-    grid = article.within(stable, FRACTIONS)
-    return Nominal(configuration, model, values | {"frequency": float(grid[1])}, stable, grid)
-
-
-def _units(configuration: str) -> dict[str, float]:
-    """The unit of each parameter by its key of the scene file."""
-    measure = "rotor.angle_deg" if configuration == "tilt" else "rotor.displacement_mm"
-    return {known.key or measure: known.unit for known in PARAMETERS.values()}
-
-
-def scene_of(configuration: str, values: Mapping[str, float], frequency: float = 100.0) -> Scene:
-    """The scene of a rotor in vacuum with all parameters given by name (SI; measure: mm or °), at a frequency in Hz."""
-    cube = {"edge_mm": 1e3 * values["edge"], "remanence_T": values["rotor_remanence"], "recoil_permeability": 1.0}
-    measure = next(iter(_units(configuration))).removeprefix("rotor.")
-    rotor = {"configuration": configuration, measure: values["measure"], **cube}
-    size, remanence = 1e3 * values["diameter"], values["floater_remanence"]
-    ball = sphere(diameter_mm=size, remanence_T=remanence, density_kg_m3=values["density"])
-    still, down = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}, [0.0, 0.0, -values["gravity"]]
-    return written_scene(frequency_hz=frequency, rotor=rotor, floater=ball, gravity_m_s2=down, drag=still)
+def scene_of(configuration: str, measure: float, frequency: float = 100.0) -> Scene:
+    """The scene of a rotor (mm or °) of μr = 1 in vacuum with all else as it should be, at a frequency in Hz."""
+    cube = {"edge_mm": 10.0, "remanence_T": article.REMANENCE, "recoil_permeability": 1.0}
+    rotor = {
+        "configuration": configuration,
+        parameters_of(configuration)[0].key.removeprefix("rotor."): measure,
+        **cube,
+    }
+    ball = sphere(diameter_mm=12.7, remanence_T=article.REMANENCE, density_kg_m3=7500.0)
+    still = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}
+    return written_scene(frequency_hz=frequency, rotor=rotor, floater=ball, drag=still)
 
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
     """A rotor's quantities, their derivatives by all parameters, and what they are with parameters that are off."""
 
-    base: Nominal
+    configuration: str
+    stable: StableRange
+    grid: Array  # frequencies at which the distance is asked for, Hz
     derivatives: Array  # (parameter, quantity)
     errors: Array  # (parameter, quantity) estimates
     ways: tuple[Any, ...]  # `Gradient.ways` at each of the frequencies
 
     @classmethod
-    def of(cls, base: Nominal) -> Self:
-        levitation = article.levitation_of(scene_of(base.configuration, base.values, float(base.grid[1])), base.model)
-        units, found, ways = _units(base.configuration), np.zeros((2, len(PARAMETERS), len(QUANTITIES))), []
-        for k, end in enumerate((base.stable.low, base.stable.high)):
+    def of(cls, configuration: str, measure: float, model: FieldModel = "cuboid") -> Self:
+        """Of the rotor as it should be, its field by `model`. Raises EquilibriumError where it does not levitate."""
+        levitation = article.levitation_of(scene := scene_of(configuration, measure), model)
+        if not (ranges := levitating_ranges(scene, levitation.table, levitation.rates)):
+            raise EquilibriumError("The rotor levitates stably at no frequency.")
+        stable, grid = ranges[0], article.within(ranges[0], FRACTIONS)
+        varied, ways = parameters_of(configuration), []
+        found = np.zeros((2, len(varied), len(QUANTITIES)))
+        for k, end in enumerate((stable.low, stable.high)):
             gradient = Gradient(levitation.elsewhere(frequency=end.parameter))
-            for number, (key, unit) in enumerate(units.items()):
-                found[:, number, k] = 0.0 if end.kind == BORDER else unit * np.array(gradient.end_by(end, key))
-        for k, frequency in enumerate(base.grid, 2):
-            there = levitation.elsewhere(frequency=float(frequency))
-            middle = base.stable.near(frequency)
-            known = equilibrium_at(there, at_frequency(there.scene, there.rates, middle, float(frequency), LONG_STEPS))
-            gradient = Gradient(there)
-            ways.append((known, *gradient.ways(known, list(units))))
-            for number, (key, unit) in enumerate(units.items()):
-                value, error = gradient.with_errors(known, ways[-1][1][key], ["distance"], key)
-                found[:, number, k] = unit * np.array([value[0], error[0]])
-        return cls(base, found[0], np.abs(found[1]), tuple(ways))
+            for number, one in enumerate(varied):
+                found[:, number, k] = 0.0 if end.kind == BORDER else one.unit * np.array(gradient.end_by(end, one.key))
+        for k, frequency in enumerate(grid.tolist(), 2):
+            there = levitation.elsewhere(frequency=frequency)
+            point = at_frequency(there.scene, there.rates, stable.near(frequency), frequency, LONG_STEPS)
+            known, gradient = equilibrium_at(there, point), Gradient(there)
+            ways.append((known, *gradient.ways(known, [one.key for one in varied])))
+            for number, one in enumerate(varied):
+                value, error = gradient.with_errors(known, ways[-1][1][one.key], ["distance"], one.key)
+                found[:, number, k] = one.unit * np.array([value[0], error[0]])
+        return cls(configuration, stable, grid, found[0], np.abs(found[1]), tuple(ways))
 
     def off(self, draw: Array) -> Array:
         """Quantities with parameters off by a `draw`: ends to first order, distances of whole equilibria."""
-        base, units = self.base, _units(self.base.configuration)
-        ends = [base.stable.low.parameter, base.stable.high.parameter] + draw @ self.derivatives[:, :2]
-        row = np.append(ends, [np.nan] * 3)
-        offsets = {key: unit * float(by) for (key, unit), by in zip(units.items(), draw, strict=True)}
-        for k, (frequency, (_, tangents, implicit, nearby)) in enumerate(zip(base.grid, self.ways, strict=True), 2):
+        ends = [self.stable.low.parameter, self.stable.high.parameter] + draw @ self.derivatives[:, :2]
+        row, varied = np.append(ends, [np.nan] * 3), parameters_of(self.configuration)
+        offsets = {one.key: one.unit * float(by) for one, by in zip(varied, draw, strict=True)}
+        for k, (frequency, (_, tangents, implicit, nearby)) in enumerate(zip(self.grid, self.ways, strict=True), 2):
             if row[0] < frequency + offsets["frequency_hz"] < row[1]:
                 scene = changed(nearby.scene, {key: nearby.numbers[key] + by for key, by in offsets.items()})
                 steps = [(by, tangents[key]) for key, by in offsets.items()]
@@ -161,13 +138,13 @@ class Slopes:
     def leaning(self) -> Array:
         """Distance (m) and largest growth (1/s) in the middle of the range with the axis tilted (2, tilt)."""
         _, tangents, implicit, nearby = self.ways[1]
-        found = []
+        found, key = [], PARAMETERS["gravity"].key
         for tilt in np.radians(TILTS):
             down = 9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
             scene = replace(nearby.scene, gravity=down)
-            less = {"gravity_m_s2.2": float(down[2] - nearby.scene.gravity[2])}
-            setting = nearby.at(scene, less)
-            fixed = implicit.moved(setting, [(by, tangents[key]) for key, by in less.items()])
+            less = float(down[2] - nearby.scene.gravity[2])
+            setting = nearby.at(scene, {key: less})
+            fixed = implicit.moved(setting, [(less, tangents[key])])
             motion = ForcedMotion(scene, setting.rates, setting.values, None)
             forced = None if fixed is None else motion.equilibrium(fixed)
             numbers = (forced.distance, forced.growth_per_s) if isinstance(forced, Equilibrium) else (np.nan, np.nan)
@@ -177,19 +154,19 @@ class Slopes:
 
 def sensitivity(point: Point) -> xr.Dataset:
     """Derivatives, tolerance band and tilt of one rotor."""
-    base, samples = nominal(point["configuration"], point["measure"], point["field"]), point["samples"]
-    slopes = Slopes.of(base)
+    slopes, samples = Slopes.of(point["configuration"], point["measure"], point["field"]), point["samples"]
     # a Latin hypercube: each parameter's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239)
     generator = np.random.default_rng(SEED)
     ranks = generator.permuted(np.tile(np.arange(samples)[:, None], len(PARAMETERS)), axis=0)
     levels = (ranks + generator.random(ranks.shape)) / samples
-    draws = spreads(base.configuration) * np.where(NORMAL, ndtri(levels), 2 * levels - 1)
+    spreads = [known.spread for known in parameters_of(slopes.configuration)]
+    draws = spreads * np.where(NORMAL, ndtri(levels), 2 * levels - 1)
     sample = [slopes.off(draw) for draw in draws]
     lean = variable(("lean",), np.array(TILTS), "°", "tilt of the axis from the vertical")
     axes = {"parameter": list(PARAMETERS), "quantity": list(QUANTITIES), "fraction": list(FRACTIONS), "lean": lean}
     distances = [known.distance for known, *_ in slopes.ways]
-    row = np.array([base.stable.low.parameter, base.stable.high.parameter, *distances])
-    found = (row, slopes.derivatives, slopes.errors, sample, draws, base.grid, *slopes.leaning())
+    row = [slopes.stable.low.parameter, slopes.stable.high.parameter, *distances]
+    found = (row, slopes.derivatives, slopes.errors, sample, draws, slopes.grid, *slopes.leaning())
     return recorded(point, COLUMNS, found, axes)
 
 
@@ -202,7 +179,8 @@ BANDS = f"{PERCENTILES[0]} to {PERCENTILES[1]} % of the rotors"
 
 def contributions(one: xr.Dataset, quantity: str) -> Array:
     """What one standard deviation of each parameter does to a quantity of one rotor, and its error (2, parameter)."""
-    deviation = SCALES[quantity][0] * spreads(one["configuration"].item()) / np.where(NORMAL, 1.0, np.sqrt(3))
+    spreads = np.array([known.spread for known in parameters_of(one["configuration"].item())])
+    deviation = SCALES[quantity][0] * spreads / np.where(NORMAL, 1.0, np.sqrt(3))
     both = one[["derivative", "derivative_error"]].sel(quantity=quantity)
     return np.abs([both[name].values * deviation for name in both])
 
@@ -309,9 +287,7 @@ def design(point: Point, rtol: float = RTOL) -> xr.Dataset:
     """The cubes with the largest margin by the closed form, and their measure in the field of the finite magnets."""
     name, frequency = point["configuration"], point["frequency"]
     measure, begun, bounds = BEGUN[name]
-    key = next(iter(_units(name)))
-    values = {parameter: known.nominal for parameter, known in PARAMETERS.items()} | {"measure": measure}
-    scene = scene_of(name, values, begun)
+    key, scene = parameters_of(name)[0].key, scene_of(name, measure, begun)
     free = {key: bounds, "rotor.edge_mm": EDGES, "frequency_hz": (min(begun, frequency), max(begun, frequency))}
     search, elements, parts = Search(article.levitation_of(scene, "cuboid"), free), None, []
     for distance in point["distances_mm"]:  # each from where the last one ended
