@@ -82,21 +82,18 @@ def drawn(pictures: Sequence[Picture], progress: Progress = lambda fraction: Non
     try:
         with closing(results(1, _drawing, deque([pictures]), showing=True)) as answers:
             for _, answer in answers:
-                if isinstance(answer, float):
-                    progress(answer)
-                elif isinstance(answer, Death):
+                if isinstance(answer, Death):
                     from ..cli.console import DRAWING, way_out
 
                     said = f"the process that draws them {answer.how}, as it does without graphics libraries. "
-                    said += way_out(DRAWING)
-                    raise RenderError(said)
-                elif isinstance(answer, str):
+                    raise RenderError(said + way_out(DRAWING))
+                if isinstance(answer, str):
                     raise RenderError(answer)
+                if isinstance(answer, float):
+                    progress(answer)
                 else:
                     yield answer
-    except RenderError:
-        raise
-    except ComputationError as error:  # no process can begin, or it is of another version
+    except ComputationError as error:  # also where no process can begin, or it is of another version
         raise RenderError(str(error)) from None
 
 

@@ -69,8 +69,7 @@ def flight_animation(frames: Frames) -> Iterator[float | bytes]:
     plotter, file = new_plotter((800, 640)), io.BytesIO()
     magnets = _add_rotor(plotter, frames.scene)
     add_plate(plotter, frames.scene)
-    floater = _add_frame(plotter, frames, 0)
-    _look(plotter, frames.scene)
+    floater: list[pv.Actor] = []
     gif: Any = imageio.get_writer(file, format="GIF", mode="I", loop=0, duration=1000 / PER_SECOND)
     with gif:
         for number, instant in enumerate(frames.time):
@@ -80,7 +79,10 @@ def flight_animation(frames: Frames) -> Iterator[float | bytes]:
                 actor.user_matrix = pose
             for actor in floater:
                 plotter.remove_actor(actor, render=False)
-            floater = _add_frame(plotter, frames, number)
+            axes = None if frames.axes is None else frames.axes[number]
+            floater = add_floater(plotter, frames.scene, frames.position[number], frames.moment[number], axes)
+            if not number:
+                _look(plotter, frames.scene)
             plotter.add_text(f"t = {instant:.4f} s", color="black", font_size=10, name="time")
             gif.append_data(plotter.screenshot(return_img=True))
             yield (number + 1) / len(frames.time)
@@ -111,10 +113,10 @@ def turnable_scene(view: View) -> bytes:
         entry["hash"]: {**entry, "content": context.get_cached_data_array(entry["hash"], False)}
         for entry in serializers.extract_array_hash(state)
     }
+    plotter.close()
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("index.json", json.dumps({"scene": state, "hashes": arrays}))
-    plotter.close()
     return file.getvalue()
 
 
@@ -125,11 +127,6 @@ def new_plotter(size: tuple[int, int] = (1400, 1100)) -> pv.Plotter:
     return plotter
 
 
-def _add_frame(plotter: pv.Plotter, frames: Frames, k: int) -> list[pv.Actor]:
-    axes = None if frames.axes is None else frames.axes[k]
-    return add_floater(plotter, frames.scene, frames.position[k], frames.moment[k], axes)
-
-
 def add_floater(
     plotter: pv.Plotter, scene: Scene, position: Array, moment: Array, axes: Array | None = None
 ) -> list[pv.Actor]:
@@ -138,14 +135,10 @@ def add_floater(
     On a `plotter`, lengths in mm. The columns of `axes` (3, 3) are the body's; None: those that the moment gives.
     Returns the actors.
     """
-    floater = scene.floater
-    direction = moment / (np.linalg.norm(moment) or 1.0)
-    drawn = [
-        actor
-        for part in floater.placed(position, direction if axes is None else axes)
-        for actor in _add_body(plotter, part, METAL, opacity=0.45, specular=0.6)
-    ]
-    return [*drawn, *_add_arrow(plotter, 1e3 * position, moment, 1e3 * floater.radius)]
+    drawn, direction = [], moment / (np.linalg.norm(moment) or 1.0)
+    for part in scene.floater.placed(position, direction if axes is None else axes):
+        drawn += _add_body(plotter, part, METAL, opacity=0.45, specular=0.6)
+    return [*drawn, *_add_arrow(plotter, 1e3 * position, moment, 1e3 * scene.floater.radius)]
 
 
 def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = None) -> None:
@@ -232,11 +225,9 @@ def _add_field(plotter: pv.Plotter, view: View) -> None:
 
 
 def _polylines(lines: Any) -> pv.PolyData:
-    numbers, count = [], 0
-    for line in lines:
-        numbers += [len(line), *range(count, count + len(line))]
-        count += len(line)
-    return pv.PolyData(1e3 * np.concatenate(lines), lines=numbers)
+    ends = np.cumsum([len(line) for line in lines])
+    numbers = [np.r_[len(line), end - len(line) : end] for line, end in zip(lines, ends, strict=True)]
+    return pv.PolyData(1e3 * np.concatenate(lines), lines=np.concatenate(numbers))
 
 
 def _rotor_corners(scene: Scene) -> Array:

@@ -183,24 +183,24 @@ def field_lines(scene: Scene, field: Callable[[Array], Array], low: Array, high:
         return []
     start = middle + radius * outwards[np.searchsorted(flux, (np.arange(LINES) + 0.5) / LINES * flux[-1])]
     found: list[list[Array]] = [[place] for place in start]
-    for sign in (-1.0, 1.0):
 
-        def slope(places: Array, sign: float = sign) -> Array:
-            b = field(places)
-            return np.asarray(sign * b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-30))
+    def slope(places: Array) -> Array:
+        b = field(places)
+        return np.asarray(b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-30))
 
+    for step in (-STEP, STEP):
         active, places = np.arange(len(start)), start
         for _ in range(STEPS):
             one = slope(places)
-            two = slope(places + STEP / 2 * one)
-            three = slope(places + STEP / 2 * two)
-            places = places + STEP / 6 * (one + 2 * two + 2 * three + slope(places + STEP * three))
+            two = slope(places + step / 2 * one)
+            three = slope(places + step / 2 * two)
+            places = places + step / 6 * (one + 2 * two + 2 * three + slope(places + step * three))
             free = ((places > low) & (places < high)).all(axis=1)
             for magnet in scene.rotor:
                 free &= magnet.body.distance(places) > 0.2 * STEP
             active, places = active[free], places[free]
             for k, place in zip(active, places, strict=True):
-                found[k].insert(0 if sign < 0 else len(found[k]), place)
+                found[k].insert(0 if step < 0 else len(found[k]), place)
             if not len(active):
                 break
     return [np.array(line) for line in found if len(line) > 2]
