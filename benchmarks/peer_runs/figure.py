@@ -4,7 +4,7 @@ from pathlib import Path
 
 from growth import useful
 
-from spinlev.studies.figures.style import legend_below, panels, plain_log, save_figure, styled, titled
+from spinlev.studies.figures.style import figure_bytes, legend_below, panels, plain_log, styled, titled
 
 PICTURES = Path("docs/pictures")
 MARKERS = "osD^vP*X"
@@ -16,7 +16,7 @@ DECADE = 10.0
 def draw(work, curves):
     """Save the figure of a work as docs/pictures/peers-NAME.png."""
     figure = _figure(work, curves)
-    save_figure(figure, PICTURES / f"peers-{work.name}.png")
+    (PICTURES / f"peers-{work.name}.png").write_bytes(figure_bytes(figure, "png"))
 
 
 @styled

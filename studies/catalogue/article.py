@@ -97,17 +97,16 @@ def rotor_scene(
     frequency: float = 100.0,
     *,
     drag: bool = True,
-    edge: float = EDGE,
     remanence: float = REMANENCE,
     permeability: float = PERMEABILITY,
     floater: Floater = FLOATER,
 ) -> Scene:
     """A rotor of the article above its floater, without a plate, with Stokes' `drag` or in vacuum.
 
-    Displacement `value` in mm or tilt in degrees, `frequency` in Hz, the cubes' `edge` in m, `remanence` in T.
+    Displacement `value` in mm or tilt in degrees, `frequency` in Hz, the cubes' `remanence` in T.
     """
     kind = CONFIGURATIONS[configuration]
-    magnets = kind.make(kind.scale * value, edge, remanence, permeability)
+    magnets = kind.make(kind.scale * value, EDGE, remanence, permeability)
     return Scene(frequency, magnets, floater, Drag.stokes(floater.radius) if drag else Drag(0.0, 0.0))
 
 

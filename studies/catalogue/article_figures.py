@@ -48,19 +48,15 @@ def field_components(point: Point) -> xr.Dataset:
     return recorded(point, FIELD_COLUMNS, (across, along, error), {"distance": there})
 
 
-def _of(part: xr.Dataset, model: str) -> xr.Dataset:
-    return cases_with(part, model=model).sortby("value")
-
-
 def deviations(part: xr.Dataset) -> dict[str, Any]:
-    """|B - B_fem| / |B_fem| (case, distance) of each simpler model, and last the finite elements' own error."""
-    true = _of(part, "fem")
+    """|B - B_fem| / |B_fem| (case, distance) of each simpler model, and the finite elements' own error."""
+    true = cases_with(part, model="fem")
     size = np.hypot(true["off_axis"], true["on_axis"])
-    found: dict[str, Any] = {}
+    found: dict[str, Any] = {"fem": true["field_error"] / size}
     for model in FIELD_MODELS[:-1]:
-        off_axis, on_axis = (_of(part, model)[name] - true[name] for name in COMPONENTS)
+        off_axis, on_axis = (cases_with(part, model=model)[name] - true[name] for name in COMPONENTS)
         found[model] = np.hypot(off_axis, on_axis) / size
-    return {**found, "fem": true["field_error"] / size}
+    return found
 
 
 COMPONENTS = {"off_axis": r"off-axis field $B_\perp$ (mT)", "on_axis": r"on-axis field $B_z$ (mT)"}
@@ -77,7 +73,7 @@ def components_figure(result: xr.Dataset) -> Figure:
         row[0].set_ylabel(label)
         for panel, (configuration, part) in zip(row, configurations.items(), strict=True):
             for model, style in styles.items():
-                found = _of(part, model)
+                found = cases_with(part, model=model)
                 for k, color in zip(range(found.sizes["distance"]), PALETTE, strict=False):
                     panel.plot(found["value"], 1e3 * found[quantity][:, k], style, color=color, ms=4)
             plain_log(panel.yaxis)
@@ -93,7 +89,7 @@ def differences_figure(result: xr.Dataset) -> Figure:
     figure, rows = showing.configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
     worst = 0.0
     for axes, configuration, part in rows:
-        value, off = _of(part, "fem")["value"], deviations(part)
+        value, off = cases_with(part, model="fem")["value"], deviations(part)
         for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
             for model in ("dipole", "cuboid"):
                 axes.plot(value, 100 * off[model][:, k], DASHES[model], color=color)
@@ -112,7 +108,7 @@ def _explain(axes: Axes, result: xr.Dataset, models: dict[str, str]) -> None:
 def _components_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for configuration, part in showing.by_configuration(result):
-        true, off = _of(part, "fem"), deviations(part)
+        true, off = cases_with(part, model="fem"), deviations(part)
         for k, distance in enumerate(1e3 * result["distance"].values):
             ends = [" to ".join(f"{1e3 * true[q].values[n, k]:.3f}" for n in (0, -1)) for q in ("off_axis", "on_axis")]
             worst = [f"{100 * float(off[name][:, k].max()):.2g}" for name in ("dipole", "cuboid", "article", "fem")]

@@ -265,32 +265,25 @@ def trajectories(point: Point) -> xr.Dataset:
     }
     for k, start in enumerate(branch.side("near", FREQUENCIES)):
         if start is not None:
-            for name, value in _flight_row(scene, levitation, start, point["duration_s"]).items():
-                found[name][k] = value
+            row = _flight_row(scene, levitation, start, point["duration_s"])
+            for values, value in zip(found.values(), row, strict=True):
+                values[k] = value
     frequency = variable(("frequency",), FREQUENCIES, "Hz", "frequency of the rotor")
     return recorded(point, FLIGHT_COLUMNS, found, {"frequency": frequency})
 
 
-def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, seconds: float) -> dict[str, Any]:
+def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, seconds: float) -> tuple[Any, ...]:
+    """One frequency's values of `FLIGHT_COLUMNS`."""
     there, field = replace(scene, frequency=start.parameter), levitation.interaction
     slow = drift(there, field, 0.0, article.FLIGHT, levitation.rates, Scales.of(there).unpack(start.state), stokes=True)
     times = np.linspace(0.0, slow.time[-1], SAMPLES)
     flight = simulate(kicked(there, start, KICK), field, seconds, [])
     lost_at_once = flight.ended_by != "duration" and flight.levitated_s < SHORTEST
     edges, distance = np.linspace(0.0, flight.time[-1], PARTS + 1), -flight.lab.position[:, 2]
-    kinds = {"lowest": "min", "mean": "mean", "highest": "max"}
-    return {
-        "time": (edges[1:] + edges[:-1]) / 2,
-        **{name: binned_statistic(flight.time, distance, kind, edges).statistic for name, kind in kinds.items()},
-        "kind": SHORT if lost_at_once else flight_kind(flight),
-        "averaged_end": slow.ended_by,
-        "levitated": flight.levitated_s,
-        "averaged_levitated": slow.levitated_s,
-        "growth": start.growth_per_s,
-        "energy_error": flight.energy_error,
-        "averaged_time": times,
-        "averaged_distance": np.interp(times, slow.time, slow.distance),
-    }
+    parts = [binned_statistic(flight.time, distance, kind, edges).statistic for kind in ("min", "mean", "max")]
+    numbers = flight.levitated_s, slow.levitated_s, start.growth_per_s, flight.energy_error
+    averaged, kind = np.interp(times, slow.time, slow.distance), SHORT if lost_at_once else flight_kind(flight)
+    return *numbers, (edges[1:] + edges[:-1]) / 2, *parts, times, averaged, kind, slow.ended_by
 
 
 @each(small_multiples, 3.6, 3, "time (s)", "levitation distance (mm)", of=showing.rotor_cases, sharey=True)

@@ -237,8 +237,7 @@ def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     rotors = variable((), np.array(len(parts) - len(variants)), "1", "rotors of the designs")
     if not variants:
         return xr.Dataset({"design_rotors": rotors})
-    pairs = [pair for part in variants for pair in zip(part["fact"].values, part["says"].values[0], strict=True)]
-    says = dict(pairs)
+    says = {k: v for part in variants for k, v in zip(part["fact"].values, part["says"].values[0], strict=True)}
     joined = xr.concat([part.drop_vars("says") for part in variants], "variant", data_vars="all", join="outer")
     return joined.assign(
         design_rotors=rotors,

@@ -146,8 +146,9 @@ def levitation_times(point: Point) -> xr.Dataset:
                 state, here = last.state, grid[k]
             there = replace(scene, frequency=grid[k])
             release, how = Scales.of(there).unpack(state), (variant.stokes, variant.e_folds)
-            for name, value in _row(drift(there, levitation.table, variant.spin, CAP, rates, release, *how)).items():
-                found[name][k] = value
+            row = _row(drift(there, levitation.table, variant.spin, CAP, rates, release, *how))
+            for values, value in zip(found.values(), row, strict=True):
+                values[k] = value
     frequency = variable(("case", "step"), grid[None], "Hz", "frequency of the rotor")
     coordinates = {"case": [point["case"]], "variant": [point["variant"]], "frequency": frequency}
     attributes = {"model": model, "cap_s": CAP, "shortest_s": SHORTEST}
@@ -155,21 +156,14 @@ def levitation_times(point: Point) -> xr.Dataset:
     return xr.Dataset(data, coordinates, attributes)
 
 
-def _row(flight: Drift) -> dict[str, Any]:
+def _row(flight: Drift) -> tuple[Any, ...]:
+    """One frequency's values of `COLUMNS`."""
     kept, times = flight.ended_by in ("duration", "balance"), np.linspace(0.0, flight.time[-1], SAMPLES)
-    return {
-        "levitation_time": CAP if kept else min(flight.levitated_s, CAP),
-        "outcome": LEVITATES if kept else OUTCOMES.index(flight.ended_by),
-        "distance_start": flight.distance[0],
-        "distance_end": flight.distance[-1],
-        "spin_end": flight.spin[-1],
-        "fall_rate": flight.fall_rate(0.0, 0.9),
-        "fall_ratio": flight.fall_rate(0.6, 0.9) / flight.fall_rate(0.0, 0.3),
-        "balance_spin": flight.balance_spin,
-        "growth": flight.growth_per_s.max(),
-        "flight_time": times,
-        "flight_distance": np.interp(times, flight.time, flight.distance),
-    }
+    lasted = (CAP, LEVITATES) if kept else (min(flight.levitated_s, CAP), OUTCOMES.index(flight.ended_by))
+    ends = flight.distance[0], flight.distance[-1], flight.spin[-1]
+    falls = flight.fall_rate(0.0, 0.9), flight.fall_rate(0.6, 0.9) / flight.fall_rate(0.0, 0.3)
+    path = times, np.interp(times, flight.time, flight.distance)
+    return *lasted, *ends, *falls, flight.balance_spin, flight.growth_per_s.max(), *path
 
 
 def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:

@@ -83,13 +83,10 @@ def _ramps_lines(result: xr.Dataset) -> list[str]:
 
 def ramps_numbers(result: xr.Dataset) -> dict[str, Any]:
     """Each rotor's frequencies as numbers: `ramps`."""
-    found = []
-    for one in each_case(result):
-        steady = {"lowest_stable_hz": float(one["lowest"]), "highest_stable_hz": float(one["highest"])}
-        ended = [(w, r, float(one["lost_at"].sel(way=w, rate=r))) for w in WAYS for r in one["rate"].values.tolist()]
-        lost = [{"way": w, "rate_hz_per_s": r, "lost_at_hz": None if at != at else at} for w, r, at in ended]
-        rotor = {"configuration": one["configuration"].item(), "value": float(one["measure"])}
-        found.append({**rotor, **steady, "lost": lost})
+    rotor = {"configuration": "configuration", "value": "measure"}
+    found = showing.records(result, rotor | {"lowest_stable_hz": "lowest", "highest_stable_hz": "highest"})
+    for row, one in zip(found, each_case(result[["lost_at"]].stack(ramp=("way", "rate"))), strict=True):
+        row["lost"] = showing.records(one, {"way": "way", "rate_hz_per_s": "rate", "lost_at_hz": "lost_at"})
     return {"ramps": found}
 
 

@@ -158,10 +158,9 @@ def _summary(path: Path) -> dict[str, Any]:
     summary = path.parent / "summary.json"
     if not summary.exists():
         return {}
+    content = file_content(summary, MOST, "summary", "a JSON file")
     try:
-        return dict(json.loads(file_content(summary, MOST, "summary", "a JSON file")))
-    except InputError:
-        raise
+        return dict(json.loads(content))
     except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"Input {summary} must be a JSON object; instead: {error}.") from None
 

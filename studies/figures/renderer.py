@@ -86,7 +86,8 @@ def drawn(pictures: Sequence[Picture], progress: Progress = lambda fraction: Non
                     from ..cli.console import DRAWING, way_out
 
                     said = f"the process that draws them {answer.how}, as it does without graphics libraries. "
-                    raise RenderError(said + way_out(DRAWING))
+                    said += way_out(DRAWING)
+                    raise RenderError(said)
                 if isinstance(answer, str):
                     raise RenderError(answer)
                 if isinstance(answer, float):

@@ -196,11 +196,12 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
     frame = min(seen, key=lambda frame: np.ptp(result[seen[frame]].values[near], axis=0).max())
     here, x, y = time[near], *(1e3 * result[seen[frame]].values[near].T[:2])
     step = float(np.diff(seconds[near]).max(initial=0.0))
-    style = "." if step > COARSE else "-"
-    if step > COARSE:
-        look.set_title(f"(b) a sample every {step:.2g} s")
     close: tuple[Array, ...] = (here, distance[near], x, y)
-    close = close if step > COARSE else _smooth(here, *close)
+    if step > COARSE:
+        style = "."
+        look.set_title(f"(b) a sample every {step:.2g} s")
+    else:
+        close, style = _smooth(here, *close), "-"
     look.plot(close[0], close[1], style, lw=0.8, ms=3)
     above.plot(close[2], close[3], style, lw=0.8, ms=3)
     above.plot(x[0], y[0], "o", color=PALETTE[2], ms=4, label="start of (d)")
@@ -288,8 +289,7 @@ def question_figure(result: xr.Dataset) -> Figure:
 
     Of equilibria the branch on which the floater levitates; solid and filled where it is stable or marginal.
     """
-    shown, (along, others) = _derived(result), _axes(result)
-    names = _shown(shown)
+    (shown, names), (along, others) = _derived(result), _axes(result)
     figure, ((*axes,),) = panels(1, len(names), 3.1, 2)
     members = list(product(*(shown[key].values.tolist() for key in others)))
     for panel, name in zip(axes, names, strict=True):
@@ -321,12 +321,8 @@ def _axes(result: xr.Dataset) -> tuple[str, list[str]]:
     return along, [key for key in varied if key != along]
 
 
-def _shown(result: xr.Dataset) -> list[str]:
-    return [name for name in QUANTITIES[str(result.attrs["ask"])] if name in result]
-
-
-def _derived(result: xr.Dataset) -> xr.Dataset:
-    """The result with what is drawn instead of what is kept."""
+def _derived(result: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
+    """The result with what is drawn instead of what is kept, and the names of that."""
     if "position" in result:
         depth = (-1e3 * result["position"].sel(axis="z")).assign_attrs(units="mm", long_name="levitation distance")
         result = result.assign(depth=depth)
@@ -341,7 +337,7 @@ def _derived(result: xr.Dataset) -> xr.Dataset:
         x, y, z = (1e3 * result["B"].sel(axis=axis, drop=True) for axis in "xyz")
         parts = {"across": (x**2 + y**2) ** 0.5, "along": abs(z)}
         result = result.assign({k: v.assign_attrs(units="mT", long_name=f"|B| {k} the axis") for k, v in parts.items()})
-    return result
+    return result, [name for name in QUANTITIES[str(result.attrs["ask"])] if name in result]
 
 
 def _curve(axes: Axes, result: xr.Dataset, name: str, key: str, color: str, label: str) -> None:
@@ -406,14 +402,14 @@ def question_lines(result: xr.Dataset) -> list[str]:
     varied, ask = np.atleast_1d(result.attrs["varied"]), str(result.attrs["ask"])
     grid = " × ".join(f"{key} ({result.sizes[key]} values)" for key in varied)
     lines = [f"{ANSWERED[ask]} over {grid}."]
-    shown = _derived(result)
+    shown, names = _derived(result)
     if "stable" in shown:
         some = (shown["stable"] == 1).any("equilibrium")
         lines.append(f"Stable levitation ({CRITERION}) at {int(some.sum())} of {some.size} points.")
         shown = shown.where(shown["stable"] == 1)
     if "unknown" in result and (result["unknown"] > 0).any():
         lines.append(f"At {int((result['unknown'] > 0).sum())} points not all equilibria could be computed.")
-    for name in _shown(shown):
+    for name in names:
         values = shown[name].values[np.isfinite(shown[name].values)]
         if len(values):
             what = f"{shown[name].attrs['long_name']}{' where stable' if 'stable' in shown else ''}"
@@ -456,7 +452,7 @@ def drive_figure(result: xr.Dataset) -> Figure:
     mean, low, high = np.array([(frequency[p].mean(), distance[p].min(), distance[p].max()) for p in parts]).T
     ways = np.sign(np.round([frequency[p[-1]] - frequency[p[0]] for p in parts], 9)).astype(int)
     steady, equilibria = result["quasi_static_frequency"].values, 1e3 * result["quasi_static_distance"].values
-    stable = result["quasi_static_growth"].values <= 0.004
+    stable = result["quasi_static_growth"].values <= MARGINAL
     plot_branch(along, steady, equilibria, stable, color="k", label="equilibrium")
     along.plot([], [], "k--", label="unstable equilibrium")
     for stretch in np.split(np.arange(len(parts)), np.flatnonzero(np.diff(ways)) + 1):
@@ -470,9 +466,8 @@ def drive_figure(result: xr.Dataset) -> Figure:
     there = (steady >= frequency.min()) & (steady <= frequency.max())
     known = np.array([*equilibria[there], np.quantile(low, 1 - MOST), np.quantile(high, MOST)])
     room = MARGIN * max(float(np.ptp(known)), 1.0)
-    if str(result.attrs["ended_by"]) in ("contact", "lost"):
-        label = f"{result.attrs['ended_by']}, {frequency[-1]:.4g} Hz"
-        along.axvline(frequency[-1], color=PALETTE[3], ls=":", label=label)
+    if (end := str(result.attrs["ended_by"])) in ("contact", "lost"):
+        along.axvline(frequency[-1], color=PALETTE[3], ls=":", label=f"{end}, {frequency[-1]:.4g} Hz")
     span = max(float(np.ptp(frequency)), 1.0)
     along.set(xlabel="frequency of the rotor (Hz)", ylabel=DISTANCE, ylim=(known.min() - room, known.max() + room))
     along.set_xlim(frequency.min() - 0.1 * span, frequency.max() + 0.1 * span)

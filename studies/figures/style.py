@@ -130,8 +130,7 @@ def panels(
     """
     from matplotlib.figure import Figure
 
-    width, count, turned = "page" if stays else _width.get(), rows * columns, False
-    beside = beside or columns
+    width, count, turned, beside = "page" if stays else _width.get(), rows * columns, False, beside or columns
     if width == "column":
         turned, beside = columns > rows > 1, min(beside, 2 if count > 4 else 1)
         height = min(height, max(LOWER * height, LOWEST))
@@ -190,14 +189,10 @@ def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
     files = []
     for name, figure in figures.items():
         for kind in ("png", "pdf"):
-            save_figure(figure, out / f"{name}.{kind}")
-            figure.set_layout_engine("none")  # the places found for the first format are those of the second
             files.append(str(out / f"{name}.{kind}"))
+            write_whole(out / f"{name}.{kind}", figure_bytes(figure, kind))
+            figure.set_layout_engine("none")  # the places found for the first format are those of the second
     return files
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    write_whole(path, figure_bytes(figure, path.suffix[1:]))
 
 
 def figure_bytes(figure: Figure, kind: str) -> bytes:

@@ -17,10 +17,11 @@ from spinlev.dynamics.motion.rotor_effects import Mutual
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.scene.files import changed
 from spinlev.studies.catalogue import regions
 from spinlev.studies.catalogue.article import rotor_scene
 from spinlev.studies.catalogue.finite_magnets import dipole_vs_fem
-from spinlev.studies.catalogue.margins import design, sensitivity
+from spinlev.studies.catalogue.margins import design, scene_of, sensitivity
 from spinlev.studies.catalogue.regions import stability_map
 
 
@@ -99,7 +100,7 @@ def test_a_design_is_stable_up_to_its_margin():
     measure, edge = float(found["measure"]), float(found["edge"])
 
     def stable(frequency):
-        scene = rotor_scene("tilt", measure, frequency, drag=False, edge=edge, permeability=1.0)
+        scene = changed(scene_of("tilt", measure, frequency), {"rotor.edge_mm": 1e3 * edge})
         return [e for e in find_equilibria(scene, rotor_table(scene.rotor, "cuboid")) if e.stable]
 
     assert stable(120.0)[0].distance == pytest.approx(25e-3, abs=1e-6)

@@ -18,7 +18,7 @@ from spinlev.studies.catalogue.article_figures import (
 )
 from spinlev.studies.catalogue.article_flights import NONE, levitation_distance, trajectories
 from spinlev.studies.catalogue.entries import CATALOGUE
-from spinlev.studies.figures.style import save_figure
+from spinlev.studies.figures.style import figure_bytes
 from spinlev.studies.study import by_case
 
 ROTORS = [("horizontal", 2.0), ("vertical", 14.0), ("tilt", 10.0)]
@@ -181,7 +181,7 @@ def test_figures_and_reports_come_from_the_result_alone(distances, forces, tmp_p
     )
     for name, result in {"levitation-distance": distances, "force-curve": forces, "field-components": field}.items():
         for figure, draw in CATALOGUE[name].figures.items():
-            save_figure(draw(result), tmp_path / f"{figure}.png")
+            (tmp_path / f"{figure}.png").write_bytes(figure_bytes(draw(result), "png"))
         lines = CATALOGUE[name].report(result)
         assert lines
         assert not any("unknown" in line for line in lines)
