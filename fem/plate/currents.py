@@ -14,7 +14,7 @@ solving again.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache, cached_property, lru_cache, partial
 from typing import Any
 
 import ngsolve
@@ -76,6 +76,14 @@ class CurrentSpace:
             for rows, image, states in zip(found, part, weighted, strict=True):
                 rows.append(image.reshape(len(image), -1) @ states.T)
         return [np.concatenate(rows) for rows in found]
+
+    def dipole_couplings(self, places: Array) -> list[Array]:
+        """`couplings` of three unit dipoles at each of `places` (n, 3) m; all rotors ask for those of the same."""
+        return self._of_dipoles(np.ascontiguousarray(places, float).tobytes())
+
+    @cached_property
+    def _of_dipoles(self) -> Callable[[bytes], list[Array]]:
+        return lru_cache(DIPOLES_KEPT)(lambda raw: self.couplings(unit_dipoles(np.frombuffer(raw).reshape(-1, 3))))
 
 
 def space_couplings(
@@ -320,7 +328,9 @@ def train(
     return made, worst_error(omegas, residuals, couplings, len(probes)), omegas, dipoles
 
 
-SPACE_SHARE = 0.1  # Share of the tolerance for what the current space misses of the finite elements' currents
+# Share of the tolerance for what the current space misses of the finite elements' currents. With 0.1 the dipoles do not
+# stand for a rotor over a plate that is lowered, and all is solved again.
+SPACE_SHARE = 0.06
 # Tolerances below the first have a finer mesh, from the second on a coarser one with less air: its truncation takes a
 # part of them.
 STRICT, LOOSE = 5e-4, 2e-3
@@ -331,6 +341,7 @@ INDEPENDENT = 1e-9  # Combinations of dipoles with less than this share of the l
 STEPS = 5.0  # The raster of boxes is the largest power of two, in metres, of which so many fit between box and plate
 FREQUENCY_STEP = 125.0  # Highest frequencies are multiples of this, Hz
 ROUND_OFF = 1e-6
+DIPOLES_KEPT = 8  # sets of places whose couplings are remembered, some MB each
 
 
 @dataclass(frozen=True, eq=False)
@@ -423,7 +434,7 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     images = np.concatenate(list(source_images(space.parity, space.points, sources)), axis=1)
     amplitudes, rest = _fitted(space, solution.probes[standing], images)
     stands, tested = np.repeat(standing, 3), np.repeat(inside, 3)
-    driving, testing = space.couplings(sources), space.couplings(unit_dipoles(solution.probes[inside]))
+    driving, testing = space.couplings(sources), space.dipole_couplings(solution.probes[inside])
     worst = 0.0
     for omega, residuals in zip(solution.angular_frequencies, solution.residuals, strict=True):
         left = np.sqrt(np.sum(amplitudes @ residuals[np.ix_(stands, stands)].real * amplitudes, axis=1)) + rest
@@ -451,7 +462,15 @@ def _fitted(space: CurrentSpace, places: Array, images: Array) -> tuple[Array, A
 CURRENTS = TableKind("plate-currents", PlateSolution, "Currents of a plate by finite elements")
 
 
+_latest: dict[str, PlateSolution] = {}  # the last one by its key: neighbours in a sweep need the same
+
+
 def cached_currents(plate: Plate, *given: Any, report: Report, watch: Watch = unwatched) -> PlateSolution:
     """`solve_currents` of a `plate` and all `given` up to the others, cached; for `report` and `watch`."""
     inputs, solve = (plate.body.shape_numbers, plate.metal, *given), partial(solve_currents, watch=watch)
-    return CURRENTS.cached(inputs, partial(solve, plate, *given), report)[0]
+    key = CURRENTS.key(*inputs)
+    if key not in _latest:
+        solution = CURRENTS.cached(inputs, partial(solve, plate, *given), report)[0]
+        _latest.clear()
+        _latest[key] = solution
+    return _latest[key]

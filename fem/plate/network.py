@@ -12,7 +12,7 @@ M. Clemens, T. Weiland, IEEE Trans. Magn. 35 (1999) 1163 (discrete eddy-current 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from itertools import product
@@ -24,7 +24,6 @@ from ...geometry.common import Array, Watch
 from ...geometry.scene.contents import Plate
 from ...geometry.solids import Solids
 from ..closed_forms.eddy_bodies import ComplexArray
-from ..closed_forms.potentials import unit_dipoles
 from .currents import STRICT, OtherSources, PlateSolution, grid_counts, probe_places, space_couplings, unit_power
 from .eddy import Source
 from .multipoles import Multipoles, fit_multipoles, real_kinds
@@ -199,7 +198,7 @@ def from_elements(
     probes = probe_places(region, plate.body.mirrors)
     grid = region.grid(grid_counts(region, plate.body), plate.body.mirrors)
     driving, testing = (
-        space.couplings([*unit_dipoles(places), *more])
+        [np.concatenate(both) for both in zip(space.dipole_couplings(places), space.couplings(more), strict=True)]
         for places, more in ((grid, others.training), (probes, others.probes))
     )
     scale = unit_power(np.sum([np.sum(part**2, axis=1) for part in driving], axis=0), len(others.training))
@@ -228,33 +227,33 @@ def from_elements(
         if state_error > allowed:
             refuse(rtol, ENOUGH * max(state_error + functions_error + known, rtol), CONDUCTOR)
         rates, fields = zip(*[part.diagonalised() for part in chosen], strict=True)
-        rows = list(space.fields)
-        for group, states in zip(groups, fields, strict=True):
-            ends = np.cumsum([len(space.inductances[number]) for number in group])
-            for number, part in zip(group, np.split(states, ends[:-1], axis=1), strict=True):
-                rows[number] = part @ space.fields[number]
-        held = replace(space, fields=tuple(rows))  # for couplings only: these inductances are 1
 
-        def couplings(sources: Sequence[Source]) -> Array:
-            parts = held.couplings(sources)
-            return np.concatenate([np.sum([parts[number] for number in group], axis=0) for group in groups], axis=1)
+        def of_states(parts: Sequence[Array]) -> Array:
+            shares = zip(joined(parts), fields, strict=True)
+            return np.concatenate([part @ states.T for part, states in shares], axis=1)
 
+        functions = partial(_functions, lambda places: of_states(space.dipole_couplings(places)))
         return PassiveNetwork(
-            plate, region, frequencies, np.concatenate(rates), couplings,
-            _functions, solution.mesh_error, state_error + space_error,
+            plate, region, frequencies, np.concatenate(rates), lambda sources: of_states(space.couplings(sources)),
+            functions, solution.mesh_error, state_error + space_error,
             {"ngsolve": version("ngsolve"), "order": float(space.order), "cells": float(space.cells)}, solution.seconds,
         )  # fmt: skip
 
     return reduced
 
 
-def _functions(network: PassiveNetwork, rtol: float, watch: Watch) -> tuple[Multipoles, Array, float]:
-    """`PassiveNetwork.field_functions` from the fields on the region's surface, which determine those within."""
+def _functions(
+    signals: Callable[[Array], Array], network: PassiveNetwork, rtol: float, watch: Watch
+) -> tuple[Multipoles, Array, float]:
+    """`PassiveNetwork.field_functions` from the fields on the region's surface, which determine those within.
+
+    `signals` are those of three unit dipoles at each of some places.
+    """
     region, rates = network.region, network.rates
     extent = region.upper - region.lower
     x, y, z = np.clip(np.ceil(13 * np.sqrt(extent / extent.max())), 6, 13).astype(int)  # more along the longer edges
     points = region.surface((int(x), int(y), int(z)))
-    values = network.couplings(unit_dipoles(points)).T.reshape(len(rates), -1, 3)
+    values = signals(points).T.reshape(len(rates), -1, 3)
     low, high = (2 * np.pi * f for f in network.frequencies)
     middle = np.sqrt(low * high)
     state_scale = 1 / np.sqrt(rates + middle)

@@ -23,7 +23,7 @@ from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box, rotation_matrix
 from ..closed_forms.moments import uniform_cells
 from ..closed_forms.potentials import PolarizedCuboid
-from ..harmonics.expansion import MultipoleExpansion
+from ..harmonics.expansion import MultipoleExpansion, uniform_moments
 from ..harmonics.solid import Coefficients, derivative, field_spectrum, outer_sums
 from ..rotor.models import AccuracyError
 from ..rotor.table import RotorTable
@@ -33,6 +33,8 @@ from .network import PassiveNetwork
 from .table import PlateTable, Region, RotorShare, turn_harmonics
 
 DOWN = np.array([0.0, 0.0, -1.0])
+# Farther than so many circumradii a cuboid's moments up to this degree do for `LEFT_OUT`, in half of its time
+FAR, FAR_DEGREE = 2.5, 16
 CLOSEST = 0.1  # Clearance of the plate, in radii of a round magnet, for which its moments are made at least
 LEFT_OUT = 1e-7  # Share of the rotor's field at the plate that is left out where no tolerance says another
 SHARE_PART = 0.1  # Share of a table's tolerance for the series of the rotor's signals
@@ -86,15 +88,17 @@ def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> 
     `left_out`: degrees whose field at the plate is below this share of the rotor's are dropped. Raises InputError: the
     plate comes so near that an expansion does not converge in it.
     """
-    boxes = [magnet for magnet in table.uniform if isinstance(magnet.body, Box)]
-    parts: list[Source] = list(map(PolarizedCuboid.of_magnet, boxes))
-    round_ones = [magnet for magnet in table.uniform if not isinstance(magnet.body, Box)]
-    moments = []
-    for magnet in round_ones:
-        radius = magnet.body.circumradius
-        clearance = max(_nearest(magnet.body.center, plate) - radius, CLOSEST * radius)  # that the plate keeps
-        moments += uniform_cells(magnet, clearance)
-    for expansion in (*table.expansions, *moments):
+    parts: list[Source] = []
+    moments = list(table.expansions)
+    for magnet in table.uniform:
+        nearest, radius = _nearest(magnet.body.center, plate), magnet.body.circumradius
+        if not isinstance(magnet.body, Box):
+            moments += uniform_cells(magnet, max(nearest - radius, CLOSEST * radius))  # that the plate keeps
+        elif nearest < FAR * radius:
+            parts.append(PolarizedCuboid.of_magnet(magnet))
+        else:
+            moments.append(uniform_moments(magnet, FAR_DEGREE))
+    for expansion in _together(moments):
         nearest = _nearest(expansion.center, plate)
         if nearest <= 1.001 * expansion.nearest:
             raise InputError(
@@ -109,6 +113,19 @@ def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> 
             end = kept[-1] + 1
             parts.append(ExpansionSource(replace(expansion, coefficients=expansion.coefficients[:end, :end])))
     return parts
+
+
+def _together(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
+    """The expansions with those about one centre added up, as of a magnet's remanence and of what it induces."""
+    found: dict[tuple[float, ...], list[MultipoleExpansion]] = {}
+    for one in expansions:
+        found.setdefault((*one.center.tolist(), one.radius), []).append(one)
+    sums = []
+    for some in found.values():
+        degree = max(one.degree for one in some)
+        whole = np.sum([np.pad(one.coefficients, (0, degree - one.degree)) for one in some], axis=0)
+        sums.append(replace(some[0], coefficients=whole))
+    return sums
 
 
 def posed_rotor(parts: Sequence[Source], plate: Plate, angle: float, depth: float) -> RotorSource:
@@ -174,9 +191,9 @@ def rotor_share(
             cached.update(zip(some, network.couplings(sources), strict=True))
         return np.array([cached[place] for place in places])
 
-    angles, depths = 12, 4 if distance else 1
+    angles, depths = 12, 5 if distance else 1
     while True:
-        nodes = np.cos(np.pi * (np.arange(depths) + 0.5) / depths)
+        nodes = np.cos(np.pi * np.arange(depths) / max(depths - 1, 1))
         turns = 2 * np.pi * np.arange(angles) / angles
         samples = signals(distance * (1 + nodes) / 2, turns).reshape(depths, angles, -1)
         fourier = np.linalg.pinv(turn_harmonics(turns, angles - 1))
@@ -195,12 +212,15 @@ def rotor_share(
                 f"received {tolerance:.1e}."
             )
         angles *= 1 + (by_angle > tolerance / 2)  # so that none is computed twice
-        depths += 2 * (by_depth > tolerance / 2)
-    # The highest harmonics go, whose sum no signal misses by more than half of the tolerance.
-    tails = np.append(np.cumsum(np.abs(series).sum(axis=2).max(axis=1)[::-1])[::-1] / size, [0.0, 0.0])
-    kept = max(3, int(np.argmax(tails <= tolerance / 2)) | 1)
-    part = np.where(np.abs(series[:kept]) < NOISE * size, 0.0, series[:kept])
-    return RotorShare(distance, part, by_angle + by_depth + float(tails[kept]))
+        depths += (depths - 1) * (by_depth > tolerance / 2)
+    # The highest harmonics go, and the highest polynomials, whose sums no signal misses by more than half of the
+    # tolerance.
+    sizes = np.abs(series).sum(axis=2).max(axis=1), np.abs(series).sum(axis=0).max(axis=0)
+    turning, going = (np.append(np.cumsum(part[::-1])[::-1] / size, [0.0, 0.0]) for part in sizes)
+    kept = max(3, int(np.argmax(turning <= tolerance / 2)) | 1)
+    powers = max(1, int(np.argmax(going <= tolerance / 2)))
+    part = np.where(np.abs(series) < NOISE * size, 0.0, series)[:kept, :, :powers]
+    return RotorShare(distance, part, by_angle + by_depth + float(turning[kept] + going[powers]))
 
 
 def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:
