@@ -108,9 +108,6 @@ class _Problem:
         ends = [abs(end) for end in self.limits.get(name, ()) if np.isfinite(end)]
         return max([0.1 if name == "margin" else float(np.abs(self.search.near.values(name)).min()), *ends, 1e-2])
 
-    def _count(self, name: str) -> int:
-        return {"margin": 2, "decay_per_s": len(self.search.start.known.modes)}.get(name, 1)
-
     def numbers(self, z: Array) -> Array:
         low, high = self.search.low, self.search.high
         return np.asarray(np.clip(low + z[: len(self.width)] * self.width, low, high))
@@ -156,7 +153,8 @@ class _Problem:
     def excess(self, z: Array, name: str, end: float | None, sign: int, equal: bool) -> Array:
         """By how much a measure is more than its end, or, without one, than the bound that is raised."""
         if (value := self.values(z, name, sign)) is None:
-            return np.full(self._count(name) if sign > 0 else 1, FAILED if equal else -FAILED)
+            count = {"margin": 2, "decay_per_s": len(self.search.start.known.modes)}.get(name, 1) if sign > 0 else 1
+            return np.full(count, FAILED if equal else -FAILED)
         return sign * (value - (z[-1] if end is None else end / self.sizes[name]))
 
     def keep(self, z: Array) -> None:
@@ -346,48 +344,31 @@ def checked_free(free: object, levitation: Levitation | None = None) -> Limits:
 
 
 def designed(levitation: Levitation, goals: Sequence[str], bounds: Limits, limits: Limits, points: int) -> xr.Dataset:
-    """The Dataset of `design`, for goals and limits that were checked."""
+    """The Dataset of `design`, for `goals`, `bounds` of free numbers and `limits` that were checked.
+
+    Of two goals the curve has so many `points`; `levitation` is of the scene given.
+    """
     checked_free(bounds, levitation)
     if (levitation.models.model, levitation.models.plate_model) not in SIMPLE:
         _check_reach(levitation, bounds, limits)
     search = Search(levitation, bounds)
     kinds = [GOALS[goal] for goal in goals]
     found = [optimised(search, kinds[0], limits)] if len(kinds) == 1 else _front(search, kinds, limits, points)
-    return _dataset(search, levitation, goals, bounds, limits, [numbers for _, numbers in found])
-
-
-def _check_reach(levitation: Levitation, bounds: Limits, limits: Limits) -> None:
-    """ComputationError where not even point dipoles, of which a search takes seconds, come near the limits."""
-    quick = Levitation(levitation.scene, Models("dipole", "none", interaction="rigid"), levitation.spin)
-    known = {name: ends for name, ends in limits.items() if name not in LEAST}
-    with suppress(EquilibriumError):
-        problem = _Problem(Search(quick, bounds), NO_GOAL, known | {"decay_per_s": (-MARGINAL / 2, np.inf)})
-        problem.by = " by point dipoles without the plate"
-        try:
-            problem.solved()
-        except ComputationError:
-            if problem.nearest[0] > ROUGH:
-                raise
-
-
-def _dataset(
-    search: Search, first: Levitation, goals: Sequence[str], bounds: Limits, limits: Limits, found: Sequence[Array]
-) -> xr.Dataset:  # fmt: skip
     note("The scene that was found, searched anew ...")
-    begun = replace(first.models, model=search.models.model)
-    given = scene_numbers(first.scene)[1]
-    numbers = [np.array([given[key] for key in search.keys]), *found]
+    begun = replace(levitation.models, model=search.models.model)
+    given = scene_numbers(levitation.scene)[1]
+    numbers = [np.array([given[key] for key in search.keys]), *(numbers for _, numbers in found)]
     rows, curves, texts = [], [], list[str]()
     for k, one in enumerate(numbers):
         scene = changed(search.scene, dict(zip(search.keys, one.tolist(), strict=True)))
-        there = first if k == 0 else Levitation(scene, begun, search.spin)
+        there = levitation if k == 0 else Levitation(scene, begun, search.spin)
         near = search.at(one) if k else None
         if near is not None and (survey := survey_near(there, *(v[None] for v in near.bare.start.vectors[:3:2]))):
             there.adopt(survey)
         known = nearest_of(there.equilibria, near.known.position if near else np.zeros(3))
         rows.append(_measured(there, known, search.keys))
         curves.append(_curve(there, known))
-        texts.append(scene_text(first.scene if k == 0 else scene))
+        texts.append(scene_text(levitation.scene if k == 0 else scene))
     units = [label_of_key(key)["units"] for key in search.keys]
     ends = [limits.get(name, (-np.inf, np.inf)) for name in MEASURES]
     axes = {"key": list(search.keys), "unit": ("key", units), "measure": list(MEASURES), "end": ["least", "most"]}
@@ -409,6 +390,20 @@ def _dataset(
         axes,
         {"study": "designed", "goals": ", ".join(goals), "scene": texts[0], **search.near.levitation.labels},
     )
+
+
+def _check_reach(levitation: Levitation, bounds: Limits, limits: Limits) -> None:
+    """ComputationError where not even point dipoles, of which a search takes seconds, come near the limits."""
+    quick = Levitation(levitation.scene, Models("dipole", "none", interaction="rigid"), levitation.spin)
+    known = {name: ends for name, ends in limits.items() if name not in LEAST}
+    with suppress(EquilibriumError):
+        problem = _Problem(Search(quick, bounds), NO_GOAL, known | {"decay_per_s": (-MARGINAL / 2, np.inf)})
+        problem.by = " by point dipoles without the plate"
+        try:
+            problem.solved()
+        except ComputationError:
+            if problem.nearest[0] > ROUGH:
+                raise
 
 
 def _measured(levitation: Levitation, known: Equilibrium | None, keys: tuple[str, ...]) -> list[float]:

@@ -17,6 +17,7 @@ from ..dynamics.equilibria.equilibrium import EquilibriumError
 from ..dynamics.equilibria.search import free_of_bodies
 from ..dynamics.flights.flight import most_like_levitation
 from ..dynamics.motion.state import State
+from ..fem.closed_forms.coil import coils_field
 from ..fem.closed_forms.uniform import closed_form_error, fields_of_magnets, fields_of_sphere
 from ..fem.rotor.choice import rotor_table
 from ..fem.rotor.near_field import near_field
@@ -27,7 +28,6 @@ from ..geometry.scene.contents import AbsoluteStart, Scene
 from ..geometry.scene.files import scene_text
 from .cli.console import note, to_json
 from .cli.options import Answer, Models
-from .coils import coils_at_start
 from .figures.pictures import plate_currents
 from .figures.run import working_point_figure
 from .figures.style import NAMES, colour_bar, panels, save_figures, styled, titled
@@ -149,6 +149,11 @@ def _floater_state(levitation: Levitation) -> State | None:
         note("There is no equilibrium: the floater is left out.")
         return None
     return known.equilibria[0].start
+
+
+def coils_at_start(scene: Scene, points: Array) -> tuple[Array, Array]:
+    """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m of a scene's coils at points (n, 3) m at t = 0, also in their windings."""
+    return coils_field(scene.coils, np.array([float(coil.amperes(0.0)) for coil in scene.coils]), points)
 
 
 def _lattice(axes: list[Array]) -> tuple[Array, Array]:

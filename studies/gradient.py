@@ -147,20 +147,19 @@ class Gradient:
         """Derivatives over `equilibrium` and `key`; NaN where they do not exist, with the reasons as an attribute."""
         sizes, answers = {"axis": 3, "mode": len(MODES)}, {**ANSWERS, **MORE}
         ends, of = [name for name in of if name in ENDS], [name for name in of if name not in ENDS]
-        shape = {name: (len(equilibria), len(by), *(sizes[d] for d in answers[name][2])) for name in of}
-        columns, errors = ({name: np.full(shape[name], np.nan) for name in of} for _ in range(2))
-        values = {name: np.full((shape[name][0], *shape[name][2:]), np.nan) for name in of if name in MORE}
+        shape = {name: tuple(sizes[d] for d in answers[name][2]) for name in of}
+        found = {name: np.full((2, len(equilibria), len(by), *shape[name]), np.nan) for name in of}  # with their errors
+        values = {name: np.full((len(equilibria), *shape[name]), np.nan) for name in of if name in MORE}
         wanted = [name for name in of if name != "escape_energy"]
         for row, known in enumerate(equilibria):
             tangents = self.ways(known, by)[0] if wanted else {}
             for k, key in enumerate(by):
                 if key in tangents:
-                    found = self.with_errors(known, tangents[key], wanted, key)
-                    for name, value, error in zip(wanted, *found, strict=True):
-                        columns[name][row, k], errors[name][row, k] = value, error
+                    for name, *pair in zip(wanted, *self.with_errors(known, tangents[key], wanted, key), strict=True):
+                        found[name][:, row, k] = pair
             if "escape_energy" in of:
-                here, columns["escape_energy"][row], errors["escape_energy"][row] = self._escape(known, by)
-                values["escape_energy"][row] = here
+                values["escape_energy"][row], *pair = self._escape(known, by)
+                found["escape_energy"][:, row] = pair
             if "plate_damping" in of:
                 values["plate_damping"][row] = answer_of(known, "plate_damping")
         data = {}
@@ -171,7 +170,7 @@ class Gradient:
 
         for name in of:
             unit, label, dims = answers[name]
-            add(name, ("equilibrium", "key", *dims), unit, label, columns[name], errors[name])
+            add(name, ("equilibrium", "key", *dims), unit, label, *found[name])
             if name in MORE:
                 data[f"{name}_value"] = variable(("equilibrium", *dims), values[name], unit, label)
         if ends:

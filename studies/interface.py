@@ -23,16 +23,15 @@ from .catalogue.runner import figures_of, question_study
 from .cli import options
 from .cli.console import missing_extra
 from .cli.options import FieldModel, InteractionModel, Models, PlateModel, Quantity, Requested, Workers, documented
-from .coils import coils_summary, modes_of
 from .compare import compared, compared_dataset, field_rtol
 from .fields import PLANES, field_map as plane_map, working_point_dataset
 from .figures.run import scene_figure
 from .figures.style import FigureWidth, figures_across
 from .levitation import Levitation
+from .other_motions import coils_summary, modes_of, several, several_dataset
 from .plan import SceneLike, given_scene
 from .question import Question
 from .result import AXIS, Result, found_dataset, state_columns, variable
-from .several import several, several_dataset
 from .starts import drawn_starts, endings, given_starts
 from .study import Point, Study
 from .sweep import forget, swept

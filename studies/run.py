@@ -30,17 +30,16 @@ from ..geometry.scene.files import scene_digest
 from .catalogue.runner import figures_of
 from .cli.console import note, to_json
 from .cli.options import COLUMNS, Answer, Models, refused
-from .coils import coils_at_start, coils_job
 from .compare import compared_models
-from .fields import write_working_point
+from .fields import coils_at_start, write_working_point
 from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
 from .figures.style import save_figures
 from .gradient import gradient_job
 from .levitation import Levitation
+from .other_motions import coils_job, several_job
 from .plan import check_coils, check_drive, sources
 from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, left_out_text, write_dataset
-from .several import several_job
 from .uncertainty import uncertainty_job
 from .words import flight_words, headline, left_out_words, note_details
 

@@ -21,7 +21,6 @@ from ...geometry.scene.files import check_files, parse_scene
 from ...geometry.solids import moved
 from ..cli.console import note, progress
 from ..cli.options import NAMES, Answer, Models, Workers, combinations
-from ..coils import coils_figure
 from ..compare import compare_figure
 from ..design import design_figure
 from ..fields import field_map_figure
@@ -32,6 +31,7 @@ from ..figures.style import save_figures
 from ..figures.view import SEEN, Currents, current_places, near_plate
 from ..fit import fit_figure
 from ..levitation import Levitation
+from ..other_motions import coils_figure
 from ..plan import sources
 from ..question import Question
 from ..result import write_dataset

@@ -49,15 +49,10 @@ class PageState:
     def models(self) -> Models:
         return Models(self.model, self.plate_model)
 
-    @property
-    def command(self) -> str:
-        """Options of the command line that ask for the same of the scene file."""
-        spin = f" --spin {self.spin:g}" if self.spin else ""
-        return f"--model {self.model} --plate-model {self.plate_model}{spin}"
-
     def copies(self) -> dict[str, str]:
         """What asks for the same elsewhere: a `line` about a scene file, a whole `command` of a shell, and `python`."""
-        line, text = f"spinlev equilibria scene.toml {self.command}", scene_text(self.scene)
+        chosen = f"--model {self.model} --plate-model {self.plate_model}{f' --spin {self.spin:g}' if self.spin else ''}"
+        line, text = f"spinlev equilibria scene.toml {chosen}", scene_text(self.scene)
         asked = f'model="{self.model}", plate_model="{self.plate_model}", spin={self.spin:g}'
         program = f'scene = sl.parse_scene(r"""\n{text}""")\nfound = sl.equilibria(scene, {asked})\n'
         program += 'print(found[["distance", "polar_angle", "growth", "stable"]].to_dataframe())\n'

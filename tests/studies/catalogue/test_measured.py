@@ -25,7 +25,7 @@ from spinlev.studies.catalogue.measured import (
     swing_errors,
     team28,
 )
-from spinlev.studies.coils import coils_figure, coils_summary, modes_of
+from spinlev.studies.other_motions import coils_figure, coils_summary, modes_of
 
 
 def test_swing_of_a_damped_oscillation():
