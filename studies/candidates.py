@@ -207,10 +207,8 @@ class Search:
         draws = qmc.Sobol(len(self.keys), seed=SEED).random(DRAWS)
         for numbers in [self.first, *(self.low + draws * (self.high - self.low))]:
             try:
-                one = levitation
-                if numbers is not self.first:
-                    one = self._levitation(numbers)
-                    one.share(levitation)
+                one = levitation if numbers is self.first else self._levitation(numbers)
+                one.share(levitation)
                 found = Candidate(one, self._first(one), self.keys)
             except SpinlevError as error:
                 if numbers is self.first and not isinstance(error, EquilibriumError):

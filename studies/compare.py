@@ -1,6 +1,5 @@
 """One scene by every model of the rotor's field, under the same conditions: may the point dipole be used for it?"""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -161,17 +160,17 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
         frequencies = low + (high - low) * np.linspace(0.0, 1.0, GRID) ** 2  # dense at the fold, where branches turn
     scenes = [(replace(row.levitation.scene, plate=None), row.levitation.rates, row.branch) for row in rows]
     points = [on_branch(*scene, frequencies) for scene in scenes]
-    nothing = math.nan, math.nan, False
+    nothing = np.nan, np.nan, False
     at = [[(-p.position[2], p.growth_per_s, levitates(p)) if p else nothing for p in row] for row in points]
     branch = np.array(at)
     found = [row.found for row in rows]
     modes = [e.frequencies_hz if e else () for e in found]
-    spectrum = np.array([*zip_longest(*modes, fillvalue=math.nan)], float).reshape(-1, len(rows)).T
+    spectrum = np.array([*zip_longest(*modes, fillvalue=np.nan)], float).reshape(-1, len(rows)).T
 
     def each(value: str) -> Array:
-        return np.array([getattr(e, value) if e else math.nan for e in found], float)
+        return np.array([getattr(e, value) if e else np.nan for e in found], float)
 
-    distance = [-e.position[2] if e else math.nan for e in found]
+    distance = [-e.position[2] if e else np.nan for e in found]
     over = ("model", "frequency")
     plate = next((row.levitation.plate for row in rows if row.levitation.plate), None)
     return xr.Dataset(
@@ -183,7 +182,7 @@ def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None)
             "stability": (("model",), [e.stability if e else "" for e in found]),
             "mode_frequency": variable(("model", "mode"), spectrum, "Hz", "frequencies of the modes, rotor's frame"),
             "stable_range": variable(
-                ("model", "end"), [row.stable or (math.nan,) * 2 for row in rows], "Hz",
+                ("model", "end"), [row.stable or (np.nan,) * 2 for row in rows], "Hz",
                 "ends of the range of stable frequencies, without the plate",
             ),
             "branch_distance": variable(over, branch[..., 0], "m", "levitation distance, without the plate"),

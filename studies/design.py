@@ -298,13 +298,14 @@ def design(
     >>> round(float(found.number.sel(key="frequency_hz")[0]), 2)
     93.21
     """
-    wanted, bounds, ends = checked_goals(goals, free, limits, points)
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
-    return designed(levitation, wanted, bounds, ends, points)
+    return designed(levitation, *checked_goals(levitation, goals, free, limits, points), points)
 
 
-def checked_goals(goals: object, free: object, limits: object, points: object) -> tuple[list[str], Limits, Limits]:
-    """Goals, bounds of free numbers and limits as they are used. Raises InputError."""
+def checked_goals(
+    levitation: Levitation, goals: object, free: object, limits: object, points: object
+) -> tuple[list[str], Limits, Limits]:
+    """Goals, bounds of free numbers and limits as they are used. Raises InputError; the arguments are of `design`."""
     wanted = [goals] if isinstance(goals, str) else list(goals) if isinstance(goals, Sequence) else []
     if not 1 <= len(wanted) <= 2 or len(set(map(str, wanted))) < len(wanted):
         raise refused("goals", f"be one or two of {', '.join(GOALS)}", goals)
@@ -317,10 +318,10 @@ def checked_goals(goals: object, free: object, limits: object, points: object) -
         raise refused("limits", f"be ranges by {said}", limits)
     check_names(given, MEASURES, "limits", "what a scene can be asked for")
     ends = {name: _range(f"limits.{name}", value) for name, value in given.items()}
-    return [str(one) for one in wanted], checked_free(free), {**ALWAYS, **ends}
+    return [str(one) for one in wanted], checked_free(free, levitation), {**ALWAYS, **ends}
 
 
-def checked_free(free: object, levitation: Levitation | None = None) -> Limits:
+def checked_free(free: object, levitation: Levitation) -> Limits:
     """Bounds of free numbers, which hold those of a `levitation` and have derivatives in it. Raises InputError."""
     if not isinstance(free, Mapping) or not free:
         raise refused("free", "be least and most by key of the scene file", free)
@@ -328,8 +329,6 @@ def checked_free(free: object, levitation: Levitation | None = None) -> Limits:
     for key, (low, high) in bounds.items():
         if not low < high or not np.isfinite([low, high]).all():
             raise refused(f"free.{key}", "be two finite numbers in order, least and most", free[key])
-    if levitation is None:
-        return bounds
     gradient, plate = Gradient(levitation), levitation.scene.plate is not None
     for key in gradient.checked_keys(list(bounds), "free"):
         number, (low, high) = gradient.numbers[key], bounds[key]
@@ -348,7 +347,6 @@ def designed(levitation: Levitation, goals: Sequence[str], bounds: Limits, limit
 
     Of two goals the curve has so many `points`; `levitation` is of the scene given.
     """
-    checked_free(bounds, levitation)
     if (levitation.models.model, levitation.models.plate_model) not in SIMPLE:
         _check_reach(levitation, bounds, limits)
     search = Search(levitation, bounds)
@@ -486,8 +484,8 @@ def design_job(path: Path, requested: Models, out: Path) -> Answer:
     check_names(table, ("scene", "goals", "free", "limits", "points"), "goals", f"keys of {path}")
     if not isinstance(table.get("scene"), str):
         raise refused("scene", f"be the path of a scene file, in {path}", table.get("scene"))
-    wanted = checked_goals(*map(table.get, ("goals", "free", "limits", "points")))
     levitation = Levitation(load_scene(path.parent / table["scene"]), requested)
+    wanted = checked_goals(levitation, *map(table.get, ("goals", "free", "limits", "points")))
     result = designed(levitation, *wanted, table["points"])
     count, files = result.sizes["point"], list[str]()
     for k, text in enumerate(result["scene"].values):

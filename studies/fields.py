@@ -123,20 +123,19 @@ def export_job(scene: Scene, requested: Models, path: Path) -> Answer:
             current = plate_currents(scene, scene.plate, sources(levitation.table), state, inside)
             data = _fields(levitation, state, inside)
             parts.append((inside, cells, {**data, "J": current, "body": np.full(len(inside), PLATE)}))
-    points = np.concatenate([points for points, _, _ in parts])
-    starts = np.cumsum([0, *(len(points) for points, _, _ in parts)])
-    joined = np.concatenate([part + start for start, (_, part, _) in zip(starts, parts, strict=False)])
-    data = {name: np.concatenate([part[name] for _, _, part in parts]) for name in parts[0][2]}
+    places, meshes, values = zip(*parts, strict=True)
+    points, starts = np.concatenate(places), np.cumsum([0, *map(len, places)])
+    joined = np.concatenate([mesh + start for start, mesh in zip(starts, meshes, strict=False)])
+    data = {name: np.concatenate([each[name] for each in values]) for name in values[0]}
     with replacing(path) as temporary:
         meshio.Mesh(points, [("hexahedron", joined)], point_data=data).write(temporary)
-    values = {
+    return {
         "model": levitation.table.model,
         "error_estimate": closed_form_error(scene.rotor),
         "file": str(path),
         "points": len(points),
         "floater": state is not None,
-    }
-    return values, [f"B, H, M and J at {len(points)} points in {path}"]
+    }, [f"B, H, M and J at {len(points)} points in {path}"]
 
 
 def _floater_state(levitation: Levitation) -> State | None:
@@ -305,10 +304,7 @@ COLUMNS: Columns = {
 
 
 def working_point_dataset(levitation: Levitation) -> xr.Dataset:
-    """The working point of every magnet that has a polarisation, over `magnet`, with a section through each.
-
-    Raises InputError where no magnet has one.
-    """
+    """The working point of each magnet that has a polarisation, with a section; InputError where none has one."""
     scene = levitation.scene
     numbers = [k for k, magnet in enumerate(scene.rotor) if magnet.polarization.any()]
     if not numbers:

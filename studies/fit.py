@@ -236,12 +236,12 @@ def fit(
     >>> print(f"{float(found.estimate[0]):.2f} ± {float(found.error[0]):.2f}")
     9.95 ± 0.21
     """
-    bounds = checked_free(free)
     levitation = Levitation(scene, Models(model, plate_model, **requested), spin)
+    bounds = checked_free(free, levitation)
     table = table_of(data)
     if TIME in table and HEIGHT in table:
         table = rows_of_tracks(table)
-    rows = _Rows(levitation, table, checked_free(free, levitation))
+    rows = _Rows(levitation, table, bounds)
     low, high = np.array(list(bounds.values())).T
     found = scipy.optimize.least_squares(
         lambda z: rows.residuals(low + z * (high - low)),

@@ -184,10 +184,7 @@ class Levitation:
 
     @cached_property
     def interaction(self) -> Interaction:
-        """The rotor's field with what else acts on the floater.
-
-        Raises InputError where mutual magnetisation is asked for and cannot be known.
-        """
+        """The rotor's field with what else acts on the floater. Raises InputError where that cannot be known."""
         self._has_metal()  # refused before the field's table is made, which takes minutes
         return self._with_effects(self.table)
 
@@ -272,10 +269,7 @@ class Levitation:
 
     @cached_property
     def stability(self) -> Equilibrium:
-        """The equilibrium at which a trajectory begins, with its modes; if none will do, the nearest of all.
-
-        Raises EquilibriumError where there is none.
-        """
+        """The equilibrium at which a trajectory begins, or else the nearest. Raises EquilibriumError without any."""
         if (chosen := _first(self.equilibria)) is None:
             with_spin = f"with body spin {self.spin:g}" if self.scene.frequency else "for any spin"
             raise EquilibriumError(f"At {self.scene.frequency:g} Hz the floater has no equilibrium {with_spin}.")

@@ -1,6 +1,5 @@
 """Motions that are not of one floater below a rotor: of several floaters, and of a conductor that coils carry."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -120,7 +119,7 @@ def several_job(scene: Scene, requested: Models, duration: float, out: Path, che
         "levitated_s": flight.levitated_s,
         "ended_by": found.ended_by,
         "ended_by_floaters": list(found.which),
-        "ended_at_hz": float(flight.rate[-1]) / (2 * math.pi),
+        "ended_at_hz": float(flight.rate[-1]) / (2 * np.pi),
         "energy_error": flight.energy_error,
         "field_changes": vars(flight.field_changes),
         "realtime_factor": flight.realtime_factor,

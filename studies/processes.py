@@ -109,10 +109,7 @@ def _fewer(left: int, why: str) -> int:
 
 
 def mapped(number: int) -> Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]:
-    """A function like `map` that uses so many processes.
-
-    What it gives raises ComputationError where a process died, a call raised, or no process can begin.
-    """
+    """A function like `map` in so many processes; ComputationError where one dies, none can begin, or a call raised."""
 
     def map_in_processes(function: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
         found: dict[int, Any] = {}

@@ -3,7 +3,6 @@
 Trajectories that begin in one field are simulated in SIMD batches (`dynamics/flights/batch.py`).
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -248,7 +247,7 @@ def _beside(levitation: Levitation, dipoles: Sequence[Levitation]) -> dict[str, 
     distances = {
         f"{name}_distance": variable((), 1e-3 * value, "m", f"levitation distance by {words}")
         for name, words in COMPARED.items()
-        for value in [found.get(f"{name}_distance_mm") or math.nan]
+        for value in [found.get(f"{name}_distance_mm") or np.nan]
     }
     kinds = {f"{name}_stability": ((), found.get(f"{name}_stability") or "") for name in ("dipole", "true")}
     return distances | {name: xr.Variable(*kind) for name, kind in kinds.items()}
@@ -257,7 +256,7 @@ def _beside(levitation: Levitation, dipoles: Sequence[Levitation]) -> dict[str, 
 def _flight(question: Question, levitation: Levitation) -> xr.Dataset:
     flight = levitation.flight(question.duration)
     height, memory = flight.lab.position[:, 2], levitation.flight_plate
-    lost = math.nan if flight.lost_at_hz is None else flight.lost_at_hz
+    lost = np.nan if flight.lost_at_hz is None else flight.lost_at_hz
     of_drive = {"lost_at": variable((), lost, "Hz", "frequency at the loss")} if flight.given is not None else {}
     return xr.Dataset(
         {

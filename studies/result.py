@@ -1,6 +1,5 @@
 """The result of a scene: its numbers once, as labelled data for files, as a mapping for JSON and in words."""
 
-import math
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -147,7 +146,7 @@ class Result:
                 stable = words.stable_near_start(levitation)
                 values |= {
                     "lost_at_hz": flight.lost_at_hz,
-                    "ended_at_hz": float(flight.rate[-1]) / (2 * math.pi),
+                    "ended_at_hz": float(flight.rate[-1]) / (2 * np.pi),
                     "motor_torque_N_m": momentum / flight.levitated_s if flight.levitated_s else None,
                     "motor_power_W": work / flight.levitated_s if flight.levitated_s else None,
                     "motor_momentum_N_m_s": momentum,
@@ -192,7 +191,7 @@ def equilibrium_summary(equilibrium: Equilibrium) -> dict[str, Any]:
         **({"body_axes": equilibrium.state.axes} if equilibrium.state.axes is not None else {}),
         "stability": equilibrium.stability,
         "efolding_s": equilibrium.efolding_s,
-        "spin_about_moment_hz": equilibrium.spin_rate / (2 * math.pi),
+        "spin_about_moment_hz": equilibrium.spin_rate / (2 * np.pi),
         "frequencies_hz": equilibrium.frequencies_hz,
         "modes": [vars(mode) for mode in equilibrium.modes],
         "with_plate": equilibrium.currents is not None,

@@ -6,18 +6,8 @@ from typing import Any
 
 from ..dynamics.continuation.branch import OSCILLATORY, REAL
 from ..dynamics.continuation.frequencies import BORDER, CONTACT, StableRange, stable_ranges
-from ..dynamics.equilibria.equilibrium import (
-    FOLD,
-    IN_PLATE,
-    IN_ROTOR,
-    MODE_NAMES,
-    NOT_CONVERGED,
-    PAST_TABLE,
-    STABILITIES,
-    Equilibrium,
-    LeftOut,
-    Survey,
-)
+from ..dynamics.equilibria import equilibrium as why
+from ..dynamics.equilibria.equilibrium import MODE_NAMES, STABILITIES, Equilibrium, LeftOut, Survey
 from ..dynamics.flights.trajectory import DRIFTING, GROWING, STABLE, Trajectory, flight_kind
 from .cli.console import aligned, detail
 from .figures.style import NAMES
@@ -36,7 +26,7 @@ COLUMNS = (
 )  # fmt: skip
 
 ENDS = {
-    FOLD: "fold",
+    why.FOLD: "fold",
     OSCILLATORY: "growing oscillation",
     REAL: "growth without oscillation",
     CONTACT: "contact with the rotor",
@@ -75,14 +65,14 @@ def spoken_time(seconds: float) -> str:
 def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out: Sequence[LeftOut] = ()) -> str:
     """Levitation distance and stability in a `levitation`, by its `equilibria` and what was `left_out`."""
     if not (useful := worth_a_row(equilibria)):
-        why = "there is no equilibrium"
+        reason = "there is no equilibrium"
         if equilibria:
-            why = "the field model is too rough to tell where an equilibrium is"
-        elif any(one.why in (NOT_CONVERGED, PAST_TABLE) for one in left_out):
+            reason = "the field model is too rough to tell where an equilibrium is"
+        elif any(one.why in (why.NOT_CONVERGED, why.PAST_TABLE) for one in left_out):
             return f"No equilibrium was found at {levitation.scene.frequency:g} Hz, but not all could be computed."
         elif left_out:
-            why = "no solution is an equilibrium"
-        return f"No levitation at {levitation.scene.frequency:g} Hz: {why}."
+            reason = "no solution is an equilibrium"
+        return f"No levitation at {levitation.scene.frequency:g} Hz: {reason}."
     first = useful[0]
     of_kind = first.kind and f" ({first.kind})"
     mode, alone = _least_stable(first), first.without if first.currents is not None else None
@@ -168,20 +158,20 @@ def left_out_words(levitation: Levitation, left_out: Sequence[LeftOut]) -> list[
     """Which solutions are no equilibria of the scene, or could not be computed, and why: a sentence each kind."""
     cause = "the plate's response" if levitation.plate is not None else "gravity across the axis"
     said = []
-    for body, where in ((IN_PLATE, "plate"), (IN_ROTOR, "rotor")):
+    for body, where in ((why.IN_PLATE, "plate"), (why.IN_ROTOR, "rotor")):
         if depths := [_distance(one.known) for one in left_out if one.why == body]:
             count = "a solution" if len(depths) == 1 else f"{len(depths)} solutions"
             said.append(f"Left out: {count} at {', '.join(depths)} mm, where the floater would overlap the {where}.")
     for one in left_out:
         place = f"equilibrium at {_distance(one.known)} mm"
-        if one.why == FOLD:
+        if one.why == why.FOLD:
             said.append(f"The {place} without {cause} ends at {one.part:.1%} of it, where it meets another (fold).")
-        elif one.why == NOT_CONVERGED:
+        elif one.why == why.NOT_CONVERGED:
             said.append(
                 f"Not known: what becomes of the {place} without {cause}. Newton's method did not converge beyond "
                 f"{one.part:.1%} of it, so that there may be an equilibrium."
             )
-        elif one.why == PAST_TABLE:
+        elif one.why == why.PAST_TABLE:
             said.append(f"Not known: the {place}, beyond the range of the plate's precomputed field, is left out.")
     return said
 

@@ -32,12 +32,9 @@ app = App(
     help_format="markdown",
     suppress_keyboard_interrupt=False,
 )
-for command in (
-    *(commands.run, commands.field, commands.plate, commands.equilibria, commands.compare, commands.simulate),
-    *(commands.study, commands.design),
-    *(commands.figure, commands.show, commands.report, commands.cite, commands.new, commands.export, commands.explore),
-):
-    app.command(command)
+NAMES = "run field plate equilibria compare simulate study design figure show report cite new export explore"
+for name in NAMES.split():  # in the order of the help
+    app.command(getattr(commands, name))
 app.register_install_completion_command()
 
 

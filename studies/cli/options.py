@@ -316,9 +316,9 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
 
     own = [parameter for parameter in signature.parameters.values() if parameter.kind != parameter.VAR_KEYWORD]
     if len(own) < len(signature.parameters):  # `**requested`, one by one
-        hints = {name: getattr(hint, "__forward_arg__", hint) for name, hint in Requested.__annotations__.items()}
         only = inspect.Parameter.KEYWORD_ONLY
-        own += [inspect.Parameter(name, only, default=getattr(Models, name), annotation=hints[name]) for name in hints]
+        for name, hint in Requested.__annotations__.items():
+            own.append(inspect.Parameter(name, only, default=getattr(Models, name), annotation=hint))
     called.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
     summary, *parts = re.split(r"(?m)^(\w+)\n-+\n", inspect.cleandoc(function.__doc__ or ""))
     sections = {name: text.strip() for name, text in zip(parts[::2], parts[1::2], strict=True)}
@@ -349,10 +349,7 @@ MOST_VALUES = 100_000  # points of a sweep, at most
 
 
 def parse_vary(requested: Sequence[str]) -> dict[str, list[Any]]:
-    """Values by key, in the order given.
-
-    Raises InputError: not of this form, no number, no value, a key given twice, or too many points.
-    """
+    """Values by key, in the order given. Raises InputError: another form, no value, a key twice, too many points."""
     found: dict[str, list[Any]] = {}
     for text in requested:
         key, equals, values = text.partition("=")

@@ -286,10 +286,7 @@ def regions(state: PageState, spans: Sequence[tuple[float, float]], model: str, 
     return Regions(model, cells, border)
 
 
-Node: TypeAlias = tuple[int, int]
-
-
-def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple[Node, Node], float]:
+def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple[tuple[int, int], ...], float]:
     """Where the stable equilibrium of a point of a map ends on the way (0 to 1) to a neighbour that has none."""
     stable = found.number[1] > 0
     pairs = [
