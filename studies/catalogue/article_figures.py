@@ -88,13 +88,13 @@ def differences_figure(result: xr.Dataset) -> Figure:
     """How far the simpler models are from the finite elements."""
     figure, rows = showing.configuration_panels(result, 2.7, ylabel="deviation |ΔB| / |B| (%)")
     worst = 0.0
-    for axes, configuration, part in rows:
+    for axes, part in rows:
         value, off = cases_with(part, model="fem")["value"], deviations(part)
         for k, color in zip(range(part.sizes["distance"]), PALETTE, strict=False):
             for model in ("dipole", "cuboid"):
                 axes.plot(value, 100 * off[model][:, k], DASHES[model], color=color)
         worst = max(worst, 100 * float(off["fem"].max()))
-        axes.set(xlabel=article.label_of(configuration), ylim=(0, None))
+        axes.set_ylim(0, None)
     names = {NAMES[model]: DASHES[model] for model in ("dipole", "cuboid")}
     _explain(rows[0][0], result, names | {f"error of the finite elements: at most {worst:.1g} %": " "})
     return figure

@@ -245,16 +245,16 @@ BINS = 6
 
 
 @each(configuration_panels, 2.7, ylabel="capture probability (%)")
-def share_figure(axes: Axes, name: str, own: xr.Dataset) -> None:
+def share_figure(axes: Axes, own: xr.Dataset) -> None:
     """The capture probability of each rotor at each part of its frequencies; bars: one standard deviation."""
     every = [one for _, one in each_place(own) if one["shape"] == SPHERE]
     for part, color in zip(np.unique(own["part"]), PALETTE, strict=False):
         some = [one for one in every if one["part"] == part]
         measures, hits = [one["measure"].item() for one in some], [one["outcome"] == CAPTURED for one in some]
         _shares(axes, measures, hits, color, f"{part:.0%} of the stable range")
-    for measure in article.CONFIGURATIONS[name].levitated:
+    for measure in article.CONFIGURATIONS[own["configuration"].values[0]].levitated:
         axes.axvline(measure, color="0.85", lw=4, zorder=0, label="levitated in the article")
-    axes.set(xlabel=article.label_of(name), ylim=(-2, 102))
+    axes.set_ylim(-2, 102)
 
 
 def _shares(axes: Axes, x: ArrayLike, hits: Sequence[ArrayLike], color: str, label: str) -> None:

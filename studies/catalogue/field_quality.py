@@ -2,14 +2,16 @@
 
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from ...fem.closed_forms.moments import added_by_closed_form, carrier, oblique_contact
 from ...fem.elements.ladder import Refinement, solve_rotor
@@ -171,15 +173,9 @@ class HardCase:
         return Accuracy(nearest=self.nearest).clearance(self.magnets)
 
 
-def _magnet(
-    size: Sequence[float],
-    polarization: Sequence[float],
-    center: Sequence[float] = (0.0, 0.0, 0.0),
-    angles: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    across: float | None = None,
-) -> Magnet:
+def _magnet(size: ArrayLike, polarization: ArrayLike, center: ArrayLike = (0, 0, 0), angles: Any = (0, 0, 0)) -> Magnet:
     box = Box(np.array(size, float), np.array(center, float), rotation_matrix(angles))
-    return Magnet(box, np.array(polarization, float), PERMEABILITY, across)
+    return Magnet(box, np.array(polarization, float), PERMEABILITY)
 
 
 def _cube(permeability: float) -> tuple[Magnet, ...]:
@@ -196,7 +192,7 @@ EIGHT = tuple(
     _magnet(SMALL, (1.2 + 0.01 * k, 0.1 * k, 0), (0.012 * np.cos(a), 0.012 * np.sin(a), 0.001 * k), (10 * k, 20, 30))
     for k, a in enumerate(np.arange(8) * np.pi / 4)
 )
-OBLIQUE = (_magnet(CUBE, (1, 0, 0), angles=(15, 40, 70), across=1.15),)
+OBLIQUE = (replace(_magnet(CUBE, (1, 0, 0), angles=(15, 40, 70)), transverse_permeability=1.15),)
 FLAT, LONG = (0.02, 0.02, 0.0005), (0.005, 0.005, 0.04)
 ALONG, _, UP = np.eye(3)
 DISC, THIN_RING = Cylinder(10e-3, 1e-3), ring(10e-3, 9e-3, 5e-3)

@@ -129,10 +129,10 @@ def distances_figure(axes: Axes, rotor: xr.Dataset, color: Any) -> None:
 
 
 @showing.each(showing.configuration_panels, 2.8, ylabel="change of the distance (mm)")
-def causes_figure(axes: Axes, configuration: str, part: xr.Dataset) -> None:
+def causes_figure(axes: Axes, part: xr.Dataset) -> None:
     """By how much each cause changes the distance: mean and range over the frequencies."""
     width = 0.8 / (len(CAUSES) + 1)
-    places = showing.rotor_places(axes, configuration, part)
+    places = showing.rotor_places(axes, part)
     for k, (cause, models) in enumerate([*CAUSES.items(), ("all together", TOTAL)]):
         value, error = (1e3 * values.values for values in change(part, "distance", models))
         mean = value.mean(axis=1)
@@ -145,10 +145,10 @@ def causes_figure(axes: Axes, configuration: str, part: xr.Dataset) -> None:
 
 
 @showing.each(showing.configuration_panels, 2.8, ylabel="stable frequencies (Hz)")
-def ranges_figure(axes: Axes, configuration: str, part: xr.Dataset) -> None:
+def ranges_figure(axes: Axes, part: xr.Dataset) -> None:
     """The frequencies of stable levitation by point dipoles and in the field of the finite magnets."""
     for (model, (_, color, name)), offset in zip(PAIR.items(), (-0.2, 0.2), strict=True):
-        places = showing.rotor_places(axes, configuration, part) + offset
+        places = showing.rotor_places(axes, part) + offset
         low, high = (part[end].sel(model=model).values for end in ("lowest", "highest"))
         axes.bar(places, high - low, 0.35, bottom=low, color=color, label=name)
         for end, values in (("lowest", low), ("highest", high)):

@@ -211,10 +211,10 @@ def _contributions_figure(result: xr.Dataset, quantity: str, words: str) -> Figu
 def _bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> Figure:
     """Quantities of the rotors within all tolerances together."""
     figure, rows = showing.configuration_panels(result, 2.6, ylabel=words)
-    for axes, configuration, part in rows:
+    for axes, part in rows:
         for name, color in zip(quantities, PALETTE, strict=False):
             middle, low, high = band(part, name)
-            places, bars = showing.rotor_places(axes, configuration, part), [middle - low, high - middle]
+            places, bars = showing.rotor_places(axes, part), [middle - low, high - middle]
             axes.errorbar(places, middle, bars, fmt="s", ms=4, capsize=3, color=color, label=name)
     showing.explain(rows[0][0], {f"median, and {BANDS}": "s"}, ms=4)
     return figure

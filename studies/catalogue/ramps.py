@@ -54,9 +54,9 @@ def ramps(point: Point) -> xr.Dataset:
 
 
 @showing.each(showing.configuration_panels, 3.4, ylabel="frequency of the rotor (Hz)")
-def ramps_figure(axes: Axes, configuration: str, part: xr.Dataset) -> None:
+def ramps_figure(axes: Axes, part: xr.Dataset) -> None:
     """The stable range of each rotor as a bar, and where its floater is lost on the way down and up."""
-    places = showing.rotor_places(axes, configuration, part)
+    places = showing.rotor_places(axes, part)
     span = (part["highest"] - part["lowest"]).values
     axes.bar(places, span, 0.5, part["lowest"].values, color="0.85", label="stable at steady frequency")
     for way, marker in zip(WAYS, "v^", strict=True):

@@ -140,7 +140,7 @@ MARKS = {
 
 
 @each(showing.configuration_panels, 3.9, ylabel="frequency of the rotor (Hz)")
-def map_figure(axes: Axes, configuration: str, rotors: xr.Dataset) -> None:
+def map_figure(axes: Axes, rotors: xr.Dataset) -> None:
     """Regions of stable levitation by dipole and by finite elements, kinds of boundary, and the plate's verdict."""
     for model in article.MODELS:
         _region(axes, cases_with(rotors, model=model), COLORS[model])
@@ -156,7 +156,7 @@ def map_figure(axes: Axes, configuration: str, rotors: xr.Dataset) -> None:
             axes.plot(measure[here], frequency[here], marker, color=color, ms=4, mew=0.8, label=label)
     for metal, (marker, words) in MARKS.items() if "high" in true else ():
         axes.plot(true["measure"], true["high"].sel(metal=metal), marker, color="k", ms=5, label=words)
-    axes.set(xlabel=article.label_of(configuration), ylim=(20, 410))
+    axes.set_ylim(20, 410)
     axes.margins(x=0.08)
 
 

@@ -26,10 +26,10 @@ TITLES = {"horizontal": "displaced cube", "vertical": "two cubes", "tilt": "tilt
 def each(
     panels: Callable[..., tuple[Figure, Any]], *how: Any, of: Callable[[xr.Dataset], Any] | None = None, **shared: Any
 ) -> Callable[[Callable[..., None]], Drawing]:
-    """Make what draws one panel a function of a joined result that draws the figure.
+    """Let what draws one panel draw the figure of a joined result.
 
-    Its `panels` are arranged by a function below that takes the result, or what is made `of` it, with `how` and
-    `shared`; what it gives of each of them is handed on.
+    One of the functions below arranges the `panels`, with `how` and `shared` and from the result or what is made `of`
+    it; each row that it returns is handed on to what is decorated.
     """
 
     def decorated(draw: Callable[..., None]) -> Drawing:
@@ -91,11 +91,16 @@ def _measure(part: xr.Dataset) -> str:
 
 def configuration_panels(
     result: xr.Dataset, height: float, xlabel: str = "", ylabel: str = "", **shared: Any
-) -> tuple[Figure, list[tuple[Axes, str, xr.Dataset]]]:
-    """A panel for each configuration of a joined result, with its name and its cases; options of `small_multiples`."""
-    parts = {TITLES[name]: (name, part) for name, part in by_configuration(result)}
+) -> tuple[Figure, list[tuple[Axes, xr.Dataset]]]:
+    """A panel for each configuration of a joined result with its cases, as of `small_multiples`.
+
+    Without an `xlabel` the rotors' displacement or tilt is along x.
+    """
+    parts = {TITLES[name]: part for name, part in by_configuration(result)}
     figure, rows = small_multiples(parts, height, 3, xlabel, ylabel, sharey=True, **shared)
-    return figure, [(panel, *part) for panel, part in rows]
+    for axes, part in () if xlabel else rows:
+        axes.set_xlabel(label_of(part["configuration"].values[0]))
+    return figure, rows
 
 
 def rotor_panels(
@@ -107,8 +112,8 @@ def rotor_panels(
     """
     figure, rows = configuration_panels(result, height, xlabel, ylabel, **shared)
     found: list[tuple[Axes, xr.Dataset, Any]] = []
-    for axes, configuration, part in rows:
-        rotors = dict(by_rotor(part))
+    for axes, part in rows:
+        rotors, configuration = dict(by_rotor(part)), part["configuration"].values[0]
         if len(rotors) == 1:
             axes.set_title(axes.get_title("left").replace(TITLES[configuration], next(iter(rotors))))
             found.append((axes, part, PALETTE[0]))
@@ -122,11 +127,11 @@ def rotor_panels(
     return figure, found
 
 
-def rotor_places(axes: Axes, configuration: str, part: xr.Dataset) -> Array:
+def rotor_places(axes: Axes, part: xr.Dataset) -> Array:
     """Numbered places (case,) for the rotors of one configuration along x, labelled by their displacement or tilt."""
     count = part.sizes["case"]
     axes.set_xticks(range(count), [f"{m:g}" for m in part["measure"].values])
-    axes.set(xlabel=label_of(configuration), xlim=(-0.6, count - 0.4))
+    axes.set_xlim(-0.6, count - 0.4)
     return np.arange(count, dtype=float)
 
 
