@@ -29,18 +29,14 @@ from ..cli.console import progress
 from ..figures.style import PALETTE, drawn
 from ..result import Columns, columns, variable
 from ..study import study_of_one
-from .article import EDGE, FLOATER, PERMEABILITY, REMANENCE
+from .article import EDGE, FLOATER, PERMEABILITY, QUICK_ROTORS, REMANENCE, rotor_label, rotor_scene
 from .showing import explain, last_crossing, small_multiples, text_table
 
 # Where the point dipole, and models between it and the field of the finite magnets, can be trusted.
 #
 # Region: distance below the lower magnet's centre × lateral offset, worst azimuth, for the article's three rotors.
 # Truth: the finite-element table, whose own error is stored beside.
-ROTORS = {
-    "horizontal, δx = 2 mm": horizontal(0.002, EDGE, REMANENCE, PERMEABILITY),
-    "vertical, δz = 14 mm": vertical(0.014, EDGE, REMANENCE, PERMEABILITY),
-    "tilt, δθ = 10°": tilt(float(np.radians(10)), EDGE, REMANENCE, PERMEABILITY),
-}
+ROTORS = {f"{rotor[0]}, {rotor_label(*rotor)}": rotor_scene(*rotor).rotor for rotor in QUICK_ROTORS}
 VALIDITY: Columns = {
     "field_error": (("rotor", "model", "distance", "offset"), "1", "largest relative error of B over the azimuth"),
     "gradient_error": (("rotor", "model", "distance", "offset"), "1", "largest relative error of grad B over it"),

@@ -14,7 +14,6 @@ from ...dynamics.continuation.frequencies import StableRange, at_frequency, refe
 from ...dynamics.equilibria.balance import Balance
 from ...dynamics.equilibria.equilibrium import Equilibrium, named_modes
 from ...dynamics.equilibria.perturbed import balanced_directions, shifted_equilibrium
-from ...dynamics.motion.effects import with_effects
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.state import Scales, polar_angle
@@ -239,7 +238,7 @@ def floater_permeability(scene: Scene, distances: Sequence[float] | None = None,
     places = _on_axis(np.array(distances))
     stable = next((e for e in alone.equilibria if e.stable), None)
     values = parameters(scene, Scales.of(scene), frozen_spin=True)
-    balance = Balance(Rates(with_effects(scene, alone.table)), values, 0.0)
+    balance = Balance(alone.rates, values, 0.0)
     start, guess = (stable.distance, stable.state.moment) if stable else (FARTHEST, np.array([-1.0, 0.0, 0.0]))
     dataset = missed(rotors, scene.floater, places, balanced_directions(scene, balance, places, start, guess))
     weight = scene.floater.mass * float(np.linalg.norm(scene.gravity))

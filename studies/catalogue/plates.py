@@ -1,6 +1,6 @@
 """What a conducting plate does to a floater, and its eddy currents against a measurement."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from importlib.resources import files
@@ -154,22 +154,12 @@ SWEEPS = {
 DISTANCES = (10, 15, 20, 30, 40, 60)
 ENDINGS = {"": ("infinite slab", "o-", None), REAL_PLATE: ("real plate", "s", "none")}
 """By the ending of a sweep's name: what the plate is, its marks and their face."""
-MEANS = {
-    "moved": ("equilibrium moved", "displacement (mm)"),
-    "lift": ("mean force, up", "of the weight (%)"),
-    "torque": ("braking torque on the floater", "torque (µN m)"),
-    "loss": ("loss in the plate", "loss (mW)"),
-}  # Titles and labels of what `means` gives
-
-
-def means(part: xr.Dataset) -> dict[str, xr.DataArray]:
-    """What a plate does on average: displacement (mm), force up (% of the weight), braking torque (µN m), loss (mW)."""
-    return {
-        "moved": 1e3 * (part["shift"] ** 2).sum("axis", skipna=False) ** 0.5,
-        "lift": 100 * part["force"].sel(axis="z") / float(part.attrs["weight_N"]),
-        "torque": -1e6 * part["torque"].sel(axis="z"),
-        "loss": 1e3 * part["loss"],
-    }
+MEANS: dict[str, tuple[str, Callable[[xr.Dataset], xr.DataArray]]] = {
+    "equilibrium moved": ("displacement (mm)", lambda of: 1e3 * (of["shift"] ** 2).sum("axis", skipna=False) ** 0.5),
+    "mean force, up": ("of the weight (%)", lambda of: 100 * of["force"].sel(axis="z") / of.attrs["weight_N"]),
+    "braking torque on the floater": ("torque (µN m)", lambda of: -1e6 * of["torque"].sel(axis="z")),
+    "loss in the plate": ("loss (mW)", lambda of: 1e3 * of["loss"]),
+}  # What a plate does on average, by title: its label, and its values of some cases
 
 
 @drawn
@@ -220,17 +210,16 @@ def rotors_figure(result: xr.Dataset) -> Figure:
 @drawn
 def means_figure(result: xr.Dataset) -> Figure:
     """What the plate does on average: it moves the floater, pushes it, brakes it and is warmed."""
-    titles = {title: (name, label) for name, (title, label) in MEANS.items()}
-    figure, rows = showing.small_multiples(titles, 2.2, 2, "distance of the face (mm)", sharex=True)
-    for panel, (name, label) in rows:
+    figure, rows = showing.small_multiples(MEANS, 2.2, 2, "distance of the face (mm)", sharex=True)
+    for panel, (label, mean) in rows:
         for place, line, color in zip(PLACES, ("-", "--"), PALETTE, strict=False):
             for ending, (words, style, fill) in ENDINGS.items():
                 part = part_of(result, place + ending)
                 if part.sizes["case"]:
-                    values, marks = means(part)[name], style[0] if ending else f"{style[0]}{line}"
+                    values, marks = mean(part), style[0] if ending else f"{style[0]}{line}"
                     more: Any = {"ms": 4, "color": color, "mfc": fill, "label": f"{place}, {words}"}
                     panel.errorbar(1e3 * part["value"], values, np.abs(values) * part["error"], fmt=marks, **more)
-        panel.set(ylabel=label, yscale="linear" if name == "lift" else "log")
+        panel.set(ylabel=label, yscale="linear" if "weight" in label else "log")
         plain_log(panel.xaxis, DISTANCES)
     return figure
 
@@ -255,11 +244,11 @@ def _damping_lines(result: xr.Dataset) -> list[str]:
             if np.isfinite(worst):
                 mode = showing.mode_label(one["mode"].values[int(one["growth"].argmax("mode"))])
                 rate = showing.uncertain(worst, abs(worst) * one["error"])
-                cells = [mode, rate, *(f"{float(v):.3g}" for v in means(one).values())]
+                cells = [mode, rate, *(f"{float(mean(one)):.3g}" for _, mean in MEANS.values())]
             before = f"{float(one['growth_without'].max()):+.1g}"
             rows.append((where, f"{float(one['rotor_frequency']):.1f}", before, *cells))
     head = ("where", "rotor (Hz)", "growth without (s⁻¹)", "least stable mode", "growth (s⁻¹)")
-    return [*showing.text_table((*head, *(words for _, words in MEANS.values())), rows), sentence(result)]
+    return [*showing.text_table((*head, *(label for label, _ in MEANS.values())), rows), sentence(result)]
 
 
 def sentence(result: xr.Dataset) -> str:

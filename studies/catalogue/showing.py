@@ -187,13 +187,11 @@ def uncertain(value: SupportsFloat, error: SupportsFloat) -> str:
 
 def range_text(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> str:
     """A range of values with signs, times `scale`, and the largest of their errors, which have the same dimensions."""
-    known: Array = scale * value.values[np.isfinite(value.values)]
-    if not known.size:
+    if not value.notnull().any():
         return "–"
     worst = scale * float(np.nanmax(error.values))
     digits = int(np.clip(1 - np.floor(np.log10(max(worst, 1e-6))), 1, 4))
-    low, high = (f"{value:+.{digits}f}" for value in (known.min(), known.max()))
-    return f"{low if low == high else f'{low} to {high}'} (± {worst:.1g})"
+    return f"{span(scale * value, f'+.{digits}f')} (± {worst:.1g})"
 
 
 def last_crossing(distance: Array, values: Array, level: float) -> float:
