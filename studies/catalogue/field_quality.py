@@ -55,23 +55,23 @@ def dipole_validity(quick: bool, rotors: Mapping[str, tuple[Magnet, ...]] = ROTO
     def worst(values: Array) -> Array:
         return np.asarray(values.reshape(d.shape).max(axis=2))
 
-    errors, gradients, own = [], [], []
+    rows = []
     for magnets in rotors.values():
         truth = rotor_table(magnets, "fem", 1e-6)
         exact, slope = truth.evaluate(points)
         size, steepness = np.linalg.norm(exact, axis=1), np.linalg.norm(slope, axis=(1, 2))
         factor = float(np.linalg.norm(truth.moment) / np.linalg.norm(sum(m.moment for m in magnets)))
-        found = [table.evaluate(points) for table in models(magnets, factor).values()]
-        errors.append([worst(np.linalg.norm(b - exact, axis=1) / size) for b, _ in found])
-        gradients.append([worst(np.linalg.norm(g - slope, axis=(1, 2)) / steepness) for _, g in found])
-        own.append(worst(truth.relative_error(points)[0]))
+        found = {name: table.evaluate(points) for name, table in models(magnets, factor).items()}
+        errors = [worst(np.linalg.norm(b - exact, axis=1) / size) for b, _ in found.values()]
+        gradients = [worst(np.linalg.norm(g - slope, axis=(1, 2)) / steepness) for _, g in found.values()]
+        rows.append((errors, gradients, worst(truth.relative_error(points)[0])))
     coords = {
         "rotor": list(rotors),
-        "model": list(models(next(iter(rotors.values())), 1.0)),
+        "model": list(found),
         "distance": variable(("distance",), distance, "m", "distance below the lower magnet's centre"),
         "offset": variable(("offset",), offset, "m", "distance from the axis"),
     }
-    return xr.Dataset(columns(VALIDITY, (errors, gradients, own)), coords)
+    return xr.Dataset(columns(VALIDITY, list(zip(*rows, strict=True))), coords)
 
 
 def models(magnets: tuple[Magnet, ...], factor: float) -> dict[str, RotorTable]:

@@ -19,19 +19,15 @@ from ...geometry.files import write_whole
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import check_files, parse_scene
 from ...geometry.solids import moved
+from .. import compare, design, fields, fit, other_motions
 from ..cli.console import note, progress
 from ..cli.options import NAMES, Answer, Models, Workers, combinations
-from ..compare import compare_figure
-from ..design import design_figure
-from ..fields import field_map_figure
 from ..figures import run as drawing
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
 from ..figures.style import save_figures
 from ..figures.view import SEEN, Currents, current_places, near_plate
-from ..fit import fit_figure
 from ..levitation import Levitation
-from ..other_motions import coils_figure
 from ..plan import sources
 from ..question import Question
 from ..result import write_dataset
@@ -41,13 +37,13 @@ from .entries import CATALOGUE
 
 QUESTION = "question"  # What the result of one's own question is called
 DRAWN = {
-    "first_number": ("design", design_figure),
-    "estimate": ("fit", fit_figure),
-    "branch_distance": ("compare", compare_figure),
-    "outside": ("field-map", field_map_figure),
+    "first_number": ("design", design.design_figure),
+    "estimate": ("fit", fit.fit_figure),
+    "branch_distance": ("compare", compare.compare_figure),
+    "outside": ("field-map", fields.field_map_figure),
     "easy_axis": ("working-point", drawing.working_point_figure),
     "axis_field": ("field", drawing.field_figure),
-    "heat": ("trajectory", coils_figure),
+    "heat": ("trajectory", other_motions.coils_figure),
     "curve_force": ("force", drawing.force_figure),
     "position_rotor_frame": ("trajectory", drawing.trajectory_figure),
     "motor_torque": ("drive", drawing.drive_figure),
