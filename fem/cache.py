@@ -51,10 +51,10 @@ FORMATS = {
     "slab": 4,
     "edges": 2,
     "rotor-losses": 2,
-    "floater-currents": 2,
+    "floater-currents": 3,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 14,
+    "equilibria": 15,
     "experiment": 2,
     "code": 1,
 }

@@ -1,6 +1,6 @@
 """Multipole expansions of magnets' fields: their moments by quadrature, their fields, and the fewest that will do."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
@@ -248,6 +248,20 @@ def without_noise(coefficients: Coefficients, level: float) -> Coefficients:
     """
     field = np.abs(coefficients) * solid.field_sizes(len(coefficients) - 1)
     return np.where(field > level * field.max(initial=0.0), coefficients, 0.0)
+
+
+def merged(parts: Iterable[tuple[MultipoleExpansion, float]]) -> tuple[MultipoleExpansion, ...]:
+    """The sum of expansions times factors; those about one centre are one."""
+    found = dict[tuple[float, ...], MultipoleExpansion]()
+    for part, factor in parts:
+        key = (*part.center.tolist(), part.radius)
+        sums = factor * part.coefficients
+        if key in found:
+            one, other = sorted((sums, found[key].coefficients), key=len)
+            sums = np.array(other)
+            sums[: len(one), : len(one)] += one
+        found[key] = replace(part, coefficients=sums)
+    return tuple(found.values())
 
 
 Part = tuple[int, int, int, complex]  # number of the expansion, l, m, and the real or imaginary part of the coefficient

@@ -23,7 +23,7 @@ from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box, rotation_matrix
 from ..closed_forms.moments import uniform_cells
 from ..closed_forms.potentials import PolarizedCuboid
-from ..harmonics.expansion import MultipoleExpansion, uniform_moments
+from ..harmonics.expansion import MultipoleExpansion, merged, uniform_moments
 from ..harmonics.solid import Coefficients, derivative, field_spectrum, outer_sums
 from ..rotor.models import AccuracyError
 from ..rotor.table import RotorTable
@@ -98,7 +98,7 @@ def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> 
             parts.append(PolarizedCuboid.of_magnet(magnet))
         else:
             moments.append(uniform_moments(magnet, FAR_DEGREE))
-    for expansion in _together(moments):
+    for expansion in merged((one, 1.0) for one in moments):
         nearest = _nearest(expansion.center, plate)
         if nearest <= 1.001 * expansion.nearest:
             raise InputError(
@@ -113,19 +113,6 @@ def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> 
             end = kept[-1] + 1
             parts.append(ExpansionSource(replace(expansion, coefficients=expansion.coefficients[:end, :end])))
     return parts
-
-
-def _together(expansions: Sequence[MultipoleExpansion]) -> list[MultipoleExpansion]:
-    """The expansions with those about one centre added up, as of a magnet's remanence and of what it induces."""
-    found: dict[tuple[float, ...], list[MultipoleExpansion]] = {}
-    for one in expansions:
-        found.setdefault((*one.center.tolist(), one.radius), []).append(one)
-    sums = []
-    for some in found.values():
-        degree = max(one.degree for one in some)
-        whole = np.sum([np.pad(one.coefficients, (0, degree - one.degree)) for one in some], axis=0)
-        sums.append(replace(some[0], coefficients=whole))
-    return sums
 
 
 def posed_rotor(parts: Sequence[Source], plate: Plate, angle: float, depth: float) -> RotorSource:

@@ -1,6 +1,5 @@
 """Fields of magnets that differ from those of a table: smooth functions of the magnets' numbers, and as exact."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
@@ -10,9 +9,9 @@ import numpy as np
 from ...geometry.solids import Part
 from ..closed_forms.moments import carrier
 from ..elements.surface import SurfaceCharges
-from ..harmonics.expansion import MultipoleExpansion, uniform_moments
-from .charges import charged_expansion, converging, without_charges
-from .models import DEGREE, Accuracy, Rotor, error_points, extrapolated_tail, nonzero
+from ..harmonics.expansion import MultipoleExpansion, merged, uniform_moments
+from .charges import bear_charges, charged_expansion
+from .models import DEGREE, Accuracy, Rotor, extrapolated_tail, nonzero
 from .table import RotorTable
 
 STEADY_NODES, STEADY_DEGREE = 16, 40  # of charges on surfaces whose fields are smooth functions of the magnets' numbers
@@ -41,14 +40,14 @@ def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> Chan
         whole = bare.transformed(before[0].body, rotor[0], *sizes)
         return ChangedTable(**{part.name: getattr(whole, part.name) for part in fields(RotorTable)}, origin=table)
     simple = {"dipole": lambda m: ((), tuple(uniform_moments(one, 1) for one in m))}.get(table.model, _closed)
-    charged = table.model in ("fem", "surface") and _bear_charges(before) and _bear_charges(rotor)
+    charged = table.model in ("fem", "surface") and bear_charges(before, Accuracy()) and bear_charges(rotor, Accuracy())
     (minus, less), (plus, more) = ((_with_charges if charged else simple)(m) for m in (before, rotor))
     uniform = plus
     if _numbers(table.uniform) != _numbers(minus):
         minus = tuple(replace(one, polarization=-one.polarization) for one in minus)
         uniform = (*table.uniform, *minus, *plus)
     added = *((part, -1) for part in less), *((part, 1) for part in more)
-    parts, known = _merged([*((part, 1) for part in table.expansions), *added]), dict(table.doubts) if doubts else {}
+    parts, known = merged([*((part, 1) for part in table.expansions), *added]), dict(table.doubts) if doubts else {}
     if doubts and charged:
         known["charges"] = tuple(
             replace(part, coefficients=STEADY_ERROR * part.coefficients) for part in nonzero((*less, *more))
@@ -63,36 +62,15 @@ def follows(table: RotorTable, rotor: Rotor) -> bool:
     return bool(magnified(before, rotor)) or (
         table.model in ("fem", "surface")
         and len(before) == len(rotor)
-        and _bear_charges(before)
-        and _bear_charges(rotor)
+        and bear_charges(before, Accuracy())
+        and bear_charges(rotor, Accuracy())
     )
-
-
-@lru_cache(maxsize=8)
-def _bear_charges(rotor: Rotor) -> bool:
-    accuracy = Accuracy()
-    points = error_points(rotor, accuracy.clearance(rotor))[0]
-    return not without_charges(rotor, accuracy, points) and all(converging(rotor, accuracy, points))
 
 
 def _numbers(rotor: Rotor) -> list[tuple[Any, ...]]:
     """All that the closed forms of magnets have of them."""
     each = [(m.polarization, m.body.center, m.body.rotation, m.body.shape_numbers) for m in rotor]
     return [(type(m.body), *(part.tolist() for part in parts)) for m, parts in zip(rotor, each, strict=True)]
-
-
-def _merged(parts: Sequence[tuple[MultipoleExpansion, float]]) -> tuple[MultipoleExpansion, ...]:
-    """The sum of expansions times factors; those about one centre are one."""
-    found = dict[tuple[float, ...], MultipoleExpansion]()
-    for part, factor in parts:
-        key = (*part.center.tolist(), part.radius)
-        sums = factor * part.coefficients
-        if key in found:
-            one, other = sorted((sums, found[key].coefficients), key=len)
-            sums = np.array(other)
-            sums[: len(one), : len(one)] += one
-        found[key] = replace(part, coefficients=sums)
-    return tuple(found.values())
 
 
 def _closed(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:

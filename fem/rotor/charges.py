@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -129,6 +130,13 @@ def converging(magnets: Rotor, accuracy: Accuracy, points: Array) -> list[bool]:
     """Of each permeable magnet, whether its moments converge at all `points` (n, 3) m, as those of compact ones do."""
     least = models.least_ratio(magnets, accuracy.rtol)
     return [ratio >= least for ratio in _ratios([magnet for magnet in magnets if magnet.contrast], points)]
+
+
+@lru_cache(maxsize=8)
+def bear_charges(rotor: Rotor, accuracy: Accuracy) -> bool:
+    """Whether charges on their surfaces describe magnets, and moments about their centres these charges' field."""
+    points = models.error_points(rotor, accuracy.clearance(rotor))[0]
+    return not without_charges(rotor, accuracy, points) and all(converging(rotor, accuracy, points))
 
 
 def _ratios(magnets: Sequence[Magnet], points: Array) -> list[float]:

@@ -25,7 +25,9 @@ from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
 from ..harmonics.interior import field_coefficients, harmonics, matrices, shells as multipole_degrees, sphere
 from ..harmonics.solid import factorials, regular_values, tensors
 from .changed import changed_table
+from .charges import bear_charges
 from .choice import cached_rotor_table
+from .models import Accuracy
 from .table import DerivedField, FieldTable
 
 DEGREE = 20  # of polynomials over the body that the dipoles integrate exactly
@@ -133,16 +135,21 @@ def floater_sources(
     """Sources of a floater of any shape, in its frame.
 
     Exact for μr = 1 up to a `degree` of the rotor's field over the body; with a permeability to 1e-5 of the field
-    beside the floater, from finite elements, which are kept in the user's cache. A sphere is one dipole. `report` is
-    called with a message where the cache is damaged. `near` is a floater of nearly the same numbers, whose finite
-    elements are taken: the sources are smooth functions of them.
+    beside the floater, by charges on its surfaces or by finite elements, which are kept in the user's cache. A sphere
+    is one dipole. `report` is called with a message where the cache is damaged. `near` is a floater of nearly the same
+    numbers, whose table is taken: the sources are smooth functions of them.
     """
     if floater.is_sphere:
         return FloaterSources.dipole(floater.dipole)
     if floater.recoil_permeability == 1:
         return remanent_sources(floater, degree)
     known = near or floater
-    table, _ = cached_rotor_table(known.magnets, "fem", RTOL, report, known.radius)
+    # of a ring with a small hole elements take gigabytes, and pieces of it many charges
+    charged = known.recoil_permeability <= HIGHEST_PERMEABILITY and bear_charges(
+        known.magnets, Accuracy(RTOL, known.radius)
+    )
+    model = "surface" if charged else "fem"
+    table, _ = cached_rotor_table(known.magnets, model, RTOL, report, known.radius)
     if near is not None:
         table = changed_table(table, floater.magnets)
     # Charges farther in would be large and cancel
