@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from spinlev.fem.harmonics.expansion import MultipoleExpansion
+from spinlev.fem.rotor import floater as of_floater
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.floater import FloaterSources, _charges, floater_sources, force_and_torque
 from spinlev.geometry.common import MU_0
@@ -58,6 +59,26 @@ def test_a_rigid_floater_feels_what_magpylibs_field_does_to_its_charges(body):
         known = by_charges(body, place, turn)
         assert np.linalg.norm(force[k] - known[0]) < 3e-8 * np.linalg.norm(known[0])
         assert np.linalg.norm(torque[k] - known[1]) < 3e-8 * np.linalg.norm(known[1])
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        Cylinder(6e-3, 8e-3),
+        pytest.param(Cylinder(6e-3, 8e-3, inner_radius=0.5e-3), marks=pytest.mark.slow),
+        Box((8e-3, 10e-3, 9e-3)),
+    ],
+    ids=["cylinder", "ring", "cuboid"],
+)
+def test_charges_on_a_permeable_floater_and_elements_in_it_are_pulled_alike(body, monkeypatch):
+    """Compact floaters have charges, others elements; both reach 1e-5 of the field beside them, and so of the force."""
+    turns, table = turned(len(PLACES)), rotor_table((CUBE,), "cuboid")
+    charged = force_and_torque(floater_sources(floater(body, 1.05)), table, PLACES, turns)
+    monkeypatch.setattr(of_floater, "COMPACT", 9.0)
+    for one, other in zip(
+        force_and_torque(floater_sources(floater(body, 1.05)), table, PLACES, turns), charged, strict=True
+    ):
+        assert 0 < np.linalg.norm(one - other) < 1e-5 * np.linalg.norm(one)
 
 
 @pytest.mark.parametrize(
