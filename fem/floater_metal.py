@@ -24,14 +24,14 @@ import scipy
 
 from ..geometry.common import Array, ComputationError
 from ..geometry.files import LostError, call_apart
-from ..geometry.meshes.solids import LONGEST
+from ..geometry.meshes.solids import LONGEST, mesh_metal
 from ..geometry.scene.floater import Floater
 from ..geometry.shapes import Cylinder
 from ..geometry.solids import Part, Solid
 from .cache import TableKind
 from .closed_forms.eddy_bodies import thin_field_torque
 from .elements.spaces import volume_points
-from .rotor_metal import Metal, flat, metal_of
+from .rotor_metal import flat, metal_of
 
 # Degrees of the elements, up to the first that changes K by so little: of one less for the error that is stated. About
 # the small hole of a ring the mesh is so fine that the fifth takes ten times as long as the third, for nothing.
@@ -114,10 +114,9 @@ def loss_and_delay(pieces: Pieces) -> tuple[Array, Array, Array, Array]:
     The pieces are insulated from each other. Raises MeshError.
     """
     losses, points, flows, squares = np.zeros((8, 8)), list[Array](), list[Array](), list[Array]()
-    units, made = [body.volume ** (1 / 3) for body, _ in pieces], list[tuple[Metal, Array]]()
+    units, meshes = [body.volume ** (1 / 3) for body, _ in pieces], [mesh_metal([body]) for body, _ in pieces]
     for order in ORDERS:
-        known = [metal.mesh for metal, _ in made] or [[body] for body, _ in pieces]
-        metals = [metal_of(one, sigma, order) for one, (_, sigma) in zip(known, pieces, strict=True)]
+        metals = [metal_of(mesh, sigma, order) for mesh, (_, sigma) in zip(meshes, pieces, strict=True)]
         made = [(metal, metal.loads(rates_of_potential)) for metal in metals]
         fewer, losses = losses, np.sum([metal.dissipation(rates_of_potential, loads) for metal, loads in made], axis=0)
         if _step(fewer, losses) <= STEADY:
