@@ -12,7 +12,7 @@ from typing import Self
 
 import numpy as np
 
-from ..common import Array, InputError, frozen_array
+from ..common import Array, InputError, even_directions, frozen_array
 from ..magnets import Magnet, polarizability
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix, unturned
 from ..solids import Part, Solid, moved, with_frame
@@ -22,6 +22,10 @@ ROUND = 1e-9  # of sizes, moments of inertia and directions: what deviates less 
 # sine of the angle between moment and angular momentum of a spin about it, up to which it is one
 FREELY = 1e-6
 DIPOLE = 1e-9  # of the sum of all its magnets' moments: a floater with less has no dipole moment
+
+
+# Rays that find the sphere in a floater of several parts, their least step, in radii, and what they surely find of it
+RAYS, GRAIN, ROUGHLY = 300, 5e-3, 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +125,24 @@ class Floater:
         """The parts that are magnetised or respond to a field."""
         return tuple(p.magnet for p in self.parts if p.magnet.polarization.any() or p.magnet.contrast)
 
-    @property
+    @cached_property
     def inner_radius(self) -> float:
-        """Radius of a sphere about its centre that it holds, m; 0 where the centre is not in it."""
-        return max(0.0, *(-float(body.distance(np.zeros(3))) for body in self.bodies))
+        """Radius of a sphere about its centre that it holds, m; 0 where the centre is not in it.
+
+        Of several parts, which may touch there, that in all of them together, up to a tenth less than the largest.
+        """
+        alone = max(0.0, *(-float(body.distance(np.zeros(3))) for body in self.bodies))
+        if len(self.bodies) == 1:
+            return alone
+        reach, grain = np.zeros(RAYS), GRAIN * self.radius
+        going = np.arange(RAYS)
+        while len(going):  # along rays from the centre up to where each leaves the last part
+            places = reach[going, None] * even_directions(RAYS)[going]
+            depth = -np.min([body.distance(places) for body in self.bodies], axis=0)
+            inside = depth > -grain
+            reach[going] += np.where(inside, np.maximum(depth, grain), -grain)
+            going = going[inside]
+        return max(alone, ROUGHLY * float(reach.min()))
 
     @property
     def volume(self) -> float:

@@ -103,7 +103,9 @@ def test_two_halves_are_one_cube():
     assert halves.radius == pytest.approx(cube.radius)
     assert not halves.round
     assert halves.shape == "composite"
-    assert halves.inner_radius == pytest.approx(0.0, abs=1e-15)  # each half's own face is at the centre
+    assert 0.9 * cube.inner_radius < halves.inner_radius < cube.inner_radius  # each half's own face is at the centre
+    apart = [{**half, "center_mm": [1.0, 2.0, 3.0 + z]} for half, z in zip(HALVES, (-3.0, 3.0), strict=True)]
+    assert made({"magnets": apart}).floater.inner_radius == 0.0  # the centre is in the gap between them
 
 
 def test_a_composite_has_the_inertia_of_points_drawn_in_it():
