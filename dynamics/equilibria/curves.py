@@ -32,7 +32,7 @@ STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
 # Curves of 50 scenes took 176 steps at most. Where a body other than a sphere would be in the rotor they may run into a
 # circle of others and never come back to their start.
 STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=1000, first=1 / 4, far=3.0)
-DEEP = 0.1
+DEEP = 0.1  # Radii of an overlap up to which a curve may come out of it
 FARTHEST = 0.1  # Largest depth at which equilibria are looked for, and distance from the axis, m
 TOGETHER = 8  # Curves that are followed at once
 

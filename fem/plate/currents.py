@@ -469,8 +469,8 @@ def cached_currents(plate: Plate, *given: Any, report: Report, watch: Watch = un
     """`solve_currents` of a `plate` and all `given` up to the others, cached; for `report` and `watch`."""
     inputs, solve = (plate.body.shape_numbers, plate.metal, *given), partial(solve_currents, watch=watch)
     key = CURRENTS.key(*inputs)
-    if key not in _latest:
-        solution = CURRENTS.cached(inputs, partial(solve, plate, *given), report)[0]
+    if (found := _latest.get(key)) is None:
+        found = CURRENTS.cached(inputs, partial(solve, plate, *given), report)[0]
         _latest.clear()
-        _latest[key] = solution
-    return _latest[key]
+        _latest[key] = found
+    return found

@@ -134,10 +134,9 @@ class Floater:
         alone = max(0.0, *(-float(body.distance(np.zeros(3))) for body in self.bodies))
         if len(self.bodies) == 1:
             return alone
-        reach, grain = np.zeros(RAYS), GRAIN * self.radius
-        going = np.arange(RAYS)
+        ways, reach, grain, going = even_directions(RAYS), np.zeros(RAYS), GRAIN * self.radius, np.arange(RAYS)
         while len(going):  # along rays from the centre up to where each leaves the last part
-            places = reach[going, None] * even_directions(RAYS)[going]
+            places = reach[going, None] * ways[going]
             depth = -np.min([body.distance(places) for body in self.bodies], axis=0)
             inside = depth > -grain
             reach[going] += np.where(inside, np.maximum(depth, grain), -grain)
