@@ -243,7 +243,7 @@ def _kernel(formula: Formula, width: int, order: int) -> Any:
     if order > 1:
         hessian = np.asarray(hy.diff_tensors(gradient, diff_args=free, diff_order=1).jacobian)
         outputs += [hessian[a, b] for a, b in ENTRIES]
-    return compiled(hy.cfunc, outputs, [*free, *row], fast_math=True)
+    return compiled(hy.cfunc, outputs, [*free, *row], fast_math=True, opt_level=1)
 
 
 @dataclass(frozen=True, eq=False)
