@@ -33,8 +33,12 @@ UNREPEATABLE = (
 )
 """Words in the names of numbers that are measured, or round-off, and differ from run to run."""
 ROUNDED = {
-    **{"growth_error": 1e-4, "field_changes": 1e-6, "truth_error": 1e-6},
-    **{"position_error": 1e-5, "difference_error": 1e-6, "lag_deg": 1e-8},
+    "growth_error": 1e-4,
+    "field_changes": 1e-6,
+    "truth_error": 1e-6,
+    "position_error": 1e-5,
+    "difference_error": 1e-6,
+    "lag_deg": 1e-8,
 }
 """Tolerance, by a word in their names, of numbers that are differences of near ones, most of them estimates."""
 ZERO = {"spin": 1e-12, "growth": 1e-11}
