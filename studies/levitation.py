@@ -516,7 +516,7 @@ def _seen(plate: Plate, simulated: Trajectory, most: int | None = None) -> Array
 def branch_of(levitation: Levitation, known: Equilibrium, words: str = "") -> tuple[BranchPoint, ...]:
     """Equilibria without plate against the frequency through one of a `levitation`, which is `known`.
 
-    None where they cannot be followed, or gravity is not along the axis; a message that begins with `words` says why.
+    Nothing where gravity is not along the axis, or they cannot be followed: a message that begins with `words` says so.
     """
     scene = levitation.still
     if scene.gravity[:2].any():

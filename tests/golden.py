@@ -32,15 +32,8 @@ UNREPEATABLE = (
     "cpu",
 )
 """Words in the names of numbers that are measured, or round-off, and differ from run to run."""
-ROUNDED = {
-    "growth_error": 1e-4,
-    "field_changes": 1e-6,
-    "truth_error": 1e-6,
-    "position_error": 1e-5,
-    "difference_error": 1e-6,
-    "lag_deg": 1e-8,
-}
-"""Tolerance, by a word in their names, of numbers that are differences of near ones, most of them estimates."""
+ROUNDED = {"growth_error": 1e-4, "field_changes": 1e-6, "truth_error": 1e-6}
+"""Tolerance, by a word in their names, of estimates that are differences of near numbers."""
 ZERO = {"spin": 1e-12, "growth": 1e-11}
 """Differences that are none, rad/s, Hz or 1/s, likewise: spin rates of 1e-13 and growth of 1e-12 are zeros."""
 SAMPLES = 24

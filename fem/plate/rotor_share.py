@@ -34,7 +34,7 @@ from .table import PlateTable, Region, RotorShare, turn_harmonics
 
 DOWN = np.array([0.0, 0.0, -1.0])
 # Farther than so many circumradii a cuboid's moments up to this degree do for `LEFT_OUT`, in half of its time
-FAR, FAR_DEGREE = 2.5, 16
+FAR, FAR_DEGREE = 2.5, 18
 CLOSEST = 0.1  # Clearance of the plate, in radii of a round magnet, for which its moments are made at least
 LEFT_OUT = 1e-7  # Share of the rotor's field at the plate that is left out where no tolerance says another
 SHARE_PART = 0.1  # Share of a table's tolerance for the series of the rotor's signals

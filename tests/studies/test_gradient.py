@@ -212,10 +212,8 @@ def test_the_energy_of_escape_is_the_work_along_the_axis(name):
         one = Gradient(there).dataset(there.equilibria[:1], ["escape_energy"], ["frequency_hz"])
         energies[k] = float(one.escape_energy_value[0])
     wanted = (8 * (energies[1] - energies[-1]) - (energies[2] - energies[-2])) / (12 * step)
-    # fits of mutual magnetisation for steps of 0.01 to 0.1 mm leave 5e-6, of the 5e-5 that are stated
-    missed = abs(float(found.escape_energy[0]) - wanted)
-    assert missed < (1e-6 if name == "displaced" else 1e-5) * abs(wanted)
-    assert missed < float(found.escape_energy_error[0])
+    assert float(found.escape_energy[0]) == pytest.approx(wanted, rel=1e-6)
+    assert abs(float(found.escape_energy[0]) - wanted) < float(found.escape_energy_error[0])
 
 
 def test_an_unstable_equilibrium_or_one_without_another_beyond_has_no_energy_of_escape():

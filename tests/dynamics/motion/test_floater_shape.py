@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from spinlev.dynamics.equilibria import curves
 from spinlev.dynamics.equilibria.search import survey
 from spinlev.dynamics.flights.flight import Flight, initial_state, simulate
 from spinlev.dynamics.motion.body_shape import MISSED_BY_PLATE, response_error
@@ -45,6 +46,25 @@ def dipole_field(points):
     distance = np.linalg.norm(points, axis=1)[:, None]
     unit = points / distance
     return MU_0 / (4 * np.pi) * (3 * unit * (unit @ moment)[:, None] - moment) / distance**3
+
+
+@pytest.mark.parametrize(
+    "body",
+    [BODY, pytest.param(Cylinder(6e-3, 8e-3, inner_radius=0.5e-3), marks=pytest.mark.slow)],
+    ids=["disc", "ring"],
+)
+def test_curves_of_balance_inside_of_the_rotor_lead_to_no_equilibrium(body, monkeypatch):
+    """With those that begin there, followed to any length, the search finds the same."""
+    scene = Scene(130.0, (CUBE,), Floater(body.circumradius, 1.305, 1.0, 7500.0, None, body), Drag(0.0, 0.0))
+    table = rotor_table((CUBE,), "cuboid")
+    few = survey(scene, table)
+    monkeypatch.setattr(curves, "DEEP", np.inf)
+    monkeypatch.setattr(curves, "STEPS", replace(curves.STEPS, most=5000))
+    every = survey(scene, table)
+    assert len(every.curves) > len(few.curves)
+    found, wanted = ([e.position for e in one.equilibria] for one in (few, every))
+    assert len(found) >= 3
+    assert np.array(found) == pytest.approx(np.array(wanted), abs=1e-12)
 
 
 def test_nearest_equilibrium_balances_its_charges():

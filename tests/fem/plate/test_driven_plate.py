@@ -9,15 +9,17 @@ import pytest
 from article import RADIUS
 
 from spinlev.fem.closed_forms.potentials import unit_dipoles
+from spinlev.fem.closed_forms.uniform import remanent_field
+from spinlev.fem.harmonics.expansion import uniform_moments
 from spinlev.fem.plate import tables
 from spinlev.fem.plate.choice import reachable_region
 from spinlev.fem.plate.currents import solve_currents
 from spinlev.fem.plate.eddy import solve_eddy
-from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts
+from spinlev.fem.plate.rotor_share import FAR, FAR_DEGREE, LEFT_OUT, posed_rotor, rotor_parts
 from spinlev.fem.plate.tables import DRIVEN, PlateAround
 from spinlev.fem.rotor.choice import rotor_table
-from spinlev.geometry.common import InputError
-from spinlev.geometry.magnets import tilt
+from spinlev.geometry.common import InputError, even_directions
+from spinlev.geometry.magnets import Magnet, tilt
 from spinlev.geometry.meshes.plate import MeshRule, plate_mesh
 from spinlev.geometry.scene.contents import Lowering, Plate
 from spinlev.geometry.shapes import Box, rotation_matrix
@@ -102,6 +104,15 @@ def test_rotors_over_a_lowered_plate_share_the_finite_elements(rotor, region, mo
     assert len(solved) == 2
     print(f"fields differ by {np.max(missed / size):.1e}")
     assert np.max(missed / size) < rtol
+
+
+@pytest.mark.parametrize("size", [(0.01, 0.01, 0.01), (0.02, 0.004, 0.003), (0.012, 0.012, 0.002)])
+def test_moments_stand_for_a_cuboid_that_is_far_off(size):
+    """From where they are taken on: the closed form's field, to what is left out of the rotor anyway."""
+    magnet = Magnet(Box(size), (0.7, -0.4, 1.0))
+    away = FAR * magnet.body.circumradius * even_directions(400)
+    exact, found = remanent_field([magnet], away), uniform_moments(magnet, FAR_DEGREE).evaluate(away)[0]
+    assert np.abs(found - exact).max() < LEFT_OUT * np.abs(exact).max()
 
 
 def test_permeability_reaches_the_plate(rotor):
