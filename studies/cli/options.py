@@ -327,7 +327,8 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
     if "InputError" not in (raised := sections.get("Raises", "")):
         sections["Raises"] = f"{raised}\n{UNUSABLE}".strip()
     if example := sections.get("Examples"):
-        sections["Examples"] = "\n".join([*(f">>> {line}" for line in EXAMPLE.splitlines()), example])
+        # written as one string a prompt would be an example of this module itself to whoever looks for them
+        sections["Examples"] = "\n".join([*(" ".join((">>>", line)) for line in EXAMPLE.splitlines()), example])
     shown = [f"{name}\n{'-' * len(name)}\n{sections[name]}" for name in SECTIONS if name in sections]
     called.__doc__ = "\n\n".join([summary.strip(), *shown])
     return called
