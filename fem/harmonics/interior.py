@@ -18,6 +18,7 @@ U = -Σ Q_l · ∇^(l-1) B degree by degree.  A small turn δ makes δM = δ·G 
 another place is A_k = Σ P_kn R_n(ξ) of its distance ξ.  All matrices are known from polynomials at a few places.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -101,20 +102,24 @@ def _by_height(degree: int, more: int) -> Array:
 def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -> Coefficients:
     """Coefficients a_lm (T) of dipoles outside a ball: (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
 
-    Dipoles are `moments` μ0 M dV (n, 3) T m³ at `points` (n, 3) m; up to a `degree` about the centre of `ball`.
+    Dipoles are `moments` μ0 M dV (..., n, 3) T m³ at `points` (n, 3) m: [..., l, m] up to a `degree` about the centre
+    of `ball`.
     """
-    sums = np.zeros((3, degree + 2, degree + 2), complex)
+    kinds = moments.shape[:-2]
+    weights = np.moveaxis(moments, -2, 0).reshape(len(points), 3 * math.prod(kinds))
+    whole = np.zeros((weights.shape[1], degree + 2, degree + 2), complex)
     for start in range(0, len(points), CHUNK):
         away = (points[start : start + CHUNK] - ball.center) / ball.radius
         square = np.sum(away**2, axis=1)[:, None]
-        sums += weighted_sums(degree + 1, away / square, moments[start : start + CHUNK] / np.sqrt(square))
-    sums *= factorials(degree + 1)  # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r
+        whole += weighted_sums(degree + 1, away / square, weights[start : start + CHUNK] / np.sqrt(square))
+    whole *= factorials(degree + 1)  # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r
+    sums = whole[:, 1:].reshape(*kinds, 3, degree + 1, degree + 2)
     # M·∇Θ_lm by (∂_x ± i ∂_y) Θ_lm = ±Θ_(l+1)(m±1), ∂_z Θ_lm = -Θ_(l+1)m
-    minus = np.concatenate([-np.conj(sums[:, 1:, 1:2]), sums[:, 1:, :-2]], axis=2)
-    plus = sums[:, 1:, 1:]
-    x, y, z = (plus[0] - minus[0]) / 2, (plus[1] + minus[1]) / 2j, -sums[2, 1:, :-1]
-    total = np.tril(x + y + z)
-    total[0] = 0.0  # a constant potential
+    minus = np.concatenate([-np.conj(sums[..., 1:2]), sums[..., :-2]], axis=-1)
+    plus, upright = sums[..., 1:], sums[..., 2, :, :-1]
+    x, y = (plus - minus)[..., 0, :, :] / 2, (plus + minus)[..., 1, :, :] / 2j
+    total = np.tril(x + y - upright)
+    total[..., 0, :] = 0.0  # a constant potential
     return np.asarray(total / (FOUR_PI * ball.radius**3))
 
 
@@ -155,33 +160,31 @@ def from_outer(sums: Sequence[Coefficients], radii: Array, centers: Array, ball:
 
 
 def field_at_center(incident: Coefficients) -> Array:
-    """B (3,) T at the centre."""
-    return np.array([incident[1, 1].real, incident[1, 1].imag, -incident[1, 0].real])
+    """B (..., 3) T at the centre, of a_lm (T) [..., l, m]."""
+    upright, turned = incident[..., 1, 0], incident[..., 1, 1]
+    return np.stack([turned.real, turned.imag, -upright.real], axis=-1)
 
 
-def gradient_coefficients(incident: Coefficients, axis: int) -> Coefficients:
-    """a_lm of ∂u/∂x̃_axis of u = Σ conj a_lm Υ_lm: one degree less."""
-    above = incident[1:]
-    size = len(above)
-    lower = np.hstack([-np.conj(above[:, 1:2]), above[:, : size - 1]])  # m - 1
-    upper = above[:, 1 : size + 1]  # m + 1
-    return np.asarray(((lower - upper) / 2, 0.5j * (lower + upper), above[:, :size])[axis])
+def gradient_coefficients(incident: Coefficients) -> Coefficients:
+    """a_lm of ∂u/∂x̃, ∂u/∂ỹ, ∂u/∂z̃ of u = Σ conj a_lm Υ_lm, [..., 3, l, m]: one degree less."""
+    above = incident[..., 1:, :]
+    lower = np.concatenate([-np.conj(above[..., 1:2]), above[..., :-2]], axis=-1)  # m - 1
+    upper = above[..., 1:]  # m + 1
+    return np.stack([(lower - upper) / 2, 0.5j * (lower + upper), above[..., :-1]], axis=-3)
 
 
 def gradient_at_center(incident: Coefficients, radius: float) -> Array:
     """∂B_i/∂x_j (3, 3) T/m at the centre of a ball of a radius (m)."""
-    return np.stack([field_at_center(gradient_coefficients(incident, axis)) for axis in range(3)], axis=1) / radius
+    return field_at_center(gradient_coefficients(incident)).T / radius
 
 
 def multipole_force(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
-    """Force (3,) N of the `incident` field a_lm (T) on `sources` c_lm (T) in a `ball`; exact."""
-    force = np.zeros(3)
-    for axis in range(3):
-        slope = gradient_coefficients(incident, axis)
-        size = min(len(slope), len(sources))
-        products = np.real(slope[:size, :size] * sources[:size, :size])
-        force[axis] = 2 * products.sum() - products[:, 0].sum()  # over positive and negative m
-    return -FOUR_PI * ball.radius**2 / MU_0 * force
+    """Force (..., 3) N of the `incident` field a_lm (T) on `sources` c_lm (T) in a `ball`, [..., l, m]; exact."""
+    slopes = gradient_coefficients(incident)
+    size = min(slopes.shape[-1], sources.shape[-1])
+    twice = np.where(np.arange(size), 2.0, 1.0)  # over positive and negative m
+    force = np.einsum("...klm,...lm->...k", slopes[..., :size, :size], sources[..., :size, :size] * twice).real
+    return np.asarray(-FOUR_PI * ball.radius**2 / MU_0 * force)
 
 
 def multipole_torque(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
@@ -319,8 +322,8 @@ class BallField:
         field, gradient = evaluate(ball.center + ball.radius * normals)
         known = [field.T, np.array([gradient[:, i, j] for i, j in UPPER])]
         incident = _by_normal_field(np.sum(field * normals, axis=1), self.degree, MORE)
-        parts = [-gradient_coefficients(incident, axis) for axis in range(3)]
-        slopes = [gradient_coefficients(parts[i], j) / ball.radius for i, j in UPPER]
+        parts = -gradient_coefficients(incident)
+        slopes = gradient_coefficients(parts)[tuple(np.transpose(UPPER))] / ball.radius
         weights = [
             np.array([real_weights(one) for one in group]) * kept
             for group, kept in zip((parts, slopes), self._kept, strict=True)

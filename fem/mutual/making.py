@@ -23,12 +23,9 @@ from . import response
 from .response import ChargeResponse
 from .table import (
     MANY,
-    OF_RETURN,
-    OF_SPHERE,
     PARALLEL,
     POWERS,
     RETURNED,
-    EnergySum,
     MutualTable,
     ResponseGrid,
     effort,
@@ -48,7 +45,8 @@ SMALL, FEW_WEIGHTS = 1e-9, 500
 PENALTY, FREE, FEW, ENOUGH = 1e-3, 1e-6, 1e-2, 15
 # Points along an edge where there are several magnets: between the samples of some hundred places more run wild
 MOST = 8
-CHUNK = 512  # rows of equations at once: all would take hundreds of megabytes
+# Rows of equations at once, and places beside all points: all would take hundreds of megabytes
+CHUNK, BESIDE = 512, 128
 # Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
 SINGLE = 250
 GAPS = (0.03, 0.08, 0.16, 0.5, 1.5)  # at which both are compared, in floater radii
@@ -118,7 +116,7 @@ OBLIQUE = (
 EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
 # Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, of two whose
 # points have weights of their own, and of others
-SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
+SAMPLES = np.array([[30, 0], [60, 90], [60, 90]])
 
 
 def mutual_table(
@@ -314,14 +312,15 @@ def sphere_fit(
     """
     energy, force, energy_size, force_size = samples
 
-    def scaled(value: Array, slope: Array, _: Array) -> Array:
-        by_place = np.moveaxis(slope[..., :3], -1, 0)
-        return np.concatenate([value / energy_size, *(by_place / force_size)], axis=-1)
+    def of_points(direction: Array, field: Array, change: Array) -> Array:
+        return -np.concatenate([(field @ direction)[..., None], direction @ change], axis=-1)
 
-    pairs = list(combinations(range(len(grids)), 2))
+    pairs, still = list(combinations(range(len(grids)), 2)), np.zeros_like(places)
     sums = [pair_sum(grids[a], grids[b], images, effort(len(grids)).charges) for a, b in pairs]
-    right = scaled(energy, -force, force)
-    found, weights = _fitted(grids, single, OF_SPHERE, sums, places, 1, scaled, right, PENALTY)
+    derivatives = [one.derivatives(places, still, 1) for one in sums]
+    others = [np.column_stack([value, slope[:, :3]]) for value, slope, _ in derivatives]
+    right, sizes = np.column_stack([energy, -force]), np.column_stack([energy_size, *[force_size] * 3])
+    found, weights = _fitted(grids, single, POWERS, places, of_points, others, right, sizes, PENALTY)
     coupled = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         coupled[a, b] = coupled[b, a] = weight
@@ -343,18 +342,20 @@ def returned_fit(
     m.
     """
     field, change = samples
-    sizes = np.linalg.norm(field, axis=1)[:, None], np.linalg.norm(change, axis=(1, 2))[:, None, None]
 
-    def scaled(_: Array, slope: Array, second: Array) -> Array:
-        first, second = slope[..., 3:] / sizes[0], second[..., 3:, :3] / sizes[1]
-        rows = first.shape[:-2]
-        return np.concatenate([first.reshape(*rows, -1), second.reshape(*rows, -1)], axis=-1)
+    def rows(field: Array, change: Array) -> Array:
+        # the energy is -M·V
+        return -np.concatenate([field, change.reshape(*change.shape[:-2], 9)], axis=-1)
 
-    pairs = list(permutations(range(len(grids)), 2))
+    pairs, still = list(permutations(range(len(grids)), 2)), np.zeros_like(places)
     sums = [mixed_sum(grids[a], inner[b], images, effort(len(grids)).reflected) for a, b in pairs]
-    # the energy is -M·V
-    right = -np.concatenate([(field / sizes[0]).ravel(), (change / sizes[1]).ravel()])
-    found, weights = _fitted(grids, single, OF_RETURN, sums, places, 2, scaled, right, 10 * PENALTY)
+    derivatives = [one.derivatives(places, still) for one in sums]
+    others = [-rows(slope[:, 3:], second[:, 3:, :3]) for _, slope, second in derivatives]
+    right, each = rows(field, change), (np.linalg.norm(field, axis=1), np.linalg.norm(change, axis=(1, 2)))
+    sizes = np.repeat(np.column_stack(each), (3, 9), axis=1)
+    found, weights = _fitted(
+        grids, single, RETURNED, places, lambda _, *known: rows(*known), others, right, sizes, 10 * PENALTY
+    )
     mixed = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         mixed[a, b] = weight
@@ -364,36 +365,43 @@ def returned_fit(
 def _fitted(
     grids: Sequence[ResponseGrid],
     single: bool,
-    numbers: range,
-    sums: Sequence[EnergySum],
+    powers: Sequence[int],
     places: Array,
-    order: int,
-    scaled: Callable[[Array, Array, Array], Array],
+    of_points: Callable[[Array, Array, Array], Array],
+    others: Sequence[Array],
     right: Array,
+    sizes: Array,
     cost: float,
 ) -> tuple[list[Array], Array]:
-    """Some `numbers` of the points (n, powers, 2) of each grid, and weights (k,) of sums.
+    """Weights of the points' powers (n, powers, 2) of each grid, and those (k,) of what `others` (k, m, rows) do.
 
-    `scaled` makes the equations' columns (..., rows) of the energies' derivatives up to an `order`; it is linear in
-    them. `right` is what they shall give.
+    `of_points` makes of the direction (3,) of a magnet's remanence and of what `ResponseGrid.fields` gives at `places`
+    (m, 3) m what each point does (n, m, rows). `right` (m, rows) is what they shall do, and counts by `sizes`.
     """
-    columns, small, kinds, still = list[Array](), list[Array](), list[Array](), np.zeros_like(places)
+    small, kinds, blocks = list[Array](), list[tuple[Array, int]](), list[Array]()
     for grid in grids:
         kind = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
         kind = kind[:, : None if grid.axis.any() else 0]
-        alone = np.eye(len(kind))[:, : None if single and kind.size else 0]
-        kinds.append(np.concatenate([kind, alone], axis=1))
-        for k in numbers:
-            rows = scaled(*grid.energy(np.eye(13)[k]).derivatives(places, still, order, apart=True))
-            columns.append(np.concatenate([kind.T @ rows, rows[: alone.shape[1]]]))
-            small.append(np.arange(kinds[-1].shape[1]) >= kind.shape[1])
-    for one in sums:
-        columns.append(scaled(*one.derivatives(places, still, order))[None])
-        small.append(np.zeros(1, bool))
-    found = least_squares(np.concatenate(columns).T, right, np.concatenate(small), cost)
-    parts = iter(np.split(found, np.cumsum([len(column) for column in columns])[:-1]))
-    each = [np.stack([kind @ next(parts) for _ in numbers], axis=1).reshape(len(kind), -1, 2) for kind in kinds]
-    return each, np.array([float(part[0]) for part in parts])
+        alone = len(kind) if single and kind.size else 0
+        kinds.append((kind, alone))
+        small += [np.repeat([False, True], (kind.shape[1], alone))] * (2 * len(powers))
+    for start in range(0, len(places), BESIDE):
+        here, columns = slice(start, start + BESIDE), list[Array]()
+        for grid, (kind, alone) in zip(grids, kinds, strict=True):
+            for field, change in grid.fields(powers, places[here]):
+                done = of_points(grid.box.rotation @ grid.axis, field, change) / sizes[here]
+                rows = done.reshape(len(kind), -1)
+                columns += [kind.T @ rows, rows[:alone]]
+        blocks.append(np.concatenate([*columns, *((one[here] / sizes[here]).reshape(1, -1) for one in others)]))
+    small.append(np.zeros(len(others), bool))
+    found = least_squares(np.concatenate(blocks, axis=1).T, (right / sizes).ravel(), np.concatenate(small), cost)
+    *parts, weights = np.split(found, np.cumsum([len(some) for some in small])[:-1])
+    each = []
+    for k, (kind, alone) in enumerate(kinds):
+        whole = np.concatenate([kind, np.eye(len(kind))[:, :alone]], axis=1)
+        mine = parts[2 * len(powers) * k : 2 * len(powers) * (k + 1)]
+        each.append(np.stack([whole @ part for part in mine], axis=1).reshape(len(kind), -1, 2))
+    return each, weights
 
 
 def classes(grid: ResponseGrid, mirrored: bool) -> Array:

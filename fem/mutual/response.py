@@ -454,14 +454,13 @@ def returned_samples(
         ball = Ball(place, floater.radius)
         degree = min(enough_degree(rotor.magnets, ball, effort(len(rotor.magnets)).degrees), MOST_RETURNED)
         own = rotor.own_field(ball, degree)
-        back, slope = point_response(grids, inner, coupling, high(own), ball), []
-        for unit in np.eye(3):
-            moment = interior.dipole_sources(unit, ball, degree)
-            answer = point_response(grids, inner, coupling, moment, ball)
-            pairs = (answer, high(own)), (back, moment), (own, high(answer))
-            slope.append(np.sum([interior.multipole_force(*pair, ball) for pair in pairs], axis=0))
+        moments = [interior.dipole_sources(unit, ball, degree) for unit in np.eye(3)]
+        sources = np.stack([high(own), *moments])
+        back, *answers = point_response(grids, inner, coupling, sources, ball)
         fields.append(interior.field_at_center(back))
-        slopes.append(slope)
+        incident = np.stack([*answers, *[back] * 3, *[own] * 3])
+        felt = np.stack([*[sources[0]] * 3, *moments, *(high(answer) for answer in answers)])
+        slopes.append(interior.multipole_force(incident, felt, ball).reshape(3, 3, 3).sum(axis=0))
     return np.array(fields), np.array(slopes)
 
 
@@ -470,13 +469,15 @@ def point_response(
 ) -> Coefficients:
     """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball.
 
-    `sources` are c_lm (T) in the `ball`. `grids` are of the magnets; `inner` (k, 3) m and `coupling` (3k, 3k) A m²/T
-    are for the magnets as a whole.
+    `sources` c_lm (T) in the `ball` are [k, l, m], as the answers to them. `grids` are of the magnets; `inner` (n, 3) m
+    and `coupling` (3n, 3n) A m²/T are for the magnets as a whole.
     """
     places = np.concatenate([*(grid.places for grid in grids), inner])
-    fields = outer_sums([-derivative(sources, axis) for axis in range(3)], (places - ball.center) / ball.radius)
-    *seen, whole = np.split(fields, np.cumsum([len(grid.points) for grid in grids]))
+    potentials = np.stack([-derivative(sources, axis) for axis in range(3)], axis=1)
+    fields = outer_sums([*np.concatenate(potentials)], (places - ball.center) / ball.radius)
+    by_source = fields.reshape(len(places), -1, 3).swapaxes(0, 1)
+    *seen, whole = np.split(by_source, np.cumsum([len(grid.points) for grid in grids]), axis=1)
     frames = [grid.box.rotation for grid in grids]
     moments = [(b @ r * grid.strengths) @ r.T for grid, r, b in zip(grids, frames, seen, strict=True)]
-    moments.append((coupling @ whole.ravel()).reshape(-1, 3))
-    return interior.from_magnetization(places, MU_0 * np.concatenate(moments), ball, len(sources) - 1)
+    moments.append((whole.reshape(len(sources), -1) @ coupling.T).reshape(whole.shape))
+    return interior.from_magnetization(places, MU_0 * np.concatenate(moments, axis=1), ball, sources.shape[-1] - 1)

@@ -12,7 +12,7 @@ J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 4.4 and 5.11; 
 Electricity (3rd ed. 1968), section 5.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from itertools import permutations, product
@@ -37,7 +37,6 @@ UNIT = MU_0 / FOUR_PI
 IN_SPHERE, IN_CIRCLE = 0.64, 0.8
 # p of the sphere's energy: two dipoles' begin with p = 4, those of degree 2; and q, about that of three dipoles
 POWERS, RETURNED = (4, 5, 6), (5, 6)
-OF_SPHERE, OF_RETURN = range(3, 9), range(9, 13)  # among a point's `numbers`: v and w of each p; s and t of each q
 # Second derivatives over place and moment that are computed; they are symmetric
 ENTRIES = [(a, b) for a in range(6) for b in range(a, 6)]
 WHERE = np.array([[ENTRIES.index((min(a, b), max(a, b))) for b in range(6)] for a in range(6)])
@@ -207,29 +206,25 @@ class EnergySum:
         exact = np.where(np.abs(self.axes.T) < 1e-15, 0.0, self.axes.T)
         return [hy.sum([float(r) * v for r, v in zip(row, vector, strict=True) if r]) for row in exact]
 
-    def derivatives(
-        self, places: Array, moments: Array, order: int = 2, apart: bool = False
-    ) -> tuple[Array, Array, Array]:
+    def derivatives(self, places: Array, moments: Array, order: int = 2) -> tuple[Array, Array, Array]:
         """The energy and its first and second derivatives by place (m) and moment (A m²), in this order.
 
-        J and its derivatives (m,), (m, 6) and (m, 6, 6) at `places` (m, 3) m of `moments` (m, 3) A m², rotor's frame;
-        of every row `apart` (n, m), (n, m, 6) and (n, m, 6, 6). With the `order` 1 the second ones are zero.
+        J and its derivatives (m,), (m, 6) and (m, 6, 6) at `places` (m, 3) m of `moments` (m, 3) A m², rotor's frame.
+        With the `order` 1 the second ones are zero.
         """
         free = np.concatenate([(places - self.origin) @ self.axes, moments @ self.axes], axis=1)
         kernel, (count, width) = _kernel(self.formula, self.rows.shape[1], order), self.rows.shape
-        sums = np.zeros((7 + len(ENTRIES) * (order > 1), len(places), count if apart else 1))
+        sums = np.zeros((7 + len(ENTRIES) * (order > 1), len(places)))
         step = max(1, EVALUATIONS // max(count, 1))
         for start in range(0, len(places) if count else 0, step):
             some = free[start : start + step]
             given = np.empty((6 + width, len(some), count))
             given[:6], given[6:] = some.T[:, :, None], self.rows.T[:, None]
             found = kernel(given.reshape(6 + width, -1)).reshape(-1, len(some), count)
-            sums[:, start : start + step] = found if apart else found.sum(axis=2, keepdims=True)
+            sums[:, start : start + step] = found.sum(axis=2)
         turn = np.kron(np.eye(2), self.axes)
-        energy, slope, second = sums[0].T, sums[1:7].T @ turn.T, np.zeros(1)
-        if order > 1:
-            second = turn @ sums[7:].T[..., WHERE] @ turn.T
-        return (energy, slope, second) if apart else (energy[0], slope[0], second[0])
+        second = turn @ sums[7:].T[..., WHERE] @ turn.T if order > 1 else np.zeros(1)
+        return sums[0], sums[1:7].T @ turn.T, second
 
 
 @cache
@@ -296,10 +291,27 @@ class ResponseGrid:
         """(n, 13) of each point: λ (3), v and w of three powers, s and t of two."""
         return np.concatenate([self.strengths, *(w.reshape(len(w), -1) for w in (self.degrees, self.returned))], axis=1)
 
-    def energy(self, numbers: Array) -> EnergySum:
-        """Of the points with some `numbers` (n, 13) or (13,)."""
-        each = [np.broadcast_to(part, (len(self.points), np.shape(part)[-1])) for part in (numbers, self.axis)]
-        rows = np.concatenate([self.points, *each, np.full((len(self.points), 1), self.radius)], axis=1)
+    def fields(self, powers: Sequence[int], places: Array) -> Iterator[tuple[Array, Array]]:
+        """For each of the `powers` q what `point_energy` weighs in V: (R/d)^2q ĵ, and (R/d)^2q (ĵ·d) d/d².
+
+        Of all points at `places` (m, 3) m, rotor's frame: (n, m, 3), and by the place (n, m, 3, 3) 1/m. Their part
+        along ĵ is what it weighs in u.
+        """
+        turn, axis = self.box.rotation, self.box.rotation @ self.axis
+        away = (places - self.box.center) - (self.points @ turn.T)[:, None]
+        inverse, axial = 1 / np.sum(away**2, axis=-1)[..., None], (away @ axis)[..., None]
+        steep = away[..., :, None] * axis + axial[..., None] * np.eye(3)
+        for q in powers:
+            size = (self.radius**2 * inverse) ** q
+            upright, turned, fall = size * axis, size * axial * inverse * away, -2 * inverse * away
+            yield upright, upright[..., :, None] * (q * fall)[..., None, :]
+            slope = turned[..., :, None] * ((q + 1) * fall)[..., None, :]
+            yield turned, slope + (size * inverse)[..., None] * steep
+
+    def energy(self) -> EnergySum:
+        """Of all points."""
+        same = np.broadcast_to([*self.axis, self.radius], (len(self.points), 4))
+        rows = np.concatenate([self.points, self.numbers, same], axis=1)
         return EnergySum(point_energy, rows, self.box.center, self.box.rotation)
 
 
@@ -374,7 +386,7 @@ class MutualTable:
     @cached_property
     def _sums(self) -> list[EnergySum]:
         """Whose sum is the energy of the moment M."""
-        taken, sums = effort(len(self.grids)), [grid.energy(grid.numbers) for grid in self.grids]
+        taken, sums = effort(len(self.grids)), [grid.energy() for grid in self.grids]
         number = round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
         inner = [grid.inner(number) for grid in self.grids]
         if self.coupling.any():
