@@ -12,10 +12,11 @@ solving again.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache, partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import ngsolve
 import numpy as np
@@ -69,10 +70,19 @@ class CurrentSpace:
     cells: int
 
     def couplings(self, sources: Sequence[Source]) -> list[Array]:
-        """b (sources, states) of each parity class."""
+        """b (sources, states) of each parity class; of a source that is still there they are remembered."""
+        if new := [source for source in sources if source not in self._known]:
+            images = source_images(self.parity, self.points, new)
+            self._known.update(zip(new, np.concatenate(self.of_images(images), axis=1), strict=True))
+        ends = np.cumsum([len(field) for field in self.fields])
+        whole = np.array([self._known[source] for source in sources]).reshape(len(sources), ends[-1])
+        return np.split(whole, ends[:-1], axis=1)
+
+    def of_images(self, images: Iterable[Array]) -> list[Array]:
+        """`couplings` of sources by their `source_images` at the points."""
         weighted = [field * self.root for field in self.fields]
         found: list[list[Array]] = [[np.zeros((0, len(field)))] for field in weighted]
-        for part in source_images(self.parity, self.points, sources):
+        for part in images:
             for rows, image, states in zip(found, part, weighted, strict=True):
                 rows.append(image.reshape(len(image), -1) @ states.T)
         return [np.concatenate(rows) for rows in found]
@@ -80,6 +90,10 @@ class CurrentSpace:
     def dipole_couplings(self, places: Array) -> list[Array]:
         """`couplings` of three unit dipoles at each of `places` (n, 3) m; all rotors ask for those of the same."""
         return self._of_dipoles(np.ascontiguousarray(places, float).tobytes())
+
+    @cached_property
+    def _known(self) -> WeakKeyDictionary[Source, Array]:
+        return WeakKeyDictionary()
 
     @cached_property
     def _of_dipoles(self) -> Callable[[bytes], list[Array]]:
@@ -434,7 +448,7 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     images = np.concatenate(list(source_images(space.parity, space.points, sources)), axis=1)
     amplitudes, rest = _fitted(space, solution.probes[standing], images)
     stands, tested = np.repeat(standing, 3), np.repeat(inside, 3)
-    driving, testing = space.couplings(sources), space.dipole_couplings(solution.probes[inside])
+    driving, testing = space.of_images([images]), space.dipole_couplings(solution.probes[inside])
     worst = 0.0
     for omega, residuals in zip(solution.angular_frequencies, solution.residuals, strict=True):
         left = np.sqrt(np.sum(amplitudes @ residuals[np.ix_(stands, stands)].real * amplitudes, axis=1)) + rest

@@ -14,7 +14,7 @@ geometrically.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
@@ -37,18 +37,19 @@ DOWN = np.array([0.0, 0.0, -1.0])
 FAR, FAR_DEGREE = 2.5, 18
 CLOSEST = 0.1  # Clearance of the plate, in radii of a round magnet, for which its moments are made at least
 LEFT_OUT = 1e-7  # Share of the rotor's field at the plate that is left out where no tolerance says another
+UNNOTICED = 1e-3  # The same, of a table's tolerance
 SHARE_PART = 0.1  # Share of a table's tolerance for the series of the rotor's signals
-UNNOTICED = 1e-2  # Share of the series' tolerance for degrees of the rotor's multipoles that are left out
-MOST_TERMS = 15  # Highest number of harmonics, and of points along the way
-TOGETHER = 12  # Places whose signals are computed at once
+MOST_TERMS = 16  # Highest number of harmonics, and of points along the way
+# Angles of a turn and depths of the plate at first, at which networks are trained too, with probes between them; and
+# the fewest angles at further depths
+ANGLES, DEPTHS_FIRST, FEWEST = 8, 5, 4
+TOGETHER = 32  # Places whose signals are computed at once
 NOISE = 1e-10  # Amplitudes below this share of the largest signal are what symmetry forbids
 # Share of a table's tolerance for the sum of what left-out harmonics have in the field of the rotor's currents or in
 # its gradient, at any place and frequency of the table; with SHARE_PART it stays below the tolerance.
 MISSED = 0.3
 # Places in the region, and depths of a plate that is lowered, where the field of the rotor's currents is looked at.
 POINTS, DEPTHS = (3, 3, 3), 7
-# Networks are trained with the rotor at so many angles of a turn and depths of the plate; probes lie between them.
-TRAINED_ANGLES, TRAINED_DEPTHS = 8, 5
 INNER = 0.25  # Part of a magnet's edges about its centre in which dipoles stand for it
 
 
@@ -129,19 +130,33 @@ def _nearest(place: Array, plate: Plate) -> float:
     return min(float(plate.body.distance(circle - depth * DOWN).min()) for depth in np.linspace(0.0, plate.way, 25))
 
 
-def turning_rotor(plate: Plate, rotor: RotorTable) -> OtherSources:
-    """The rotor at some angles and depths of the plate, to train and to probe a network with."""
-    parts = rotor_parts(rotor, plate)
-    way = plate.way
-    depths = way * (1 - np.cos(np.pi * np.arange(TRAINED_DEPTHS) / (TRAINED_DEPTHS - 1))) / 2 if way else np.zeros(1)
-    angles = 2 * np.pi * np.arange(TRAINED_ANGLES) / TRAINED_ANGLES
-    training = [posed_rotor(parts, plate, angle, depth) for depth in depths for angle in angles]
-    between = (depths[1:] + depths[:-1]) / 2 if way else depths
-    probes = [posed_rotor(parts, plate, angle + angles[1] / 2, depth) for depth in between for angle in angles[:3]]
-    centers = np.array([magnet.box.center for magnet in rotor.magnets])
-    if not parts:  # a rotor without a field
-        training, probes = [], []
-    return OtherSources(training, probes, plate.box.to_body(centers))
+class TurningRotor:
+    """A rotor beside a `plate` as a source at all angles (rad) and depths (m) of the plate, the same one each time."""
+
+    def __init__(self, plate: Plate, rotor: RotorTable, left_out: float = LEFT_OUT) -> None:
+        """`left_out` as of `rotor_parts`."""
+        self.plate, self._rotor, parts = plate, rotor, rotor_parts(rotor, plate, left_out)
+        self.at = cache(partial(posed_rotor, parts, plate))
+        self._driving = bool(parts)  # a rotor without a field does not
+
+    def depths(self, number: int) -> Array:
+        """A `number` of depths on the plate's way, m: Chebyshev's, the ends among them."""
+        return self.plate.way * (1 + np.cos(np.pi * np.arange(number) / max(number - 1, 1))) / 2
+
+    def others(self) -> OtherSources:
+        """At some angles and depths, to train and to probe a network with."""
+        depths = self.depths(DEPTHS_FIRST if self.plate.way else 1)
+        angles = _angles(ANGLES)
+        training = [self.at(angle, depth) for depth in depths.tolist() for angle in angles]
+        between = ((depths[1:] + depths[:-1]) / 2 if self.plate.way else depths).tolist()
+        probes = [self.at(angle + angles[1] / 2, depth) for depth in between for angle in angles[:3]]
+        places = self.plate.box.to_body(np.array([magnet.box.center for magnet in self._rotor.magnets]))
+        return OtherSources(training, probes, places) if self._driving else OtherSources((), (), places)
+
+
+def _angles(number: int) -> list[float]:
+    """Of a turn, rad."""
+    return [2 * np.pi * k / number for k in range(number)]
 
 
 def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
@@ -156,58 +171,73 @@ def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
     return Region(body.min(axis=0), body.max(axis=0))
 
 
-def rotor_share(
-    network: PassiveNetwork, plate: Plate, rotor: RotorTable, tolerance: float, watch: Watch = unwatched
-) -> RotorShare:
-    """Signals of a rotor for the pose and the way of `plate`.
+def rotor_share(network: PassiveNetwork, rotor: TurningRotor, tolerance: float, watch: Watch = unwatched) -> RotorShare:
+    """Signals of a rotor for the pose and the way of its plate.
 
     Raises AccuracyError: the tolerance is not met with the most terms. `network`: of a plate of the same size and
     conductivity, or of what stands for it; `tolerance`: for the estimated error; harmonics and depths are added until
     it is met; `watch`: progress callback.
     """
-    parts, distance = rotor_parts(rotor, plate, UNNOTICED * tolerance), plate.way
-    cached: dict[tuple[float, float], Array] = {}
+    distance, cached = rotor.plate.way, dict[tuple[float, float], Array]()
 
-    def signals(depths: Array, angles: Array) -> Array:
+    def signals(depths: Array, angles: Sequence[float]) -> Array:
         """(depths × angles, states) at depths (m) and angles (rad); each is computed once."""
-        places = [(float(depth), float(angle)) for depth in depths for angle in angles]
+        places = [(angle, depth) for depth in depths.tolist() for angle in angles]
         new = [place for place in places if place not in cached]
         groups = [new[first : first + TOGETHER] for first in range(0, len(new), TOGETHER)]
         for some in watched(groups, watch, f"rotor's field in the plate, {len(new)} positions"):
-            sources = [posed_rotor(parts, plate, angle, depth) for depth, angle in some]
-            cached.update(zip(some, network.couplings(sources), strict=True))
+            cached.update(zip(some, network.couplings([rotor.at(*place) for place in some]), strict=True))
         return np.array([cached[place] for place in places])
 
-    angles, depths = 12, 5 if distance else 1
-    while True:
-        nodes = np.cos(np.pi * np.arange(depths) / max(depths - 1, 1))
-        turns = 2 * np.pi * np.arange(angles) / angles
-        samples = signals(distance * (1 + nodes) / 2, turns).reshape(depths, angles, -1)
-        fourier = np.linalg.pinv(turn_harmonics(turns, angles - 1))
+    def series_of(angles: int, depths: int) -> tuple[Array, float]:
+        """Series (angles - 1, states, depths), and the largest signal."""
+        nodes, turns = np.cos(np.pi * np.arange(depths) / max(depths - 1, 1)), _angles(angles)
+        samples = signals(rotor.depths(depths), turns).reshape(depths, angles, -1)
+        fourier = np.linalg.pinv(turn_harmonics(np.array(turns), angles - 1))
         chebyshev = np.linalg.inv(np.polynomial.chebyshev.chebvander(nodes, depths - 1))
-        series = np.einsum("ha,kn,nas->hsk", fourier, chebyshev, samples, optimize=True)
-        size = np.abs(samples).max()
-        if not size:  # a rotor without a field
-            return RotorShare(distance, series[:3, :, :1] * 0.0, 0.0)
-        by_angle = float(np.abs(series[-4:]).max() / size)  # of two harmonics: symmetry may forbid one
-        by_depth = float(np.abs(series[..., -1]).max() / size) if distance else 0.0
-        if max(by_angle, by_depth) <= tolerance / 2:
-            break
-        if max(angles // 2, depths) > MOST_TERMS:
+        return np.einsum("ha,kn,nas->hsk", fourier, chebyshev, samples, optimize=True), float(np.abs(samples).max())
+
+    def more(terms: int, missed: float) -> bool:
+        """Whether what is missed is too much. Raises AccuracyError: there are so many `terms` that it ends here."""
+        if missed <= tolerance / 2:
+            return False
+        if terms > MOST_TERMS:
             raise AccuracyError(
-                f"Input tolerance must be at least {by_angle + by_depth:.1e} for this rotor and this way; instead "
-                f"received {tolerance:.1e}."
+                f"Input tolerance must be at least {missed:.1e} for this rotor and this way; instead received "
+                f"{tolerance:.1e}."
             )
-        angles *= 1 + (by_angle > tolerance / 2)  # so that none is computed twice
-        depths += (depths - 1) * (by_depth > tolerance / 2)
+        return True
+
+    # each grows so that none is computed twice
+    angles, depths = ANGLES, DEPTHS_FIRST if distance else 1
+    series, size = series_of(angles, depths)
+    if not size:  # a rotor without a field
+        return RotorShare(distance, series[:3, :, :1] * 0.0, 0.0)
+    # of two harmonics: symmetry may forbid one
+    while more(angles // 2, by_angle := float(np.abs(series[-4:]).max() / size)):
+        angles *= 2
+        series, size = series_of(angles, depths)
+    # At further depths so many angles do that what they take for lower harmonics is half of the tolerance.
+    turning, few = _left_out(np.abs(series).sum(axis=2).max(axis=1) / size), FEWEST
+    while few < angles and turning[few - 1] > tolerance / 2:
+        few *= 2
+    aliased, (series, size) = float(turning[few - 1]), series_of(few, depths)
+    while more(depths, by_depth := float(np.abs(series[..., -1]).max() / size) if distance else 0.0):
+        depths += depths - 1
+        series, size = series_of(few, depths)
     # The highest harmonics go, and the highest polynomials, whose sums no signal misses by more than half of the
     # tolerance.
     sizes = np.abs(series).sum(axis=2).max(axis=1), np.abs(series).sum(axis=0).max(axis=0)
-    turning, going = (np.append(np.cumsum(part[::-1])[::-1] / size, [0.0, 0.0]) for part in sizes)
+    turning, going = (_left_out(part / size) for part in sizes)
     kept = max(3, int(np.argmax(turning <= tolerance / 2)) | 1)
     powers = max(1, int(np.argmax(going <= tolerance / 2)))
     part = np.where(np.abs(series) < NOISE * size, 0.0, series)[:kept, :, :powers]
-    return RotorShare(distance, part, by_angle + by_depth + float(turning[kept] + going[powers]))
+    return RotorShare(distance, part, by_angle + aliased + by_depth + float(turning[kept] + going[powers]))
+
+
+def _left_out(sizes: Array) -> Array:
+    """Sums (n + 2,) of sizes (n,) from each on."""
+    return np.append(np.cumsum(sizes[::-1])[::-1], [0.0, 0.0])
 
 
 def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:

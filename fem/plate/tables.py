@@ -26,11 +26,12 @@ from .network import CONDUCTOR, NETWORK_SHARE, PassiveNetwork, Reduction, checke
 from .rotor_share import (
     MISSED,
     SHARE_PART,
+    UNNOTICED,
+    TurningRotor,
     posed_rotor,
     rotor_box,
     rotor_parts,
     rotor_share,
-    turning_rotor,
     without_high_harmonics,
 )
 from .slab import rotor_reach, slab_frame
@@ -98,12 +99,12 @@ class PlateAround:
         """
         conductor = "this plate, taken as an infinite slab, and this place of the floater" if self.slab else CONDUCTOR
         network, table = _reduced_table(self._reduction(solve, watch), self.rtol, conductor, watch)
-        share = rotor_share(network, _seen(self.plate, self.slab), self.rotor, SHARE_PART * self.rtol, watch)
+        share = rotor_share(network, self._turning, SHARE_PART * self.rtol, watch)
         return table, without_high_harmonics(share, table, MISSED * self.rtol)
 
     def _reduction(self, solve: Callable[..., PlateSolution], watch: Watch) -> Reduction:
         plate, rotor, region, frequencies, rtol = self.plate, self.rotor, self.region, self.frequencies, self.rtol
-        others = turning_rotor(_seen(plate, self.slab), rotor)
+        others = self._turning.others()
         if self.slab:
             far = rotor_reach(plate, rotor, slab_frame(plate, region))
             return from_slab(plate, region, frequencies, rtol, others, far)
@@ -130,6 +131,10 @@ class PlateAround:
         return SLAB if self.slab else DRIVEN
 
     @cached_property
+    def _turning(self) -> TurningRotor:
+        return TurningRotor(_seen(self.plate, self.slab), self.rotor, UNNOTICED * self.rtol)
+
+    @cached_property
     def key(self) -> str:
         return self._kind.key(*self.deciding)
 
@@ -149,8 +154,8 @@ class PlateAround:
         return CHANGED.cached((self.key, more), lambda: (self._changed(known, others, report), 0.0), report)[0][0]
 
     def _changed(self, known: Both, others: Sequence[tuple[Plate, RotorTable]], report: Report) -> Array:
-        reduced, (table, share) = self._reduction(partial(cached_currents, report=report), unwatched), known
-        network = reduced(0.0)
+        reduced = self._reduction(partial(cached_currents, report=report), unwatched)
+        network, (table, share) = reduced(0.0), known
         if network.rates.shape != table.rates.shape:
             network = _reduced_table(reduced, self.rtol, CONDUCTOR, unwatched)[0]
         angles = 2 * np.pi * np.arange(SEEN) / SEEN

@@ -18,7 +18,7 @@ from spinlev.fem.plate.currents import (
     train,
 )
 from spinlev.fem.plate.eddy import MESH_SHARE, EddySpace, Ladder, solve_eddy
-from spinlev.fem.plate.rotor_share import rotor_box, turning_rotor
+from spinlev.fem.plate.rotor_share import TurningRotor, rotor_box
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import PlateAround
 from spinlev.fem.rotor.choice import rotor_table
@@ -71,7 +71,7 @@ def test_what_residuals_bound_is_no_larger(space, frequency):
 @pytest.mark.parametrize("rotor", ROTORS, ids=["of the box", "beyond the box"])
 def test_the_bound_for_a_rotor_that_was_not_trained_holds(solution, rotor):
     """Its field in the region against the complex solution on the same elements, at the highest frequency."""
-    probes = turning_rotor(PLATE, rotor).probes
+    probes = TurningRotor(PLATE, rotor).others().probes
     stated = error_of(solution, probes)
     places = solution.probes[solution.boxes[0].contains(solution.probes)]
     corners = np.concatenate([box.grid((2, 2, 2), fold=(0, 1, 2)) for box in solution.boxes])

@@ -11,7 +11,7 @@ from spinlev.fem.cache import TableFileError
 from spinlev.fem.closed_forms.potentials import unit_dipoles
 from spinlev.fem.plate.currents import OtherSources, solve_currents
 from spinlev.fem.plate.network import from_elements
-from spinlev.fem.plate.rotor_share import posed_rotor, rotor_parts, rotor_share, without_high_harmonics
+from spinlev.fem.plate.rotor_share import TurningRotor, posed_rotor, rotor_parts, rotor_share, without_high_harmonics
 from spinlev.fem.plate.table import Region
 from spinlev.fem.plate.tables import (
     PLATE as PLATES,
@@ -108,7 +108,7 @@ def test_compiled_field_functions_are_the_multipoles(table):
 def test_rotor_share_follows_the_turning_rotor(network):
     """Series in angle and depth against the rotor itself, where neither was sampled: the estimated error, 1e-3."""
     rotor = rotor_table(vertical(0.014, 0.01, 1.305, 1.0), "cuboid")
-    share = rotor_share(network, PLATE, rotor, 1e-3)
+    share = rotor_share(network, TurningRotor(PLATE, rotor), 1e-3)
     assert share.error < 1e-3
     angle, depth = 0.7, 0.0123
     source = posed_rotor(rotor_parts(rotor, PLATE), PLATE, angle, depth)
@@ -124,7 +124,7 @@ def test_rotor_share_follows_the_turning_rotor(network):
 def test_harmonics_that_the_floater_does_not_feel_are_left_out(network, table):
     """At an unseen place, depth and frequency the rest misses no more of the force's gradient than is stated."""
     rotor = rotor_table(horizontal(4e-3, 0.01, 1.305, 1.0), "cuboid")
-    share = rotor_share(network, PLATE, rotor, 1e-5)
+    share = rotor_share(network, TurningRotor(PLATE, rotor), 1e-5)
     assert without_high_harmonics(share, table, 0.0).error == share.error
     few = without_high_harmonics(share, table, 1e-2)
     assert 1 < len(few.series) < len(share.series)
