@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from ..dynamics.continuation import frequencies
 from ..dynamics.continuation.branch import BranchPoint
@@ -204,7 +204,7 @@ class Search:
 
     def _begun(self, levitation: Levitation) -> Candidate:
         """The scene itself, or the first of some within the bounds that has an equilibrium."""
-        draws = qmc.Sobol(len(self.keys), seed=SEED).random(DRAWS)
+        draws = scipy.stats.qmc.Sobol(len(self.keys), seed=SEED).random(DRAWS)
         for numbers in [self.first, *(self.low + draws * (self.high - self.low))]:
             try:
                 one = levitation if numbers is self.first else self._levitation(numbers)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from ...geometry.common import MU_0, Array
 from ...geometry.magnets import Magnet
@@ -145,10 +146,8 @@ def _working_point(field: EasyField, number: int) -> WorkingPoint:
 
 def _spread_inside(magnet: Magnet, seed: int) -> Array:
     """2^PER_BATCH evenly spread points in a magnet."""
-    from scipy.stats.qmc import Sobol  # slow to load
-
     body, wanted, found = magnet.body, 2**PER_BATCH, np.zeros((0, 3))
-    draw = Sobol(3, rng=np.random.default_rng(seed))
+    draw = scipy.stats.qmc.Sobol(3, rng=np.random.default_rng(seed))
     while len(found) < wanted:
         local = (2 * draw.random(2 * wanted) - 1) * body.half_edges
         points = body.center + local @ body.rotation.T

@@ -4,10 +4,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy
 import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
-from scipy.stats import binned_statistic
 
 from ...dynamics.continuation.branch import BranchPoint
 from ...dynamics.continuation.frequencies import by_frequency, distance_error, kicked, levitating_branch
@@ -280,7 +280,9 @@ def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, second
     flight = simulate(kicked(there, start, KICK), field, seconds, [])
     lost_at_once = flight.ended_by != "duration" and flight.levitated_s < SHORTEST
     edges, distance = np.linspace(0.0, flight.time[-1], PARTS + 1), -flight.lab.position[:, 2]
-    parts = [binned_statistic(flight.time, distance, kind, edges).statistic for kind in ("min", "mean", "max")]
+    parts = [
+        scipy.stats.binned_statistic(flight.time, distance, kind, edges).statistic for kind in ("min", "mean", "max")
+    ]
     numbers = flight.levitated_s, slow.levitated_s, start.growth_per_s, flight.energy_error
     averaged, kind = np.interp(times, slow.time, slow.distance), SHORT if lost_at_once else flight_kind(flight)
     return *numbers, (edges[1:] + edges[:-1]) / 2, *parts, times, averaged, kind, slow.ended_by

@@ -14,11 +14,11 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
+import scipy
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.special import logsumexp, ndtri
-from scipy.stats import qmc
 
 from ...geometry.common import Array
 from ..figures.style import PALETTE, drawn, panels, styled
@@ -97,7 +97,7 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
 
     The draws are Sobol's sequence of this `seed`.
     """
-    shares = np.clip(qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws), 1e-12, 1 - 1e-12)
+    shares = np.clip(scipy.stats.qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws), 1e-12, 1 - 1e-12)
     pieces = np.array_split(shares, max(1, draws // TOGETHER))
     parts = [log_likelihoods(models, prior_values(part), facts) for part in pieces]
     known = np.stack([np.concatenate([part[name] for part in parts]) for name in facts], axis=1)

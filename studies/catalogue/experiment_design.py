@@ -12,9 +12,9 @@ from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from ...dynamics.continuation.branch import Family, frequencies
 from ...dynamics.continuation.frequencies import UNIT, hanging_distance
@@ -221,7 +221,7 @@ class PosedLosses:
 def design_inputs(kind: str, number: int) -> dict[str, float]:
     """Inputs of one rotor of a design: that number of Sobol's sequence (I. M. Sobol, 1967; scrambled by A. B. Owen)."""
     box = KINDS[kind].box
-    unit = qmc.Sobol(len(box), seed=SEED).random(LONGEST_DESIGN)[number]
+    unit = scipy.stats.qmc.Sobol(len(box), seed=SEED).random(LONGEST_DESIGN)[number]
     return {name: low + (high - low) * float(u) for (name, (low, high)), u in zip(box.items(), unit, strict=True)}
 
 
