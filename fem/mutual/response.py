@@ -459,8 +459,8 @@ def returned_samples(
         back, *answers = point_response(grids, inner, coupling, sources, ball)
         fields.append(interior.field_at_center(back))
         incident = np.stack([*answers, *[back] * 3, *[own] * 3])
-        felt = np.stack([*[sources[0]] * 3, *moments, *(high(answer) for answer in answers)])
-        slopes.append(interior.multipole_force(incident, felt, ball).reshape(3, 3, 3).sum(axis=0))
+        inside = np.stack([*[sources[0]] * 3, *moments, *(high(answer) for answer in answers)])
+        slopes.append(interior.multipole_force(incident, inside, ball).reshape(3, 3, 3).sum(axis=0))
     return np.array(fields), np.array(slopes)
 
 
@@ -469,7 +469,7 @@ def point_response(
 ) -> Coefficients:
     """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball.
 
-    `sources` c_lm (T) in the `ball` are [k, l, m], as the answers to them. `grids` are of the magnets; `inner` (n, 3) m
+    `sources` c_lm (T) in the `ball` are [k, l, m], as what they send back. `grids` are of the magnets; `inner` (n, 3) m
     and `coupling` (3n, 3n) A m²/T are for the magnets as a whole.
     """
     places = np.concatenate([*(grid.places for grid in grids), inner])
