@@ -14,6 +14,8 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
 
 from ...fem.harmonics import interior
 from ...fem.harmonics.expressions import regular_harmonics
@@ -41,8 +43,8 @@ LESS = 3  # degrees by which what they feel in a ball is of a lower one than the
 # Of the dipole's force, one radius off the body: shells of multipoles with less are left out of simulations
 KEPT = 5e-3
 # Size of the multipoles' states by those of the dipole: a step must not be short for their sake, but as short as what
-# they do asks for. A cube takes 28.6 steps a turn at 1, 21.2 at 1e-2, 16.0 at 1e-4, and 15.8 at 1e-6 and below, where
-# velocity and spin alone decide, in which it is shaken four times a turn. Below 1e-4 energy is kept less well.
+# they do asks for. A cube takes 27.8 steps a turn at 1, 20.6 at 1e-2, and 15.9 at 1e-4 and below, where the motion
+# alone decides, in which it is shaken four times a turn. Below 1e-4 other bodies keep their energy less well.
 LITTLE = 1e-4
 ROUND_OFF = 1e-9  # of the moment, below which a rest of it is none
 # Error of the force in a ball by that of the dipole, by the degree of what multipoles feel: a large ball is left for
@@ -185,6 +187,11 @@ class BodyShape:
         return float(left + self.shares[-1] * min(ratio, 1.0) ** 0.5)
 
     @property
+    def _turns(self) -> Array:
+        """(3, k, k) of their states by a unit turn about each of the rotor's axes."""
+        return interior.turns(HIGHEST)[:, self.kept[:, None], self.kept]
+
+    @property
     def _unit(self) -> float:
         """Of the multipoles' states, A m."""
         return strength(self.floater) / self.floater.radius / LITTLE
@@ -192,8 +199,8 @@ class BodyShape:
     def states_at(self, state: State) -> Array:
         axes = state.axes
         assert axes is not None
-        turned = self.sources.turned(axes).multipoles(HIGHEST, self.floater.radius)
-        return np.asarray((turned / interior.sizes(HIGHEST))[self.kept] / self._unit)
+        turn = Rotation.from_matrix(axes).as_rotvec() @ self._turns.swapaxes(0, 1)
+        return np.asarray(expm(turn) @ (self.moments / interior.sizes(HIGHEST))[self.kept] / self._unit)
 
     # Force and torque
 
@@ -204,8 +211,7 @@ class BodyShape:
         if not len(self.kept):  # it is all of it
             return dipole
         states = [hy.expression(f"multipole_{k}") for k in range(len(self.kept))]
-        own = interior.turns(HIGHEST)[:, self.kept[:, None], self.kept]
-        turned = [[_combined(row, states) for row in matrix] for matrix in own]  # (3, k) by a unit turn
+        turned = [[_combined(row, states) for row in matrix] for matrix in self._turns]  # (3, k) by a unit turn
         rates = [dot(motion.lag, [part[k] for part in turned]) for k in range(len(states))]
         shape = self._by_dipoles(motion) if self.ball is None else self._in_ball(motion, states, turned)
         return Added(
