@@ -387,8 +387,7 @@ class JointFlight:
         given = np.zeros((len(time), 2)) if scene.drive else None
         for flight, own in zip(self.flights, self._own, strict=True):
             part = states[:, own]
-            lengths = np.linalg.norm(part[:, 6 : flight.scales.size - 3], axis=1)
-            error = max(error, float(np.abs(lengths - 1).max()))
+            error = max(error, flight.scales.off_unit(part))
             lab = flight.scales.unpack(part).to_lab(angle)
             each.append(lab.moved(*pose) if pose else lab)
             if given is not None:

@@ -13,6 +13,9 @@ along its own axes, those of its principal moments of inertia I.  With its rotat
 
     q̇ = ½ q (Ω - Rᵀ W),                   I Ω̇ = Rᵀ τ - Ω × I Ω.
 
+Where these are equal, as a cube's, trajectories have its spin as a round body's, for Ω × I Ω vanishes, and instead of
+q its moment and a direction ê across it, with ê' = (Ω - W) × ê: 123 instead of 149 products of variables.
+
 Without drag and with gravity along the axis everything is autonomous, and the Jacobi integral
 
     J = v²/2 + i Ω²/2 - i (m T²/I) m̂·B - g·r - W·(r × v + i Ω),   i = I/(M R²)   (unit: M R²/T²)
@@ -43,6 +46,7 @@ from .effect import NOTHING, PARAMETERS, Motion, interaction_of
 from .plate import PlateMemory, memory_terms
 from .state import (
     DRIVEN,
+    HALF,
     STEADY,
     Given,
     Parameter,
@@ -62,6 +66,7 @@ Matrix = list[list[hy.expression]]
 CENTRE = tuple(f"{vector}_{axis}" for vector in ("position", "velocity") for axis in "xyz")
 ROUND_NAMES = tuple(f"{vector}_{axis}" for vector in ("moment", "spin") for axis in "xyz")
 NAMES = (*CENTRE, *ROUND_NAMES)
+EVEN_NAMES = (*ROUND_NAMES[:3], *(f"side_{axis}" for axis in "xyz"), *ROUND_NAMES[3:])
 TURNING_NAMES = (*(f"turn_{part}" for part in "wxyz"), *(f"spin_{axis}" for axis in "xyz"))
 
 
@@ -141,6 +146,27 @@ def turning_attitude(quaternion: Vector, spin: Vector, rate: hy.expression, acro
     )
 
 
+def even_attitude(
+    turn: Vector, halved: Vector, rate: hy.expression, across: Vector, given: Given, frame: Array
+) -> Attitude:
+    """That of a body of equal moments of inertia, from its moment and half a direction across it, `turn` (6,).
+
+    Its spin is `halved` (3,), too; see `Scales` for both and for `frame`, and `turned` for a rate `across` the axis.
+    `given` are the runtime parameters.
+    """
+    moment, half, spin = turn[:3], turn[3:], [s / HALF for s in halved]
+    side, lag = [s / HALF for s in half], lag_of(spin, rate, across)
+    brake = [-given[Parameter.TILT_DRAG] * s for s in spin]
+
+    def rates(torque: Vector) -> list[hy.expression]:
+        own = [HALF * t for t in add(torque, brake)]
+        return [*cross(lag, moment), *cross(lag, half), *subtract(own, turned(halved, rate, across))]
+
+    columns = [side, cross(moment, side), moment]
+    axes = [[dot(row, column) for row in frame.tolist()] for column in zip(*columns, strict=True)]
+    return Attitude(moment, spin, 0.5 * dot(spin, spin), spin, dot(brake, lag), rates, axes)
+
+
 @dataclass(frozen=True, eq=False)
 class Equations:
     """The equations of motion as heyoka expressions."""
@@ -186,18 +212,22 @@ def equations_of_motion(
     driven: bool = False,
     moving: bool = False,
     given: Given = PARAMETERS,
+    frame: Array | None = None,
 ) -> Equations:
     """Rates of the scaled state in the field of a table.
 
     The `table` is the rotor's field, with effects if it is an `Interaction`. `tilted_gravity`: gravity has a part
     across the axis; it turns in this frame, so that time enters. `memory` is of the plate's currents, if they are
     modelled, and `first` the number of the first of their runtime parameters, which are `given`. The rotor's rate
-    changes in time if it is `driven`, and it is moved, too, if it is `moving`.
+    changes in time if it is `driven`, and it is moved, too, if it is `moving`. `frame` is that of `Scales`.
     """
     whole, rotor = interaction_of(table), moved() if moving else DRIVEN if driven else STEADY
-    variables = list(hy.make_vars(*CENTRE, *(TURNING_NAMES if whole.turning else ROUND_NAMES)))
+    names = EVEN_NAMES if frame is not None else TURNING_NAMES if whole.turning else ROUND_NAMES
+    variables = list(hy.make_vars(*CENTRE, *names))
     position, velocity, turn_states, spin_states = variables[:3], variables[3:6], variables[6:-3], variables[-3:]
-    if whole.turning:
+    if frame is not None:
+        attitude = even_attitude(turn_states, spin_states, rotor.rate, rotor.across, given, frame)
+    elif whole.turning:
         attitude = turning_attitude(turn_states, spin_states, rotor.rate, rotor.across, given)
     else:
         attitude = round_attitude(turn_states, spin_states, rotor.rate, rotor.across)

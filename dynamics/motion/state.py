@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
+from ...geometry.scene.floater import frame_about
 
 Vector = Sequence[hy.expression]
 
@@ -186,6 +187,7 @@ def subtract(a: Vector, b: Vector) -> list[hy.expression]:
     return [a[i] - b[i] for i in range(3)]
 
 
+HALF = 0.5  # See `Scales.even`
 WEIGHTLESS = 1e-9  # Gravity, m/s², that sets no unit of time
 
 
@@ -267,6 +269,10 @@ class Scales:
     # direction of the moment along the axes of a body that is not round about it, whose states are a quaternion and the
     # true spin along these axes; None of a round one
     pointing: tuple[float, float, float] | None = None
+    # whether that body's moments of inertia are equal and its states those of a round one with a direction across the
+    # moment. This and the spin have half their size: their terms would decide the length of Taylor's steps, by which
+    # energy would gain nothing
+    even: bool = False
 
     @classmethod
     def of(cls, scene: Scene) -> "Scales":
@@ -281,13 +287,27 @@ class Scales:
     @property
     def size(self) -> int:
         """Number of the floater's own states."""
-        return 12 if self.pointing is None else 13
+        return 12 if self.pointing is None else 15 if self.even else 13
+
+    @property
+    def frame(self) -> Array | None:
+        """(3, 3) across the moment, across both, and along it, as columns along the axes of an `even` body."""
+        return np.round(frame_about(np.array(self.pointing)), 15) if self.even else None
+
+    def off_unit(self, scaled: Array) -> float:
+        """By how much moments or quaternions of states (n, 12 or more) are not of unit length, at most."""
+        turn = scaled[:, 6 : 10 if self.size == 13 else 9]
+        return float(np.abs(np.linalg.norm(turn, axis=1) - 1).max())
 
     def pack(self, state: State) -> Array:
-        """Scaled state (..., 12): position, velocity, moment, spin; or (..., 13), see `attitude`."""
+        """Scaled state (..., 12): position, velocity, moment, spin; or (..., 13 or 15) with another turn and spin."""
         speed = self.length / self.time
         if self.pointing is None:
             turn, spin = state.moment, _stretched(state.spin, state.moment, self.spin_ratio)
+        elif self.frame is not None:
+            assert state.axes is not None
+            turns = state.axes @ self.frame
+            turn, spin = np.concatenate([turns[..., 2], HALF * turns[..., 0]], axis=-1), HALF * state.spin
         else:
             assert state.axes is not None
             turn, spin = quaternions_of(state.axes), np.einsum("...ij,...i->...j", state.axes, state.spin)
@@ -300,6 +320,10 @@ class Scales:
         turn, spin = scaled[..., 6 : self.size - 3], scaled[..., self.size - 3 : self.size]
         if self.pointing is None:
             return State(position, velocity, turn + 0.0, _stretched(spin, turn, 1 / self.spin_ratio) / self.time)
+        if self.frame is not None:
+            moment, side, spin = turn[..., :3], turn[..., 3:] / HALF, spin / HALF
+            axes = np.stack([side, np.cross(moment, side), moment], axis=-1) @ self.frame.T
+            return State(position, velocity, moment + 0.0, spin / self.time, axes)
         axes = matrices_of(turn)
         return State(
             position, velocity, axes @ np.array(self.pointing), (axes @ spin[..., None])[..., 0] / self.time, axes

@@ -77,7 +77,7 @@ class Floater:
         if moments_of_inertia is not None:
             turn = np.eye(3)
         elif _round_about(pieces, center, axis):
-            turn = _frame_about(axis)
+            turn = frame_about(axis)
         else:
             turn = _principal_axes(_inertia(pieces, center))
         bodies = [piece.magnet.body for piece in pieces]
@@ -196,7 +196,7 @@ class Floater:
     @cached_property
     def averaged(self) -> "Floater":
         """Its mean over turns about its moment, which is round."""
-        turn, along = _frame_about(self.pointing), float(self.principal_inertia @ self.pointing**2)
+        turn, along = frame_about(self.pointing), float(self.principal_inertia @ self.pointing**2)
         across = (float(self.principal_inertia.sum()) - along) / 2
         magnets = [replace(part.magnet, body=with_frame(part.magnet.body, turn.T)) for part in self.parts]
         pieces = tuple(FloaterPart(one, part.density) for one, part in zip(magnets, self.parts, strict=True))
@@ -239,7 +239,7 @@ class Floater:
         if orientation.ndim == 2:
             return orientation
         moment = orientation
-        there, own = _frame_about(moment), _frame_about(self.pointing)
+        there, own = frame_about(moment), frame_about(self.pointing)
         if near is None:
             return np.asarray(there @ own.T)
         x = own.T @ self.file_axes[:, 0]
@@ -329,7 +329,7 @@ def _round_about(parts: Sequence[FloaterPart], center: Array, axis: Array) -> bo
     return True
 
 
-def _frame_about(axis: Array) -> Array:
+def frame_about(axis: Array) -> Array:
     """(3, 3) right-handed axes as columns, the third along a unit vector (3,), turned about it as little as can be."""
     across = np.eye(3)[int(np.argmin(np.abs(axis)))] if abs(axis[0]) > 0.99 else np.eye(3)[0]
     first = across - (across @ axis) * axis / (axis @ axis)

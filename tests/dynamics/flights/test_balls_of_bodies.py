@@ -101,13 +101,13 @@ def test_a_cube_moves_in_small_balls_as_in_a_large_one(start, monkeypatch):
 
 
 def test_a_cube_costs_what_its_steps_cost(start):
-    """A step has at most 1.1 times a sphere's operations in balls, and a turn 2.3 times its steps."""
+    """A step has fewer operations than a sphere's in balls, and a turn 2.3 times its steps at most."""
     ball = initial_state(SPHERE, TABLE)[0]
     flights = in_balls(LEVITATING, TABLE, 0.05), in_balls(SPHERE, TABLE, 0.05)
     flown = [integrate(flight, begun, 0.05) for flight, begun in zip(flights, (start, ball), strict=True)]
     cube, sphere = (len(next(iter(flight.parts.values())).integrator.decomposition) for flight in flights)
     print(f"\noperations: cube {cube}, sphere {sphere}; steps: {flown[0].steps}, {flown[1].steps}")
-    assert cube < 1.1 * sphere
+    assert cube < 0.95 * sphere
     assert flown[0].steps < 2.3 * flown[1].steps
 
 
@@ -118,7 +118,8 @@ def test_numbers_in_the_code_are_the_parameters(start):
     number = flight.degree(course.values)
     whole = balls_module.in_ball(flight.whole, BallField(balls_module.DEGREE + 1, abs(number), number < 0))
     found = []
-    for equations in (flight.equations(number)[0], equations_of_motion(whole, first=flight.first)):
+    written = equations_of_motion(whole, first=flight.first, frame=flight.scales.frame)
+    for equations in (flight.equations(number)[0], written):
         function = hy.cfunc([*equations.rates, *equations.jacobi, equations.power], equations.variables)
         found.append(function(course.state[:-1], pars=course.values[: function.nparams]))
     assert found[0] == pytest.approx(found[1], rel=1e-12, abs=1e-13)
@@ -155,12 +156,12 @@ def test_what_the_floaters_dipole_misses_is_a_dipole_along_its_axes():
         flight = Flight(scene, Interaction(TABLE, (one,), turning=True), 0.1)
         state = initial_state(scene, TABLE)[0]
         course = flight.begin(state, 0.1)
-        equations = flight.equations(flight.degree(course.values))[0]
-        function = hy.cfunc(list(equations.rates[:13]), list(equations.variables), compact_mode=True)
+        equations, scales = flight.equations(flight.degree(course.values))[0], flight.scales
+        function = hy.cfunc(list(equations.rates[: scales.size]), list(equations.variables), compact_mode=True)
         rates = function(course.state[:-1], pars=course.values[: function.nparams])
-        found.append(np.concatenate([CUBE.mass * rates[3:6], CUBE.inertia / CUBE.radius * state.axes @ rates[10:13]]))
+        turned = scales.unpack(np.append(course.state[: scales.size - 3], rates[-3:])).spin * scales.time  # from rest
+        found.append(np.concatenate([CUBE.mass * rates[3:6], CUBE.inertia / CUBE.radius * turned]))
         assert one.rest == pytest.approx(missed if one is not shape else np.zeros(3), abs=1e-12)
-    scales = flight.scales
     moment = state.axes @ missed
     field, gradient = (part[0] for part in TABLE.evaluate(state.position[None]))
     known = np.concatenate([moment @ gradient, np.cross(moment, field) / CUBE.radius])
