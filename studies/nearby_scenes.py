@@ -35,9 +35,9 @@ from .levitation import Levitation
 
 # Step of differences by a number, by its size or by one that such a number usually has, by the end of its key
 STEP, USUAL = 2e-3, {"mm": 10.0, "deg": 20.0, "T": 1.0, "m_s2": 9.81}
-# The same where a table is made anew, by a difference of second order: of losses what its points leave is smooth over
-# this, and of mutual magnetisation it leaves 4e-7 of a derivative
-WIDE = {"mutual": 1e-3, "losses": 0.02}
+# The same where a table is made anew, and of which order the difference is. Of mutual magnetisation the fit leaves 4e-6
+# of a derivative at a tenth of this step, and the fourth order 1e-7 at it; of losses what its points leave is smooth
+WIDE = {"mutual": (0.01, 4), "losses": (0.02, 2)}
 # Steps, weights of fourth order, and of second order
 CENTRAL = ((1, 2 / 3, 1 / 2), (-1, -2 / 3, -1 / 2), (2, -1 / 12, 0.0), (-2, 1 / 12, 0.0))
 # Where a number has an end
@@ -74,7 +74,7 @@ class NearbyScenes:
     averaged: bool  # the motion of the floater's mean over turns about its moment
     with_plate: bool
     _shares: dict[str, Array] = field(default_factory=dict, init=False)
-    _ends: dict[tuple[str, str], tuple[Any, Any, float]] = field(default_factory=dict, init=False)
+    _beside: dict[tuple[str, str], list[tuple[float, Any]]] = field(default_factory=dict, init=False)
 
     def step(self, key: str, value: float) -> float:
         usual = next((size for end, size in USUAL.items() if key.rstrip(".0123456789").endswith(f"_{end}")), 0.0)
@@ -91,10 +91,13 @@ class NearbyScenes:
             for offset, weight, lower, scene in self._scenes(key)
         ]
 
-    def _scenes(self, key: str) -> list[tuple[float, float, float, Scene]]:
-        """Offsets of a number, weights of their differences of fourth and of second order, and the scenes."""
+    def _scenes(self, key: str, times: float = 1.0) -> list[tuple[float, float, float, Scene]]:
+        """Offsets of a number, weights of their differences of fourth and of second order, and the scenes.
+
+        The step is so many `times` the usual one.
+        """
         value = self.numbers[key]
-        step = self.step(key, value)
+        step = times * self.step(key, value)
         for steps, sign in ((CENTRAL, step), (FORWARD, step), (FORWARD, -step)):
             with suppress(SceneError):
                 return [
@@ -148,10 +151,10 @@ class NearbyScenes:
                 continue
             if key.startswith("floater.") and not key.endswith(("_mm", "permeability")):
                 continue
-            ends = self._ends_of(
-                "mutual", key, table, lambda there: mutual_table_beside(table, there.rotor, there.floater.ball, note)
+            beside = self._tables(
+                "mutual", key, lambda there: mutual_table_beside(table, there.rotor, there.floater.ball, note)
             )
-            found = _Line(found, *ends[:2], offset / ends[2])
+            found = _Line(found, beside, offset)
         strong = self._strong(scene) if "rotor.remanence_T" in offsets else 1.0
         return found if strong == 1.0 else StrongerMutual(found, strong)
 
@@ -169,8 +172,8 @@ class NearbyScenes:
             if key.startswith("rotor.") and not key.endswith(
                 ("remanence_T", "recoil_permeability", "rotor.conductivity_S_m")
             ):
-                ends = self._ends_of("losses", key, losses, lambda there: cached_rotor_losses(there, note)[0])
-                found = _Line(found, *ends[:2], offset / ends[2])
+                beside = self._tables("losses", key, lambda there: cached_rotor_losses(there, note)[0])
+                found = _Line(found, beside, offset)
         return found
 
     def _plate(self, scene: Scene, offsets: Mapping[str, float]) -> PlateMemory | None:
@@ -211,38 +214,34 @@ class NearbyScenes:
         for key, scenes in near.items():
             self._shares[key] = np.sum([weight * next(found) for _, weight, *_ in scenes], axis=0)
 
-    def _ends_of(self, name: str, key: str, base: Any, make: Callable[[Scene], Any]) -> tuple[Any, Any, float]:
-        """Tables that are made a `WIDE` step to both sides of a number, and the way between."""
-        if (name, key) not in self._ends:
-            value = self.numbers[key]
-            wide = WIDE[name] / STEP * self.step(key, value)
-            try:
-                first, last = (make(changed(self.scene, {key: value + s * wide})) for s in (-1, 1))
-                self._ends[name, key] = first, last, 2 * wide
-            except SceneError:  # it has an end here
-                self._ends[name, key] = base, make(changed(self.scene, {key: value + wide})), wide
-        return self._ends[name, key]
+    def _tables(self, name: str, key: str, make: Callable[[Scene], Any]) -> list[tuple[float, Any]]:
+        """Tables that are made `WIDE` steps beside a number, each after its weight in a derivative by it."""
+        if (name, key) not in self._beside:
+            wide, order = WIDE[name]
+            weighted = [(row[1] if order == 4 else row[2], row[3]) for row in self._scenes(key, wide / STEP)]
+            self._beside[name, key] = [(weight, make(scene)) for weight, scene in weighted if weight]
+        return self._beside[name, key]
 
 
 @dataclass(frozen=True, eq=False)
 class _Line:
-    """A table between others: the numbers of `base` and a share of what two others differ by."""
+    """A table among others: the numbers of `base`, and an `offset` times their derivative by tables `beside` it."""
 
     base: Any
-    first: Any
-    last: Any
-    share: float
+    beside: Sequence[tuple[float, Any]]  # each after its weight
+    offset: float
+
+    @property
+    def _tables(self) -> list[tuple[float, Any]]:
+        return [(1.0, self.base), *((self.offset * weight, table) for weight, table in self.beside)]
 
     @property
     def polarizability(self) -> float:
-        tables = self.base, self.first, self.last
-        base, first, last = (float(table.polarizability) for table in tables)
-        return base + self.share * (last - first)
+        return sum(weight * float(table.polarizability) for weight, table in self._tables)
 
     def derivatives(self, places: Array, moments: Array) -> tuple[Array, ...]:
-        parts = (table.derivatives(places, moments) for table in (self.base, self.first, self.last))
-        return tuple(a + self.share * (c - b) for a, b, c in zip(*parts, strict=True))
+        each = [[weight * part for part in table.derivatives(places, moments)] for weight, table in self._tables]
+        return tuple(sum(parts) for parts in zip(*each, strict=True))
 
     def products(self, places: Array) -> Array:
-        base, first, last = (table.products(places) for table in (self.base, self.first, self.last))
-        return np.asarray(base + self.share * (last - first))
+        return np.asarray(sum(weight * table.products(places) for weight, table in self._tables))
