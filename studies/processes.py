@@ -45,6 +45,7 @@ class NoProcessError(ComputationError):
 
 
 def program() -> str:
+    """The digest of the program as a process reads it, see `program_digest`."""
     return program_digest()
 
 

@@ -179,6 +179,7 @@ class Result:
 
 
 def equilibrium_summary(equilibrium: Equilibrium) -> dict[str, Any]:
+    """The numbers of an equilibrium by their names in JSON, which end in their units, with its kind and stability."""
     numbers = {}
     for name, unit, _, _ in QUANTITIES:
         if unit in IN_JSON and name != "moment":

@@ -49,10 +49,12 @@ def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
 
 
 def case_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
+    """The first case of a joined result with the given labels; IndexError where there is none."""
     return cases_with(result, **labels).isel(case=0)
 
 
 def each_case(result: xr.Dataset) -> list[xr.Dataset]:
+    """The cases of a joined result one by one, without the dimension `case`."""
     return [result.isel(case=k) for k in range(result.sizes["case"])]
 
 

@@ -121,6 +121,7 @@ def turnable_scene(view: View) -> bytes:
 
 
 def new_plotter(size: tuple[int, int] = (1400, 1100)) -> pv.Plotter:
+    """A plotter without a screen, on white, for a picture of a `size` in pixels, width and height."""
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # that there is no screen is no news here
     plotter = pv.Plotter(off_screen=True, window_size=size, lighting="three lights")
     plotter.set_background("white")

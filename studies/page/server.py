@@ -153,6 +153,7 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
 
 
 def program(path: str) -> str:
+    """The text of the page, or of a file of its program, at a `path` of an address; OSError where there is none."""
     return files(__package__).joinpath("page.html" if path == "/" else path[1:]).read_text(encoding="utf-8")
 
 

@@ -332,11 +332,13 @@ _flights: list[LiveFlight] = []  # The one of this process
 
 
 def begin_flight(state: PageState) -> Frame:
+    """The first moment of a trajectory, this process's from now on; raises what `Levitation.live_flight` raises."""
     _flights[:] = [Levitation(state.scene, state.models, state.spin).live_flight()]
     return _frame()
 
 
 def fly(seconds: float) -> Frame:
+    """The trajectory so many `seconds` (s) onward, ended where its motion could not be computed."""
     try:
         return _frame(_flights[0].onward(seconds))
     except SpinlevError as error:
