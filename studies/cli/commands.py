@@ -120,7 +120,7 @@ def field(
         return working_point_job(Levitation(_loaded(scene), requested), output.folder)
     if plane is not None:
         extent = None if extent_mm is None else options.map_extent(extent_mm)
-        options.check_between("--steps", steps, options.STEPS)
+        options.check_between("--steps", steps, options.STEPS, whole=True)
         from ..fields import field_map_job
 
         return field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)

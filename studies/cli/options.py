@@ -102,7 +102,7 @@ def check_between(name: str, value: float, ends: tuple[int, int], whole: bool = 
     """Raises InputError about `name` where the value is no number between `ends`, or none that is `whole`."""
     low, high = ends
     if not is_number(value) or not low <= value <= high or (whole and value != int(value)):
-        raise refused(name, f"be between {low} and {high}", value)
+        raise refused(name, f"be {'a whole number ' * whole}between {low} and {high}", value)
 
 
 def read_points(path: Path) -> Array:

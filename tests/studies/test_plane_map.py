@@ -53,8 +53,8 @@ def test_python_has_the_map_over_the_coordinates_of_its_plane():
         ({"extent_mm": (1.0, -1.0, 0.0, 1.0)}, "extent_mm must be left, right, lower and upper end"),
         ({"extent_mm": (0.0, 1.0)}, "extent_mm must be left"),
         ({"extent_mm": (0.0, float("nan"), 0.0, 1.0)}, "extent_mm must be a finite number"),
-        ({"steps": 3}, "steps must be between 5 and 1001"),
-        ({"steps": 7.5}, "steps must be between 5 and 1001"),
+        ({"steps": 3}, "steps must be a whole number between 5 and 1001"),
+        ({"steps": 7.5}, "steps must be a whole number between 5 and 1001"),
         ({"offset_mm": "a"}, "offset_mm must be a finite number"),
     ],
 )
@@ -95,7 +95,7 @@ def test_an_extent_that_is_none_is_refused(text):
         ([], "Input --points must be given, or --plane, or --working-point; instead received none of them"),
         (["--plane", "xz", "--points", "p.csv"], "instead received 2 of them"),
         (["--plane", "xq"], "xq"),
-        (["--plane", "xz", "--steps", "1"], "--steps must be between 5 and 1001; instead received 1"),
+        (["--plane", "xz", "--steps", "1"], "--steps must be a whole number between 5 and 1001; instead received 1"),
         (["--plane", "xz", "--extent-mm", "0"], "--extent-mm must be one positive number"),
     ],
 )
