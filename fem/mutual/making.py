@@ -116,7 +116,8 @@ OBLIQUE = (
 EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
 # Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, of two whose
 # points have weights of their own, and of others
-SAMPLES = np.array([[30, 0], [60, 90], [60, 90]])
+SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
+SPARE = 1.1  # How many more samples than are `ENOUGH` do for two magnets whose points have weights of their own
 
 
 def mutual_table(
@@ -164,8 +165,12 @@ def mutual_table(
         single = cuboids and sum(len(grid.points) for grid in grids) <= SINGLE
         kind = 0 if len(magnets) == 1 else 1 if single and len(magnets) == 2 else 2
         around, beside = SAMPLES[kind] // len(magnets)
-        places = np.concatenate([facing, response.places_around(magnets, floater.radius, distances, around, 2)])
+        places = response.places_around(magnets, floater.radius, distances, around, 2)
         near = response.places_around(magnets, floater.radius, response.NEAR_GAPS, beside, 3)
+        if kind == 1:
+            share = _enough_samples(grids, len(facing)) / (len(places) + len(near))
+            places, near = (part[np.arange(0, len(part), max(1.0, 1 / share)).astype(int)] for part in (places, near))
+        places = np.concatenate([facing, places])
         both = np.concatenate([places, near])
         grids, pairs = sphere_fit(grids, single, images, both, response.sphere_samples(rotor, floater, both, watch))
         if rotor.permeable:
@@ -176,6 +181,14 @@ def mutual_table(
     table = MutualTable(magnets, tuple(grids), coupling, pairs, mixed, images, floater.polarizability)
     gaps, errors = mutual_errors(table, coarse, rotor, floater, watch)
     return replace(table, gaps=gaps, errors=errors, provenance={"seconds": time.perf_counter() - started})
+
+
+def _enough_samples(grids: Sequence[ResponseGrid], facing: int) -> float:
+    """Places beside those `facing` the magnets that do for the weights of both `_fitted`."""
+    free = SPARE * ENOUGH * sum(_classes(grid).shape[1] for grid in grids)
+    # of the sphere's response four values a place for two weights a power; of what returns twelve at fewer places
+    direct = 2 * len(POWERS) / 4 * free - facing
+    return max(direct, SPARSE * (2 * len(RETURNED) / 12 * free - facing / FACING), 1.0)
 
 
 def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
@@ -380,8 +393,7 @@ def _fitted(
     """
     small, kinds, blocks = list[Array](), list[tuple[Array, int]](), list[Array]()
     for grid in grids:
-        kind = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
-        kind = kind[:, : None if grid.axis.any() else 0]
+        kind = _classes(grid)
         alone = len(kind) if single and kind.size else 0
         kinds.append((kind, alone))
         small += [np.repeat([False, True], (kind.shape[1], alone))] * (2 * len(powers))
@@ -402,6 +414,12 @@ def _fitted(
         mine = parts[2 * len(powers) * k : 2 * len(powers) * (k + 1)]
         each.append(np.stack([whole @ part for part in mine], axis=1).reshape(len(kind), -1, 2))
     return each, weights
+
+
+def _classes(grid: ResponseGrid) -> Array:
+    """`classes` of points whose powers weigh the same; none without a remanence."""
+    kind = classes(grid, mirrored=bool(np.sum(np.abs(grid.axis) > PARALLEL) == 1))
+    return kind[:, : None if grid.axis.any() else 0]
 
 
 def classes(grid: ResponseGrid, mirrored: bool) -> Array:
