@@ -188,7 +188,7 @@ def _enough_samples(grids: Sequence[ResponseGrid], facing: int) -> float:
     free = SPARE * ENOUGH * sum(_classes(grid).shape[1] for grid in grids)
     # of the sphere's response four values a place for two weights a power; of what returns twelve at fewer places
     direct = 2 * len(POWERS) / 4 * free - facing
-    return max(direct, SPARSE * (2 * len(RETURNED) / 12 * free - facing / FACING), 1.0)
+    return float(max(direct, SPARSE * (2 * len(RETURNED) / 12 * free - facing / FACING), 1.0))
 
 
 def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
