@@ -49,7 +49,7 @@ FORMATS = {
     "plate-currents": 3,
     "changed-share": 5,
     "slab": 6,
-    "edges": 2,
+    "edges": 3,
     "rotor-losses": 2,
     "floater-currents": 3,
     "floating": 2,

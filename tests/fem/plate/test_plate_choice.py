@@ -95,6 +95,9 @@ def test_neighbours_share_a_measurement_which_is_told_once(monkeypatch):
     for frequency in (100.0, 104.0):
         for height in (0.0203, 0.0206):
             assert cached_edge_error(plate, np.array([[0.0, 2e-4, height]]), frequency, said.append) == 0.1
+    for down in (1e-4, 2e-4):
+        moved = replace(plate, body=replace(plate.body, center=np.array([0.0, 0.0, -down])))
+        assert cached_edge_error(moved, np.array([[0.0, 2e-4, 0.0203]]), 100.0, said.append) == 0.1
     assert len(seen) == len(said) == 1
     for gap in (5e-5, 4e-4, 1.4e-3):
         place = np.array([1e-4, 0.0, 0.005 + gap])
