@@ -12,7 +12,7 @@ solving again.
 """
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache, partial
 from typing import Any
@@ -69,23 +69,22 @@ class CurrentSpace:
     order: int  # of the finite elements
     cells: int
 
-    def couplings(self, sources: Sequence[Source]) -> list[Array]:
-        """b (sources, states) of each parity class; of a source that is still there they are remembered."""
-        if new := [source for source in sources if source not in self._known]:
-            images = source_images(self.parity, self.points, new)
-            self._known.update(zip(new, np.concatenate(self.of_images(images), axis=1), strict=True))
+    def couplings(self, sources: Sequence[Source], images: Array | None = None) -> list[Array]:
+        """b (sources, states) of each parity class; of a source that is still there they are remembered.
+
+        `images` are what `source_images` gives of all sources, where that is known.
+        """
+        if new := [source for source in sources if images is not None or source not in self._known]:
+            weighted, rows = [field * self.root for field in self.fields], list[Array]()
+            for part in source_images(self.parity, self.points, new) if images is None else [images]:
+                each = zip(part, weighted, strict=True)
+                rows.append(
+                    np.concatenate([image.reshape(len(image), -1) @ states.T for image, states in each], axis=1)
+                )
+            self._known.update(zip(new, np.concatenate(rows), strict=True))
         ends = np.cumsum([len(field) for field in self.fields])
         whole = np.array([self._known[source] for source in sources]).reshape(len(sources), ends[-1])
         return np.split(whole, ends[:-1], axis=1)
-
-    def of_images(self, images: Iterable[Array]) -> list[Array]:
-        """`couplings` of sources by their `source_images` at the points."""
-        weighted = [field * self.root for field in self.fields]
-        found: list[list[Array]] = [[np.zeros((0, len(field)))] for field in weighted]
-        for part in images:
-            for rows, image, states in zip(found, part, weighted, strict=True):
-                rows.append(image.reshape(len(image), -1) @ states.T)
-        return [np.concatenate(rows) for rows in found]
 
     def dipole_couplings(self, places: Array) -> list[Array]:
         """`couplings` of three unit dipoles at each of `places` (n, 3) m; all rotors ask for those of the same."""
@@ -448,7 +447,7 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     images = np.concatenate(list(source_images(space.parity, space.points, sources)), axis=1)
     amplitudes, rest = _fitted(space, solution.probes[standing], images)
     stands, tested = np.repeat(standing, 3), np.repeat(inside, 3)
-    driving, testing = space.of_images([images]), space.dipole_couplings(solution.probes[inside])
+    driving, testing = space.couplings(sources, images), space.dipole_couplings(solution.probes[inside])
     worst = 0.0
     for omega, residuals in zip(solution.angular_frequencies, solution.residuals, strict=True):
         left = np.sqrt(np.sum(amplitudes @ residuals[np.ix_(stands, stands)].real * amplitudes, axis=1)) + rest
