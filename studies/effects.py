@@ -171,7 +171,7 @@ def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
         return ListedEffect(REAL_AIR, True, 0.0, None, 'drag.model is "air"')
     if not scene.floater.is_sphere:
         floater = scene.floater
-        ends = np.array([floater.inner_radius, floater.radius]) / floater.equal_radius
+        ends = np.array([floater.held_radius, floater.radius]) / floater.equal_radius
         # A body has no less drag than one that it holds, and no more than one that holds it: R. Hill and G. Power,
         # Q. J. Mech. Appl. Math. 9 (1956) 313; of forces, and for torques alike. Beyond Stokes nobody has shown it.
         (low, high), (less, more) = ends.tolist(), (ends**3).tolist()

@@ -144,6 +144,12 @@ class Floater:
         return max(alone, ROUGHLY * float(reach.min()))
 
     @property
+    def held_radius(self) -> float:
+        """Radius of a sphere that it holds, m: about its centre, or in the wall of a ring."""
+        rounds = [body for body in self.bodies if isinstance(body, Cylinder)]
+        return max(self.inner_radius, *(min(b.radius - b.inner_radius, b.height) / 2 for b in rounds), 0.0)
+
+    @property
     def volume(self) -> float:
         return sum(body.volume for body in self.bodies)
 

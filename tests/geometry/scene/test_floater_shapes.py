@@ -41,6 +41,17 @@ def test_mass_moment_and_inertia_are_those_of_points_drawn_in_the_body(keys):
     )
 
 
+@pytest.mark.parametrize(("hole", "height"), [(1.0, 6.0), (8.0, 6.0), (8.0, 1.0), (0.0, 6.0)])
+def test_the_largest_sphere_that_a_ring_holds_is_the_deepest_of_points_drawn_in_it(hole, height):
+    """The drag of a body is no less than that of a sphere in it: where a ring's centre is in its hole, in its wall."""
+    shape = {"shape": "ring", "inner_diameter_mm": hole} if hole else {}
+    floater = made(CYLINDER | {"height_mm": height} | shape).floater
+    points = np.random.default_rng(1).uniform(-0.5, 0.5, (200_000, 3)) * floater.bodies[0].size
+    deepest = -floater.bodies[0].distance(points).min()
+    assert 0.97 * floater.held_radius < deepest <= floater.held_radius * (1 + 1e-12)
+    assert (floater.inner_radius > 0) == (hole == 0)
+
+
 @pytest.mark.parametrize("keys", [CYLINDER, CUBOID], ids=["cylinder", "cuboid"])
 def test_it_is_written_and_read(keys):
     first = made(keys)
