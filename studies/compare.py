@@ -150,9 +150,11 @@ def _with_branch(one: Compared) -> Compared:
     return replace(one, branch=points, stable=nearest)
 
 
-def compared_dataset(rows: Sequence[Compared], frequencies: Array | None = None) -> xr.Dataset:
-    """All of it over `model`, and the branches over `frequencies` (n,) Hz, by default about the ranges of stability."""
-    scene = rows[0].levitation.scene
+def compared_dataset(scene: Scene, rows: Sequence[Compared], frequencies: Array | None = None) -> xr.Dataset:
+    """All of it over `model`, and the branches over `frequencies` (n,) Hz, by default about the ranges of stability.
+
+    `scene` is what was asked for; the `rows` have the mean of a floater that is not round.
+    """
     if frequencies is None:
         ends = [f for row in rows for f in row.stable or ()] or [scene.frequency * (1 - BESIDE)]
         low, high = min(*ends, scene.frequency), max(*ends, scene.frequency)
@@ -270,7 +272,7 @@ def compare_job(scene: Scene, requested: Models, spin: float, frequencies: Array
     """Results as of `compared`, at `frequencies` (n,) Hz too; writes compare.nc, .json and the figure to `out`."""
     rows = compared(scene, requested, spin)
     best = rows[-1]
-    result = compared_dataset(rows, frequencies).assign_attrs(scene=scene_text(scene))
+    result = compared_dataset(scene, rows, frequencies)
     values: dict[str, Any] = {
         "models": [row.row() for row in rows],
         "frequency_hz": scene.frequency,

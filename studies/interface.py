@@ -108,7 +108,7 @@ def compare(
     known = given_scene(scene)
     found = field_rtol(known) if rtol is None else rtol
     requested = Models(plate_model=plate_model, rtol=found, plate_rtol=plate_rtol).checked()
-    return compared_dataset(compared(known, requested, spin), grid)
+    return compared_dataset(known, compared(known, requested, spin), grid)
 
 
 @documented

@@ -11,6 +11,7 @@ import spinlev as sl
 from spinlev.dynamics.equilibria.equilibrium import AVERAGED
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.models import of_true_moment
+from spinlev.geometry.scene.files import scene_text
 from spinlev.studies.cli.options import Models
 from spinlev.studies.compare import compare_words, compared, compared_dataset
 
@@ -108,7 +109,9 @@ def test_nothing_levitates_and_gravity_across_the_axis_are_told():
         compare_words(rows)[0]
         == "At 110 Hz the floater has no equilibrium by finite elements with mutual magnetisation."
     )
-    assert np.isnan(compared_dataset(rows)["branch_distance"]).all()
+    found = compared_dataset(scene, rows)
+    assert np.isnan(found["branch_distance"]).all()
+    assert found.attrs["scene"] == scene_text(scene)  # what was asked for, whatever the rows are of
     rows = compared(replace(scene, gravity=np.array([0.5, 0.0, -9.8])), asked)
     assert all(row.found is not None and row.stable is None for row in rows)
 
