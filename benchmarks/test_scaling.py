@@ -9,7 +9,7 @@ from peers import PLATE, SCENE, around
 from spinlev.dynamics.continuation.map import equilibrium_map
 from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
-from spinlev.fem.closed_forms.moments import carrier
+from spinlev.fem.closed_forms.moments import carriers_of
 from spinlev.fem.closed_forms.potentials import unit_dipoles
 from spinlev.fem.elements.ladder import refinement_of, solve_rotor
 from spinlev.fem.plate.eddy import solve_eddy
@@ -39,7 +39,7 @@ def test_points(benchmark, points):
 @pytest.mark.parametrize("order", [3, 4, 5, 6, 7, 8])
 def test_field_unknowns(benchmark, order):
     """Assembly and solution of the permeable magnets by elements of rising order."""
-    carriers = tuple(carrier(magnet) for magnet in SCENE.rotor)
+    carriers = carriers_of(SCENE.rotor)
 
     def solved():
         return solve_rotor(SCENE.rotor, refinement_of(order, MeshSettings()), "split", 6 + 4 * order, carriers=carriers)

@@ -285,6 +285,14 @@ def moved(body: Some, center: Array, rotation: Array | None = None) -> Some:
     return replace(body, center=center, rotation=body.rotation if rotation is None else rotation)  # type: ignore[type-var]
 
 
+def of_one_shape(bodies: Sequence[Solid]) -> list[list[int]]:
+    """Numbers of the bodies, those of one shape together."""
+    found = dict[tuple[str | float, ...], list[int]]()
+    for number, body in enumerate(bodies):
+        found.setdefault((body.kind, *body.shape_numbers.tolist()), []).append(number)
+    return list(found.values())
+
+
 def with_frame(body: Some, axes: Array, place: Array | float = 0.0) -> Some:
     """The `body` of a frame that comes to be at a `place` (3,) m with `axes`, columns of (3, 3)."""
     return moved(body, place + axes @ body.center, axes @ body.rotation)

@@ -11,7 +11,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.overlap import separation
 from ...geometry.shapes import Box, Sphere
-from ...geometry.solids import Part, Solid, moved
+from ...geometry.solids import Part, Solid, moved, of_one_shape
 from ..harmonics import expansion
 from ..harmonics.expansion import MultipoleExpansion, uniform_moments
 from ..harmonics.solid import Coefficients, gauss_legendre
@@ -113,22 +113,30 @@ OBLIQUE_NODES, OBLIQUE_NODES_ANISOTROPIC = (96, 128), (40, 64)
 
 
 def carrier(magnet: Magnet) -> Magnet:
-    """The magnet with μr = 1 and the mean polarisation J'; the magnet itself if its permeability is 1.
+    """See `carriers_of`."""
+    return carriers_of([magnet])[0]
+
+
+def carriers_of(magnets: Sequence[Magnet]) -> tuple[Magnet, ...]:
+    """The magnets with μr = 1 and their mean polarisations J'; the magnet itself if its permeability is 1.
 
     A part has no closed form, and all of its remanence is left to the elements.
     """
-    if isinstance(magnet.body, Part):
-        return Magnet(magnet.body, np.zeros(3))
-    if not magnet.contrast:
-        return magnet
-    turn = magnet.body.rotation
-    susceptibility = turn.T @ (magnet.permeability_in_rotor - np.eye(3)) @ turn
-    upright = moved(magnet.body, np.zeros(3), np.eye(3))
-    points, weights = volume_rule(upright, (), NODES)
-    # mean demagnetising tensor N in body axes, mean H = -N J; its trace is 1
-    diagonal = -np.einsum("n,nii->i", weights, demagnetizing_tensor(upright, points))
-    factors = np.eye(3) + susceptibility @ np.diag(diagonal / diagonal.sum())
-    return Magnet(magnet.body, np.asarray(np.linalg.solve(factors, magnet.polarization), float))
+    found = [Magnet(one.body, np.zeros(3)) if isinstance(one.body, Part) else one for one in magnets]
+    permeable = [number for number, one in enumerate(found) if one.contrast]
+    for alike in of_one_shape([found[number].body for number in permeable]):
+        upright = moved(found[permeable[alike[0]]].body, np.zeros(3), np.eye(3))
+        points, weights = volume_rule(upright, (), NODES)
+        # mean demagnetising tensor N in body axes, mean H = -N J; its trace is 1
+        diagonal = -np.einsum("n,nii->i", weights, demagnetizing_tensor(upright, points))
+        some = [found[permeable[k]] for k in alike]
+        turns = np.array([one.body.rotation for one in some])
+        susceptibilities = np.array([one.permeability_in_rotor for one in some]) - np.eye(3)
+        factors = np.eye(3) + turns.swapaxes(1, 2) @ susceptibilities @ turns * (diagonal / diagonal.sum())
+        uniform = np.linalg.solve(factors, np.array([one.polarization for one in some])[..., None])[..., 0]
+        for k, magnet, polarization in zip(alike, some, uniform, strict=True):
+            found[permeable[k]] = Magnet(magnet.body, polarization)
+    return tuple(found)
 
 
 def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes: int | None = None) -> Coefficients:

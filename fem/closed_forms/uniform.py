@@ -29,7 +29,7 @@ from scipy.linalg import block_diag
 from ...geometry.common import MU_0, Array, InputError
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Cylinder, Sphere
-from ...geometry.solids import Part, Solid
+from ...geometry.solids import Part, Solid, moved, of_one_shape
 from ..harmonics.expansion import MultipoleExpansion, turned_expressions, turned_field, uniform_moments
 from ..harmonics.expressions import FieldExpressions, differentiated
 from ..harmonics.solid import FOUR_PI, contracted, entries, tensors, turned_entries
@@ -227,12 +227,14 @@ def cuboid_tensor(points: Array, half_edges: Array) -> Array:
     """T (n, 3, 3) with μ0 H = T J of a polarisation J at `points` (n, 3), m, along a cuboid's axes, off its edges."""
     offset, distance, edges = _seen(points, half_edges)
     tensor = np.zeros((len(points), 3, 3))
+    corners = np.array([[offset[axis][sign] for axis, sign in enumerate(signs)] for signs in distance])  # (8, 3, n)
+    crossed = corners[:, [1, 2, 0]] * corners[:, [2, 0, 1]]
+    with np.errstate(divide="ignore", invalid="ignore"):  # on a face: its side towards + of that axis; 0/0 is 0
+        angles = np.nan_to_num(np.arctan(crossed / (corners * np.array(list(distance.values()))[:, None])))
+    diagonal = np.einsum("c,can->na", -np.prod(list(distance), axis=1, dtype=float), angles)
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
-        for signs, r in distance.items():
-            u, v, w = (offset[axis][signs[axis]] for axis in (a, b, c))
-            with np.errstate(divide="ignore", invalid="ignore"):  # on a face: its side towards + of that axis; 0/0 is 0
-                tensor[:, a, a] -= np.prod(signs) * np.nan_to_num(np.arctan(v * w / (u * r)))
+        tensor[:, a, a] = diagonal[:, a]
         tensor[:, a, b] = sum(i * j * edges[_corner(c, 0, i, j)] for i, j in product(SIGNS, repeat=2))
         tensor[:, b, a] = tensor[:, a, b]
     return tensor / FOUR_PI
@@ -367,10 +369,17 @@ def demagnetizing_tensor(body: Solid, points: Array) -> Array:
 def remanent_field(magnets: Sequence[Magnet], points: Array) -> Array:
     """μ0 H (n, 3) T of magnets with μr = 1 at points (n, 3) m, off their edges."""
     known, found = [magnet for magnet in magnets if magnet.polarization.any()], np.zeros_like(points)
-    for start in range(0, len(points), TENSORS):
-        here = slice(start, start + TENSORS)
-        for magnet in known:
-            found[here] += demagnetizing_tensor(magnet.body, points[here]) @ magnet.polarization_in_rotor
+    bodies = [magnet.body for magnet in known]
+    for numbers in of_one_shape(bodies):
+        home = moved(bodies[numbers[0]], np.zeros(3), np.eye(3))
+        some = max(1, TENSORS // max(len(points), 1))  # of few points there are many bodies at once
+        for few in (numbers[first : first + some] for first in range(0, len(numbers), some)):
+            for start in range(0, len(points), TENSORS):
+                here = slice(start, start + TENSORS)
+                seen = np.concatenate([bodies[number].to_body(points[here]) for number in few])
+                tensors = demagnetizing_tensor(home, seen).reshape(len(few), -1, 3, 3)
+                for number, tensor in zip(few, tensors, strict=True):
+                    found[here] += tensor @ known[number].polarization @ bodies[number].rotation.T
     return found
 
 

@@ -16,7 +16,7 @@ from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.overlap import closing_shifts
 from ...geometry.shapes import Sphere
 from ...geometry.solids import Part, places_off
-from ..closed_forms.moments import carrier, closed_part, first_order_moments, uniform_cells
+from ..closed_forms.moments import carrier, carriers_of, closed_part, first_order_moments, uniform_cells
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from ..harmonics.expansion import MOST, MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
 from .table import KNOWN, RotorTable
@@ -99,8 +99,9 @@ def typical_field(magnets: tuple[Magnet, ...], points: Array, share: float = CAN
 
 
 def _carriers(magnets: tuple[Magnet, ...]) -> tuple[Magnet, ...]:
-    """See `carrier`; parts as they are."""
-    return tuple(magnet if isinstance(magnet.body, Part) else carrier(magnet) for magnet in magnets)
+    """See `carriers_of`; parts as they are."""
+    found = zip(magnets, carriers_of(magnets), strict=True)
+    return tuple(magnet if isinstance(magnet.body, Part) else one for magnet, one in found)
 
 
 DEGREE = 25  # degree up to which the part that a model leaves out is computed
@@ -226,7 +227,7 @@ def fem_table(
         float(np.min(np.linalg.norm(points[:, None] - own.centers, axis=2).min(axis=0) / own.radii)) for own in cells
     ]
     degree = enough_degree(pieces, ratios, accuracy.rtol)
-    carriers = tuple(carrier(magnet) for magnet in magnets)
+    carriers = carriers_of(magnets)
     closed, unsure = closed_part(cut, magnets, carriers, degree, cells)
 
     def reaction(order: int) -> RotorSolution:

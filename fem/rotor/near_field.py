@@ -12,7 +12,7 @@ from ...geometry.cutting import CONVERGENCE
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.magnets import MeshSettings
 from ...geometry.solids import Part, Solid
-from ..closed_forms.moments import carrier
+from ..closed_forms.moments import carriers_of
 from ..closed_forms.uniform import UniformField
 from ..elements.ladder import RotorSolution, in_ball, potential_slopes, refinement_of, solve_rotor, strongest
 from .models import Accuracy, fem_table
@@ -38,7 +38,7 @@ class NearElements:
 
     def __init__(self, magnets: Sequence[Magnet]) -> None:
         self.magnets = tuple(magnets)
-        self.carriers = tuple(carrier(magnet) for magnet in magnets)
+        self.carriers = carriers_of(magnets)
         self._solved: dict[int, RotorSolution] = {}
         self._outside: dict[float, RotorTable] = {}
 

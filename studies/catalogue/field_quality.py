@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from ...fem.closed_forms.moments import added_by_closed_form, carrier, oblique_contact
+from ...fem.closed_forms.moments import added_by_closed_form, carriers_of, oblique_contact
 from ...fem.elements.ladder import Refinement, solve_rotor
 from ...fem.elements.magnetostatics import coulomb_field
 from ...fem.harmonics.expansion import uniform_moments
@@ -289,7 +289,7 @@ def reference(case: HardCase, points: Array) -> tuple[Array, Array]:
         exact = np.sum([coulomb_field(magnet, points) for magnet in case.magnets], axis=0)
         return exact, exact
     pieces = cut_magnets(case.magnets, case.clearance)
-    carriers = tuple(carrier(magnet) for magnet in case.magnets)
+    carriers = carriers_of(case.magnets)
     remanent = RotorTable("cuboid", carriers, carriers).evaluate(points)[0]
     nodes = OBLIQUE_NODES if oblique_contact([magnet.box for magnet in case.magnets]) else None
     cells = [cells_of(piece.body, FINER_CELLS * case.clearance) for whole in pieces for piece in whole]

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ...fem.closed_forms.moments import added_by_closed_form, carrier
+from ...fem.closed_forms.moments import added_by_closed_form, carriers_of
 from ...fem.compiled_code import compiled
 from ...fem.elements.ladder import Refinement, refinement_of, solve_rotor
 from ...fem.elements.magnetostatics import magnet_dipoles
@@ -72,7 +72,7 @@ def _direct(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
 def _split(order: int, magnets: Magnets) -> tuple[FieldTable, int]:
     """One order of elements: closed form of the remanence plus what the permeability adds."""
     degree = 6 + 4 * order
-    carriers = tuple(carrier(magnet) for magnet in magnets)
+    carriers = carriers_of(magnets)
     solution = solve_rotor(magnets, refinement_of(order, MeshSettings()), "split", degree, carriers=carriers)
     closed = added_by_closed_form([(magnet,) for magnet in magnets], magnets, carriers, degree)
     whole = [without_noise(a + b, 1e-15) for a, b in zip(closed, solution.coefficients, strict=True)]

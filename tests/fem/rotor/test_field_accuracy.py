@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinlev.fem.closed_forms.moments import added_by_closed_form, carrier
+from spinlev.fem.closed_forms.moments import added_by_closed_form, carriers_of
 from spinlev.fem.elements.ladder import Refinement, solve_rotor
 from spinlev.fem.harmonics.expansion import trimmed_expansions, uniform_moments
 from spinlev.fem.rotor.changed import changed_table
@@ -37,7 +37,7 @@ class Truth:
 def finer(rotor, order=6, degree=33):
     """The field from another, finer mesh at a higher order, with all moments kept; good to about 1e-8 of B."""
     pieces = cut_magnets(rotor, Accuracy().clearance(rotor))
-    carriers = tuple(carrier(magnet) for magnet in rotor)
+    carriers = carriers_of(rotor)
     solution = solve_rotor(rotor, Refinement(order, OTHER_MESH, 14), "split", degree, pieces, carriers=carriers)
     closed = added_by_closed_form(pieces, rotor, carriers, degree)
     parts = solution.expansions([a + b for a, b in zip(closed, solution.coefficients, strict=True)])

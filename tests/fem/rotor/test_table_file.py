@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from spinlev.fem.cache import TableFileError
-from spinlev.fem.closed_forms.moments import carrier
+from spinlev.fem.closed_forms.moments import carriers_of
 from spinlev.fem.harmonics.expansion import MultipoleExpansion, uniform_moments
 from spinlev.fem.rotor.choice import cached_rotor_table
 from spinlev.fem.rotor.table import ROTOR as FILES, RotorTable
@@ -103,7 +103,7 @@ def test_the_key_changes_with_all_that_decides_the_table():
 
 def test_a_closed_form_of_another_polarisation_survives_the_disk(tmp_path):
     """The finite elements' table splits off the closed form of the mean polarisation, not of the remanence."""
-    carriers = tuple(carrier(magnet) for magnet in ROTOR)
+    carriers = carriers_of(ROTOR)
     table = RotorTable("fem", ROTOR, carriers)
     FILES.save(table, tmp_path / "t.nc")
     read = FILES.load(tmp_path / "t.nc")
