@@ -41,8 +41,8 @@ from ..geometry.files import MOST, closed, hdf5_fault, ours, regular_file, seal,
 # Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
-    "rotor": 11,
-    "mutual": 18,
+    "rotor": 12,
+    "mutual": 19,
     "map": 3,
     "plate": 3,
     "driven-plate": 6,
@@ -54,8 +54,8 @@ FORMATS = {
     "floater-currents": 3,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 15,
-    "experiment": 2,
+    "equilibria": 16,
+    "experiment": 3,
     "code": 1,
 }
 # That decide the digits of a table; the others read, write and show.

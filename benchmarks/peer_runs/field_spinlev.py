@@ -12,9 +12,9 @@ import numpy as np
 from problems import CUBES, EDGE, RECOIL, REMANENCE, matrices, points_below
 from said import measure, say
 
-from spinlev.fem.closed_forms.moments import carrier
+from spinlev.fem.closed_forms.moments import carriers_of
 from spinlev.fem.closed_forms.uniform import remanent_field
-from spinlev.fem.elements.surface import SurfaceCharges
+from spinlev.fem.elements.surface_charges import SurfaceCharges
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry import Box, Magnet
 from spinlev.geometry.shapes import Cylinder
@@ -34,12 +34,8 @@ rotor = tuple(
 def field():
     """B at the points."""
     if "charges" in sys.argv:
-        carriers, charges = tuple(carrier(magnet) for magnet in rotor), SurfaceCharges(rotor, int(resolution))
-        away = points[:, None] - charges.places
-        amounts = charges.areas * charges.beyond(carriers) / (4 * np.pi)
-        return remanent_field(carriers, points) + np.einsum(
-            "k,nka->na", amounts, away / np.linalg.norm(away, axis=2)[..., None] ** 3
-        )
+        uniform, charges = carriers_of(rotor), SurfaceCharges(rotor, int(resolution))
+        return remanent_field(uniform, points) + charges.field(charges.beyond(uniform), points)
     table = rotor_table(rotor, "surface" if "surface" in sys.argv else "fem", resolution, nearest=0.007)
     return table.evaluate(points @ way)[0] @ way.T
 

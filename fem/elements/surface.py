@@ -1,4 +1,4 @@
-"""Permeable magnets by charges on their surfaces: boundary elements, one graded panel a face.
+"""A permeable magnet by charges on its surface: boundary elements, one graded panel a face; see `surface_charges`.
 
 In a magnet of one recoil permeability μ = 1 + χ nothing but its surface is charged, because ∇·M = 0 there. With
 σ = n·μ0 M and outward normals n the charge solves
@@ -6,10 +6,10 @@ In a magnet of one recoil permeability μ = 1 + χ nothing but its surface is ch
     (1 + χ/2) σ - χ K σ = n·J + χ n·b,        (K σ)(x) = 1/4π ∫ σ(y) n·(x - y)/|x - y|³ dS,
 
 b the field μ0 H of sources elsewhere. The closed form of uniform carriers is split off, so that a σ of order χ is
-left, with logarithms at the edges. Nodes crowd there as x = sin(π/2 sin(π/2 u)), and between nodes σ is a polynomial
-in u. K from face to face of a body, or of two that are near each other, integrates the product of this polynomial and
-the kernel, with a hyperbolic sine about the place nearest to the target; from afar the nodes' own rule does. Errors
-fall about as n⁻⁷ with the number n of nodes along an edge.
+left, with logarithms at the edges. Nodes crowd there as x = sin(π/2 sin(π/2 u)), up to eight of them as x = sin(π/2 u),
+and between nodes σ is a polynomial in u. K from face to face of a body, or of two that are near each other, integrates
+the product of this polynomial and the kernel, with a hyperbolic sine about the place nearest to the target; from afar
+the nodes' own rule does. Errors fall about as n⁻⁷ with the number n of nodes along an edge, of up to eight as n⁻⁴.
 
 O. D. Kellogg, Foundations of Potential Theory (1929), ch. VI; P. R. Johnston and D. Elliott, Int. J. Numer. Meth. Eng.
 62 (2005) 564, for the hyperbolic sine.
@@ -21,44 +21,44 @@ from itertools import combinations, product
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse.linalg
 from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
-from ...geometry.common import MU_0, Array, ComputationError
+from ...geometry.common import Array
 from ...geometry.magnets import Magnet
 from ...geometry.overlap import separation
 from ...geometry.shapes import Box, Cylinder, Sphere
-from ...geometry.solids import Solid, moved
+from ...geometry.solids import Solid
 from ..closed_forms.moments import parallel
-from ..closed_forms.uniform import remanent_field
 from ..harmonics.interior import sphere
 from ..harmonics.solid import FOUR_PI, gauss_legendre, members, orthonormal
 
 INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
-DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and fields otherwise at once
-SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
-TURNS = 25  # of magnets' responses to each other; with χ up to 1/2 they settle to that in fewer
 # Distance from a face, in edges by the nodes along them, from which on the nodes' own rule does: nodes are at most
 # h = 1.2 of that apart, so that it errs by exp(-2π 4/1.2) = 1e-9
-APART = 4.0
+APART, APART_OF_FEW = 4.0, 0.75  # of few, by 2e-2 of a field that is itself a few per cent of the carriers'
+# Nodes along an edge up to which the middle of a face needs them more than the logarithms at its edges: by four of them
+# the field of a cube is wrong by 3e-4, and by 2e-3 if they crowd as more do
+FEW = 8
 MORE = 2  # times as many nodes along an edge for moments as for charges
 KINKS = 0.2  # gap, in edges, from which on a neighbour's edges make no kink in the charges
 FINE = 10  # nodes of the rule for a product beyond those along an edge
 ROWS = 1 << 20  # numbers at once in such a rule
-PAIRS = 1 << 15  # of a charge and a place at once, so that they stay in the processor's cache
 TOGETHER = 1e-14  # square of a distance, by those from the axes' origin, below which two nodes are one
 ROUND_OFF = 1e-13  # of a line's half: no place is nearer to a node than that
+COARSE = (4, 2)  # of Gauss's places along an edge that stand for all nodes at each of two distances; fewer do for few
 WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near the axis, too
-# Distances of two bodies' centres, in the sum of their circumradii, from which on few places on each stand for all, and
-# how many of Gauss's rule along an edge do. What is charged beyond the carriers has hardly a field there.
-FAR, COARSE = (1.5, 6.0), (4, 2)
 
 
 @cache
 def graded(count: int) -> tuple[Array, Array]:
-    """Places x (n,) = sin(π/2 sin(π/2 u)), -1 to 1, at Gauss's u, and weights (n,) of an integral over x."""
+    """Places x (n,) = sin(π/2 sin(π/2 u)), -1 to 1, at Gauss's u, and weights (n,) of an integral over x.
+
+    Up to `FEW` are at sin(π/2 u).
+    """
     u, weights = gauss_legendre(count)
+    if count <= FEW:
+        return np.sin(np.pi / 2 * u), weights * np.pi / 2 * np.cos(np.pi / 2 * u)
     inner = np.pi / 2 * np.sin(np.pi / 2 * u)
     return np.sin(inner), weights * (np.pi / 2) ** 2 * np.cos(inner) * np.cos(np.pi / 2 * u)
 
@@ -72,7 +72,9 @@ def _to_nodes(count: int) -> Array:
 
 def _lagrange(places: Array, count: int) -> Array:
     """(..., n): Lagrange's polynomials in u, for the nodes of `graded`, at places x (...,)."""
-    u = 2 / np.pi * np.arcsin(2 / np.pi * np.arcsin(np.clip(places, -1.0, 1.0)))
+    u = 2 / np.pi * np.arcsin(np.clip(places, -1.0, 1.0))
+    if count > FEW:
+        u = 2 / np.pi * np.arcsin(u)
     return np.asarray(np.polynomial.legendre.legvander(u, count - 1) @ _to_nodes(count))
 
 
@@ -105,15 +107,19 @@ def face_rows(places: Array, normals: Array, halves: Array, counts: tuple[int, i
     return result.reshape(len(places), first * second) / FOUR_PI
 
 
-def _far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Array:
+def far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Array:
     """As `face_rows`, by the rule of the nodes alone: `sources` (n, 3) with `areas` (n,)."""
-    sizes = np.sum(places**2, axis=1)[:, None] + np.sum(sources**2, axis=1)
-    square = sizes - 2 * places @ sources.T
-    # a place on a node, of a body that touches, sees nothing of it: both are in one plane
-    inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > TOGETHER * sizes)
-    inverse *= np.sqrt(inverse)
-    inverse *= np.sum(places * normals, axis=1)[:, None] - normals @ sources.T
-    return np.asarray(inverse * (areas / FOUR_PI))
+    found, step = np.empty((len(places), len(sources))), max(1, ROWS // len(sources))
+    for start in range(0, len(places), step):
+        some = slice(start, start + step)
+        sizes = np.sum(places[some] ** 2, axis=1)[:, None] + np.sum(sources**2, axis=1)
+        square = sizes - 2 * places[some] @ sources.T
+        # a place on a node, of a body that touches, sees nothing of it: both are in one plane
+        inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > TOGETHER * sizes)
+        inverse *= np.sqrt(inverse)
+        inverse *= np.sum(places[some] * normals[some], axis=1)[:, None] - normals[some] @ sources.T
+        found[some] = inverse * (areas / FOUR_PI)
+    return found
 
 
 def _from_gauss(places: Array, count: int) -> Array:
@@ -139,6 +145,7 @@ class Surface:
     places: Array
     normals: Array
     areas: Array
+    count: int
     reach = 0.0
 
     @cached_property
@@ -148,8 +155,9 @@ class Surface:
 
     @cached_property
     def coarse(self) -> list[tuple[Array, Array, Array]]:
-        """Places and normals (k, 3) that stand for all from each of `FAR`, and the nodes' values by those (n, k)."""
-        return [self._fewer(count) for count in COARSE]
+        """Places and normals (k, 3) that stand for all from two distances, and the nodes' values by those (n, k)."""
+        few = max(self.count // 3, 1)
+        return [self._fewer(min(enough, few + more)) for enough, more in zip(COARSE, (1, 0), strict=True)]
 
     def _fewer(self, count: int) -> tuple[Array, Array, Array]:
         """One of `coarse`, with so many places along an edge."""
@@ -168,9 +176,10 @@ class _BoxSurface(Surface):
     """Of a cuboid, face by face: on those at -x, x, -y, y, -z and z, with more nodes along longer edges."""
 
     def __init__(self, body: Box, count: int) -> None:
-        self.half = body.half_edges
+        self.half, self.count = body.half_edges, count
         self.counts = [round(count * np.sqrt(half / self.half.min())) for half in self.half]
-        self.reach = APART * float(np.max(2 * self.half / self.counts))
+        self.apart = APART if count > FEW else APART_OF_FEW
+        self.reach = self.apart * float(np.max(2 * self.half / self.counts))
         rules, places, normals, areas, self.numbers, total = [graded(n) for n in self.counts], [], [], [], {}, 0
         for axis, side in product(range(3), (-1, 1)):
             (x, wide), (y, tall) = (rules[k] for k in self._order(axis)[:2])
@@ -233,11 +242,13 @@ class _BoxSurface(Surface):
     def _fewer(self, count: int) -> tuple[Array, Array, Array]:
         x, _ = gauss_legendre(count)
         places, normals, shares = [], [], []
+        along = [_from_gauss(graded(nodes)[0], count) for nodes in self.counts]
         for axis, side in self.numbers:
             places.append(self._grid(axis, side, x, x))
             normals.append(np.broadcast_to(side * np.eye(3)[axis], places[-1].shape))
-            along, across = (_from_gauss(graded(self.counts[k])[0], count) for k in self._order(axis)[:2])
-            shares.append(np.kron(along, across))
+            first, second, _ = self._order(axis)
+            # a face's nodes by its places: the product of both edges' polynomials
+            shares.append(np.einsum("ia,jb->ijab", along[first], along[second]).reshape(-1, count**2))
         return np.concatenate(places), np.concatenate(normals), np.asarray(scipy.linalg.block_diag(*shares))
 
     def refined(self, charges: Array) -> tuple[Array, Array]:
@@ -255,12 +266,12 @@ class _BoxSurface(Surface):
         for (axis, side), numbers in self.numbers.items():
             (order, seen, halves, counts), mine = self._face(axis, side, places), numbers.ravel()
             beyond = np.maximum(np.abs(seen) - [*halves, 0.0], 0)
-            near = np.linalg.norm(beyond, axis=1) < APART * np.max(2 * halves / counts)
+            near = np.linalg.norm(beyond, axis=1) < self.apart * np.max(2 * halves / counts)
             off = np.abs(seen[:, 2]) > INSET * self.half.max()
             rows = face_rows(seen[near & off], normals[near & off][:, order], halves, counts)
             result[np.ix_(near & off, mine)] = rows
             result[np.ix_(near & ~off, mine)] = 0.0
-            apart = _far_rows(places[~near], normals[~near], self.places[mine], self.areas[mine])
+            apart = far_rows(places[~near], normals[~near], self.places[mine], self.areas[mine])
             result[np.ix_(~near, mine)] = apart
             on = near & ~off & (beyond[:, :2] == 0).all(axis=1)  # of a body that touches: the charges' own jump
             along, across = (_lagrange(seen[on, i] / halves[i], counts[i]) for i in range(2))
@@ -301,7 +312,7 @@ class _RoundSurface(Surface):
 
     def rows_nearby(self, places: Array, normals: Array) -> Array:
         """As of `Surface`: the nodes' own rule, and the charges' own jump on flat faces that touch."""
-        result = _far_rows(places, normals, self.places, self.areas)
+        result = far_rows(places, normals, self.places, self.areas)
         radius = np.hypot(places[:, 0], places[:, 1])
         around, size = _around(np.arctan2(places[:, 1], places[:, 0]), self.count), 2 * self.count**2
         for number, (middle, way, normal) in enumerate(self.lines):
@@ -403,177 +414,3 @@ def smooth(magnets: Sequence[Magnet]) -> bool:
     """Whether charges have no kinks but at the edges: elsewhere faces that lie across each other would make some."""
     pairs = combinations([magnet.body for magnet in magnets], 2)
     return all(face_to_face(first, second) or gap(first, second) > KINKS for first, second in pairs)
-
-
-class SurfaceCharges:
-    """Charges on the surfaces of permeable magnets that respond to each other.
-
-    `magnets`: each of them `bears_charges`; `count`: n, nodes along an edge of a face.
-
-    Attributes
-    ----------
-    magnets : those that are permeable, on whose surfaces the nodes are
-    places, normals, areas : of the nodes, (n, 3) m, outward (n, 3) and (n,) m²; rotor's frame, magnet by magnet
-    owner : (n,) which of `magnets` a node is of
-    contrast : (n,) χ of the magnet that a node is of
-    """
-
-    def __init__(self, magnets: Sequence[Magnet], count: int) -> None:
-        self.count = count
-        self.all, self.magnets = tuple(magnets), tuple(magnet for magnet in magnets if magnet.contrast)
-        alike = dict[tuple[str | float, ...], Surface]()
-        places, normals, areas, self._surfaces = [], [], [], list[Surface]()
-        for magnet in self.magnets:
-            body = magnet.body
-            key = (body.kind, *body.shape_numbers.tolist())
-            if key not in alike:
-                alike[key] = SURFACES[type(body)](moved(body, np.zeros(3), np.eye(3)), count)
-            self._surfaces.append(alike[key])
-            places.append(body.center + alike[key].places @ body.rotation.T)
-            normals.append(alike[key].normals @ body.rotation.T)
-            areas.append(alike[key].areas)
-        self.places, self.normals, self.areas = (np.concatenate(part) for part in (places, normals, areas))
-        self.owner = np.repeat(np.arange(len(areas)), [len(one) for one in areas])
-        self._of = [np.flatnonzero(self.owner == k) for k in range(len(self.magnets))]
-        self.contrast = np.array([magnet.recoil_permeability - 1 for magnet in self.magnets])[self.owner]
-        centers = np.array([magnet.body.center for magnet in self.magnets])
-        radii = np.array([magnet.body.circumradius for magnet in self.magnets])
-        distances = np.linalg.norm(centers[:, None] - centers, axis=2)
-        # of each pair whether they are near each other, 0, or far, 1 and more
-        self._distance = np.searchsorted(FAR, distances / (radii[:, None] + radii))
-        self._near = [self._rows(k) for k in range(len(self.magnets))]
-
-    def _rows(self, number: int) -> tuple[NDArray[np.intp], Array]:
-        """Nodes of bodies that are not far from a magnet, and n·h there by its charges."""
-        magnet, surface = self.magnets[number], self._surfaces[number]
-        at = np.flatnonzero((self._distance[number, self.owner] == 0) & (self.owner != number))
-        mine, rows = self.owner == number, np.zeros((len(at), len(surface.places)))
-        close = magnet.body.distance(self.places[at]) < surface.reach
-        rows[~close] = _far_rows(self.places[at[~close]], self.normals[at[~close]], self.places[mine], self.areas[mine])
-        if close.any():
-            local = magnet.body.to_body(self.places[at[close]])
-            rows[close] = surface.rows_nearby(local, self.normals[at[close]] @ magnet.body.rotation)
-        return at, rows
-
-    def numbers_at(self, count: int) -> float:
-        """Of all matrices, with `count` nodes along an edge, about."""
-        nodes = (count / self.count) ** 2 * np.bincount(self.owner)
-        return float(np.sum((self._distance == 0) * np.outer(nodes, nodes)))
-
-    @cached_property
-    def _from_afar(self) -> list[list[tuple[NDArray[np.intp], Array]]]:
-        """For each of `FAR` and each body: coarse places of bodies so far from it, and n·h there by charges at its."""
-        found = []
-        for far in range(len(FAR)):
-            of = [
-                (magnet.body, surface.coarse[far]) for magnet, surface in zip(self.magnets, self._surfaces, strict=True)
-            ]
-            owner = np.repeat(np.arange(len(of)), [len(few[0]) for _, few in of])
-            places = np.concatenate([body.center + few[0] @ body.rotation.T for body, few in of])
-            normals = np.concatenate([few[1] @ body.rotation.T for body, few in of])
-            blocks = []
-            for k in range(len(of)):
-                at, mine = np.flatnonzero(self._distance[k, owner] == far + 1), places[owner == k]
-                blocks.append((at, _far_rows(places[at], normals[at], mine, np.ones(len(mine)))))
-            found.append(blocks)
-        return found
-
-    def normal_field(self, charges: Array) -> Array:
-        """K σ (n, ...) T of charges (n, ...) T."""
-        found = np.zeros_like(charges)
-        for surface, mine, (at, rows) in zip(self._surfaces, self._of, self._near, strict=True):
-            found[mine] += surface.kernel @ charges[mine]
-            found[at] += rows @ charges[mine]
-        amounts = (self.areas * charges.T).T
-        for far, blocks in enumerate(self._from_afar if self._distance.any() else ()):
-            shares = [surface.coarse[far][2] for surface in self._surfaces]
-            ends = np.cumsum([share.shape[1] for share in shares])
-            seen = np.zeros((ends[-1], *charges.shape[1:]))
-            for share, mine, (at, rows) in zip(shares, self._of, blocks, strict=True):
-                seen[at] += rows @ (share.T @ amounts[mine])
-            for share, mine, part in zip(shares, self._of, np.split(seen, ends[:-1]), strict=True):
-                found[mine] += share @ part
-        return found
-
-    def refined(self, number: int, charges: Array) -> tuple[Array, Array]:
-        """Places (k, 3) m on one of `magnets`, and amounts (k,) T m² there, with the moments of charges (n,) T."""
-        body = self.magnets[number].body
-        places, amounts = self._surfaces[number].refined(charges[self.owner == number])
-        return body.center + places @ body.rotation.T, amounts
-
-    def field_beside(self, number: int, charges: Array, points: Array) -> Array:
-        """B (k, 3) T at points (k, 3) m beside magnet `number`, of charges (n,) T on it: as exact as `refined` is."""
-        places, amounts = self.refined(number, charges)
-        areas = self.refined(number, np.ones_like(charges))[1]
-        amounts -= amounts.sum() / areas.sum() * areas  # a magnet has no charge
-        found, few = np.empty(points.shape), max(1, PAIRS // len(places))
-        for start in range(0, len(points), few):
-            away = points[start : start + few, None] - places
-            square = np.einsum("pna,pna->pn", away, away)
-            found[start : start + few] = np.einsum("pn,pna->pa", amounts / (square * np.sqrt(square)), away)
-        return found / FOUR_PI
-
-    def response(self, field: Array) -> Array:
-        """Charges σ (n, k) T that k fields with n·b (n, k) T of sources elsewhere make; raises as `solved`."""
-        right = self.contrast[:, None] * field
-        if len(right) <= DENSE:
-            return np.asarray(scipy.linalg.lu_solve(self._factors, right))
-        blocks = np.array_split(right, max(1, right.shape[1] // BLOCK), axis=1)
-        return np.concatenate([self._settled(block) for block in blocks], axis=1)
-
-    def _settled(self, right: Array) -> Array:
-        """`solved` of several columns at once, by turns that each leave a part of χ/2, or else one by one."""
-        share = 1 / (1 + self.contrast / 2)[:, None]
-        found = share * right
-        for _ in range(TURNS):
-            before = found
-            found = share * (right + self.contrast[:, None] * self.normal_field(before))
-            if np.abs(found - before).max() <= SOLVED * np.abs(found).max():
-                return np.asarray(found)
-        return np.stack([self.solved(column) for column in right.T], axis=1)
-
-    def solved(self, right: Array) -> Array:
-        """σ (n,) T of (1 + χ/2) σ - χ K σ = `right` (n,) T. Raises ComputationError where they do not converge."""
-        share = 1 / (1 + self.contrast / 2)
-        size, changed = (len(right),) * 2, share * self.contrast
-        whole = scipy.sparse.linalg.LinearOperator(size, lambda v: v - changed * self.normal_field(v), dtype=float)
-        rtol = SOLVED * (1 + float(self.contrast.max()))
-        found, failed = scipy.sparse.linalg.gmres(whole, share * right, rtol=rtol, restart=60, maxiter=5)
-        if not failed:
-            return np.asarray(found)
-        if len(right) > DENSE:
-            raise ComputationError("The charges on the magnets' surfaces did not converge. Choose --model fem.")
-        return np.asarray(scipy.linalg.lu_solve(self._factors, right))
-
-    @cached_property
-    def _factors(self) -> tuple[Array, NDArray[np.int32]]:
-        """Of (1 + χ/2) - χ K, for many right-hand sides, or where the iteration of `solved` does not converge."""
-        whole = np.zeros((len(self.places),) * 2, order="F")  # which is factorised in its place
-        for surface, mine, (at, rows) in zip(self._surfaces, self._of, self._near, strict=True):
-            whole[np.ix_(mine, mine)] = surface.kernel
-            whole[np.ix_(at, mine)] = rows
-        for far, blocks in enumerate(self._from_afar if self._distance.any() else ()):
-            shares = [surface.coarse[far][2] for surface in self._surfaces]
-            owner = np.repeat(np.arange(len(shares)), [share.shape[1] for share in shares])
-            for share, mine, (at, rows) in zip(shares, self._of, blocks, strict=True):
-                amounts = (share * self.areas[mine, None]).T
-                for k in np.unique(owner[at]).tolist():
-                    whole[np.ix_(self._of[k], mine)] = shares[k] @ (rows[owner[at] == k] @ amounts)
-        whole *= -self.contrast[:, None]
-        whole[np.diag_indices_from(whole)] += 1 + self.contrast / 2
-        factors, pivots = scipy.linalg.lu_factor(whole, overwrite_a=True)
-        return factors, pivots
-
-    def polarizability(self) -> Array:
-        """(3, 3) A m²/T: the moment of all magnets together that a uniform field induces, ∫ x σ dS/μ0 of a unit one."""
-        found = (self.places * self.areas[:, None]).T @ self.response(self.normals) / MU_0
-        return np.asarray((found + found.T) / 2)
-
-    def beyond(self, carriers: Sequence[Magnet]) -> Array:
-        """σ (n,) T beyond n·J' of uniform `carriers`, one for each of all magnets."""
-        sizes = np.array([magnet.body.size.min() for magnet in self.magnets])[self.owner]
-        closed = remanent_field(carriers, self.places - INSET * sizes[:, None] * self.normals)
-        kept = [one for one, magnet in zip(carriers, self.all, strict=True) if magnet.contrast]
-        pairs = zip(self.magnets, kept, strict=True)
-        rest = np.array([m.polarization_in_rotor - c.polarization_in_rotor for m, c in pairs])
-        return self.solved(np.sum((rest[self.owner] + self.contrast[:, None] * closed) * self.normals, axis=1))

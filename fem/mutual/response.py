@@ -18,10 +18,10 @@ from ...geometry.overlap import TOUCHING, sphere_overlap
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import places_off
-from ..closed_forms.moments import carrier, volume_rule
+from ..closed_forms.moments import carriers_of, volume_rule
 from ..closed_forms.potentials import unit_dipole_fields, unit_dipole_potentials
 from ..closed_forms.uniform import UniformField, remanent_field
-from ..elements.surface import SurfaceCharges
+from ..elements.surface_charges import SurfaceCharges
 from ..harmonics import interior
 from ..harmonics.expansion import box_rule, gauss, uniform_moments
 from ..harmonics.interior import Ball
@@ -73,7 +73,7 @@ def _degrees(share: float, decay: float, most: int) -> int:
 # Integration points per axis in a magnet for the closed form; its logarithm at the edges is met to round-off
 NODES = 24
 DIRECT_DIGITS = 12.0  # as `Effort.digits`, for the direct part of the response
-OWN = 8  # for the rotor's own field in a table, which then errs by 7e-5
+OWN = 8  # for the rotor's own field in a table, which then errs by 2e-5
 EDGES = 10.0  # by how much the part of these charges may be larger where they are densest
 MOMENTS = 10  # degrees at most of a far magnet's moments; where more are needed, its closed form is taken
 ACROSS = 8  # of a rule in a magnet for what its second permeability adds to its own field
@@ -124,7 +124,7 @@ class ChargeResponse:
         if self.permeable:
             self.charges = SurfaceCharges([isotropic(*each) for each in zip(magnets, means, strict=True)], count)
             along = [isotropic(magnet, magnet.recoil_permeability) for magnet in magnets]
-            carriers = tuple(carrier(magnet) for magnet in along)
+            carriers = carriers_of(along)
             alone = SurfaceCharges(along, own or count)
             amounts, bear = alone.areas * alone.beyond(carriers), np.flatnonzero([m.contrast for m in along])
             for k, number in enumerate(bear):

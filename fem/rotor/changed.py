@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...geometry.solids import Part
-from ..closed_forms.moments import carrier
-from ..elements.surface import SurfaceCharges
+from ..closed_forms.moments import carriers_of
+from ..elements.surface_charges import SurfaceCharges
 from ..harmonics.expansion import MultipoleExpansion, merged, uniform_moments
 from .charges import bear_charges, charged_expansion
 from .models import DEGREE, Accuracy, Rotor, extrapolated_tail, nonzero
@@ -81,7 +81,7 @@ def _closed(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:
 
 @lru_cache(maxsize=8)  # of the magnets that others differ from it is asked for again and again
 def _with_charges(rotor: Rotor) -> tuple[Rotor, tuple[MultipoleExpansion, ...]]:
-    carriers = tuple(carrier(magnet) for magnet in rotor)
+    carriers = carriers_of(rotor)
     found = []
     if any(m.contrast for m in rotor):
         surfaces = SurfaceCharges(rotor, STEADY_NODES)

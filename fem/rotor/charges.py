@@ -14,8 +14,9 @@ from ...geometry.cutting import CONVERGENCE
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box
 from ...geometry.solids import Part
-from ..closed_forms.moments import carrier
-from ..elements.surface import SurfaceCharges, bears_charges, gap
+from ..closed_forms.moments import carriers_of
+from ..elements.surface import FEW, bears_charges, gap
+from ..elements.surface_charges import SurfaceCharges
 from ..harmonics.expansion import FittedExpansions, MultipoleExpansion, summed_derivatives, without_noise
 from ..harmonics.solid import FOUR_PI, weighted_sums
 from . import models
@@ -25,6 +26,7 @@ from .table import CHARGES, PIECES, RotorTable
 NODES = (4, 6, 8, 10, 12, 14, 16, 20, 24)  # along an edge of a face, from coarse to fine
 # Ratio of two steps of these that is assumed at first, and between which one is believed: a geometric series is left
 FIRST_RATE, FASTEST_RATE, SLOWEST_RATE = 0.3, 0.25, 0.75
+FASTEST_OF_FEW = 0.4  # whose errors fall as n⁻⁴
 RATE_SAFETY = 2.0
 CONTACT = 0.02  # gap, in edges, below which round bodies count as touching
 LARGEST = 6e7  # numbers of the matrices that are kept, at most
@@ -161,7 +163,7 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
             f'Input rotor must have magnets that charges on their surfaces describe, for the model "surface"; instead '
             f"{reason}. Choose --model fem."
         )
-    carriers, permeable = tuple(carrier(magnet) for magnet in magnets), [m for m in magnets if m.contrast]
+    carriers, permeable = carriers_of(magnets), [m for m in magnets if m.contrast]
     converge = converging(magnets, accuracy, points)
     compact = [magnet for magnet, converges in zip(permeable, converge, strict=True) if converges]
     ratios = _ratios(compact, points)
@@ -171,7 +173,9 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
     surfaces, fits = None, list[tuple[FittedExpansions, float] | None]()
     # the fewest nodes do not show what pieces of a magnet need
     for k, more in enumerate(NODES[len(compact) < len(permeable) :] if permeable else ()):
-        if k > 1 and surfaces and surfaces.numbers_at(more) > LARGEST:
+        # few crowd otherwise than more do, so that a step from these to those says nothing of what is left
+        alike = (count <= FEW) == (more <= FEW)
+        if k > 1 and surfaces and surfaces.numbers_at(more if alike else NODES[NODES.index(more) + 1]) > LARGEST:
             break
         count, surfaces = more, SurfaceCharges(magnets, more)
         charges = surfaces.beyond(carriers)
@@ -187,12 +191,14 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
                 own, last = beside[0].of(surfaces.field_beside(number, charges, beside[0].points))
                 pieces += [replace(e, coefficients=beside[1] * e.coefficients) for e in last]
                 whole = whole + own
-        if not k:
+        if not alike or not k:
+            before = np.inf
             continue
         step = [replace(b, coefficients=b.coefficients - a.coefficients) for a, b in zip(coarse, whole, strict=True)]
         missed = summed_derivatives(step, points[::SOME], 1)
         size = float(np.max(np.linalg.norm(missed, axis=1) / scale[::SOME]))
-        rate = float(np.clip(size / before, FASTEST_RATE, SLOWEST_RATE)) if np.isfinite(before) else FIRST_RATE
+        fastest = FASTEST_OF_FEW if count <= FEW else FASTEST_RATE
+        rate = float(np.clip(size / before, fastest, SLOWEST_RATE)) if np.isfinite(before) else FIRST_RATE
         left, before = RATE_SAFETY * rate / (1 - rate), size
         steps = [replace(part, coefficients=left * part.coefficients) for part in step]
         watch("charges on the surfaces", k / len(NODES))

@@ -20,7 +20,8 @@ from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import rotation_matrix
 from ..closed_forms.potentials import unit_dipole_fields
-from ..elements.surface import SurfaceCharges, bears_charges
+from ..elements.surface import bears_charges
+from ..elements.surface_charges import SurfaceCharges
 from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
 from ..harmonics.interior import field_coefficients, harmonics, matrices, shells as multipole_degrees, sphere
 from ..harmonics.solid import factorials, regular_values, tensors

@@ -10,7 +10,7 @@ from article import MAGNETS, NO_DRAG
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate
 from spinlev.dynamics.motion.body_shape import InducedShape
 from spinlev.dynamics.motion.effect import Interaction
-from spinlev.fem.elements.surface import SurfaceCharges
+from spinlev.fem.elements.surface_charges import SurfaceCharges
 from spinlev.fem.harmonics.expansion import polynomial_rule
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.floater import polarizability_tensor

@@ -1,0 +1,282 @@
+"""Charges on the surfaces of permeable magnets that respond to each other; see `surface` for one of them.
+
+What bodies of one shape are to each other depends on how they lie: pairs that lie alike, as most in a ring or a row do,
+have one matrix.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+
+from ...geometry.common import MU_0, Array, ComputationError
+from ...geometry.magnets import Magnet
+from ...geometry.solids import moved, of_one_shape
+from ..closed_forms.uniform import demagnetizing_tensor, remanent_field
+from ..harmonics.solid import FOUR_PI
+from .surface import FEW, INSET, SURFACES, far_rows
+
+DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and fields otherwise at once
+SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
+SOLVED_BY_FEW = 1e-4  # the same of few nodes, whose own errors of B are thirty times what it does
+TURNS = 25  # of magnets' responses to each other; with χ up to 1/2 they settle to that in fewer
+PAIRS = 1 << 15  # of a charge and a place at once, so that they stay in the processor's cache
+# Distances of two bodies' centres, in the sum of their circumradii, from which on the few places of `Surface.coarse` on
+# each stand for all. What is charged beyond the carriers has hardly a field there.
+FAR = (1.5, 6.0)
+ALIKE = 1e-11  # differences of turns, and of places in circumradii, below which two pairs lie alike
+
+
+@dataclass(frozen=True)
+class _View:
+    """How bodies of one shape see those of another (or the same) at one of the distances, in the frames of these."""
+
+    far: int  # 0: near, else which of `FAR`
+    seer: int  # number of the shape
+    seen: int
+    pairs: list[tuple[NDArray[np.intp], NDArray[np.intp]]]  # which bodies of both shapes, for each way to lie
+    places: Array  # (ways, k, 3) m, of the seer
+    normals: Array
+
+
+class SurfaceCharges:
+    """Charges on the surfaces of permeable magnets that respond to each other.
+
+    `magnets`: each of them `bears_charges`; `count`: n, nodes along an edge of a face.
+
+    Attributes
+    ----------
+    magnets : those that are permeable, on whose surfaces the nodes are
+    places, normals, areas : of the nodes, (n, 3) m, outward (n, 3) and (n,) m²; rotor's frame, magnet by magnet
+    owner : (n,) which of `magnets` a node is of
+    contrast : (n,) χ of the magnet that a node is of
+    """
+
+    def __init__(self, magnets: Sequence[Magnet], count: int) -> None:
+        self.count = count
+        self.all, self.magnets = tuple(magnets), tuple(magnet for magnet in magnets if magnet.contrast)
+        bodies = [magnet.body for magnet in self.magnets]
+        self._shapes = of_one_shape(bodies)
+        self._bodies = [moved(bodies[numbers[0]], np.zeros(3), np.eye(3)) for numbers in self._shapes]
+        self._surfaces = [SURFACES[type(body)](body, count) for body in self._bodies]
+        self._centers = np.array([body.center for body in bodies])
+        self._turns = np.array([body.rotation for body in bodies])
+        self._shape = np.empty(len(bodies), int)  # of each body
+        for shape, numbers in enumerate(self._shapes):
+            self._shape[numbers] = shape
+        sizes = np.array([len(surface.places) for surface in self._surfaces])[self._shape]
+        radii = np.array([body.circumradius for body in self._bodies])[self._shape]
+        self.owner, first = np.repeat(np.arange(len(bodies)), sizes), np.cumsum(sizes) - sizes
+        # nodes of all bodies of a shape, (n, bodies)
+        self._of = [first[numbers] + np.arange(sizes[numbers[0]])[:, None] for numbers in self._shapes]
+        self.places, self.normals = np.empty((2, len(self.owner), 3))
+        self.areas = np.empty(len(self.owner))
+        for numbers, of, surface in zip(self._shapes, self._of, self._surfaces, strict=True):
+            turns = self._turns[numbers].swapaxes(1, 2)
+            self.places[of.T] = self._centers[numbers][:, None] + surface.places @ turns
+            self.normals[of.T] = surface.normals @ turns
+            self.areas[of] = surface.areas[:, None]
+        self.contrast = np.array([magnet.recoil_permeability - 1 for magnet in self.magnets])[self.owner]
+        distances = np.linalg.norm(self._centers[:, None] - self._centers, axis=2)
+        # of each pair whether they are near each other, 0, or far, 1 and more
+        self._distance = np.searchsorted(FAR, distances / (radii[:, None] + radii))
+
+    @cached_property
+    def _views(self) -> list[_View]:
+        """How the bodies see each other; pairs that lie alike are one way."""
+        found, shapes = list[_View](), list(enumerate(map(np.array, self._shapes)))
+        for far, (seer, first), (seen, second) in product(range(len(FAR) + 1), shapes, shapes):
+            there = (self._distance[np.ix_(first, second)] == far) & np.not_equal.outer(first, second)
+            if not there.any():
+                continue
+            ways, (targets, sources) = dict[bytes, list[int]](), np.nonzero(there)
+            back = self._turns[second[sources]].swapaxes(1, 2)
+            away = self._centers[first[targets]] - self._centers[second[sources]]
+            away, turned = np.einsum("pij,pj->pi", back, away), back @ self._turns[first[targets]]
+            poses = np.concatenate([away / self._bodies[seen].circumradius, turned.reshape(-1, 9)], axis=1)
+            for number, pose in enumerate(np.round(poses / ALIKE).astype(int)):
+                ways.setdefault(pose.tobytes(), []).append(number)
+            pairs, one = [(targets[way], sources[way]) for way in ways.values()], [way[0] for way in ways.values()]
+            places, normals, _ = self._few(far, seer)
+            turn = turned[one].swapaxes(1, 2)
+            found.append(_View(far, seer, seen, pairs, away[one][:, None] + places @ turn, normals @ turn))
+        return found
+
+    def _few(self, far: int, shape: int) -> tuple[Array, Array, Array | None]:
+        """Places and normals of a shape that do at a distance, and the nodes' values by those; None: they are all."""
+        surface = self._surfaces[shape]
+        return surface.coarse[far - 1] if far else (surface.places, surface.normals, None)
+
+    @cached_property
+    def _rows(self) -> list[Array]:
+        """(ways, k, l) n·h (T) at each view's places, by the nodes' charges or, from afar, by charges times areas."""
+        found = []
+        for view in self._views:
+            surface = self._surfaces[view.seen]
+            places, normals = (some.reshape(-1, 3) for some in (view.places, view.normals))
+            if view.far:
+                sources = self._few(view.far, view.seen)[0]
+                rows = far_rows(places, normals, sources, np.ones(len(sources)))
+            else:
+                rows = np.empty((len(places), len(surface.places)))
+                close = self._bodies[view.seen].distance(places) < surface.reach
+                rows[~close] = far_rows(places[~close], normals[~close], surface.places, surface.areas)
+                if close.any():
+                    rows[close] = surface.rows_nearby(places[close], normals[close])
+            found.append(rows.reshape(*view.places.shape[:2], -1))
+        return found
+
+    def _applied(self, matrices: Sequence[Array], given: Mapping[tuple[int, int], Array]) -> Array:
+        """(n, c) at all nodes: what `matrices` (ways, k, l) of the views make of what is `given` at what they see.
+
+        That is (l, bodies, c), by distance and shape.
+        """
+        seen, found = dict[tuple[int, int], Array](), np.zeros((len(self.places), next(iter(given.values())).shape[2]))
+        for view, ways in zip(self._views, matrices, strict=True):
+            shape = (ways.shape[1], len(self._shapes[view.seer]), found.shape[1])
+            there = seen.setdefault((view.far, view.seer), np.zeros(shape))
+            for matrix, (targets, sources) in zip(ways, view.pairs, strict=True):
+                there[:, targets] += _times(matrix, given[view.far, view.seen][:, sources])
+        for (far, seer), there in seen.items():
+            share = self._few(far, seer)[2]
+            found[self._of[seer]] += there if share is None else _times(share, there)
+        return found
+
+    def numbers_at(self, count: int) -> float:
+        """Of all matrices, with `count` nodes along an edge, about."""
+        own = sum(len(surface.places) ** 2 for surface in self._surfaces)
+        near = sum(rows.size for view, rows in zip(self._views, self._rows, strict=True) if not view.far)
+        return (count / self.count) ** 4 * float(own + near)
+
+    def normal_field(self, charges: Array) -> Array:
+        """K σ (n, ...) T of charges (n, ...) T."""
+        columns = charges.reshape(len(charges), -1)
+        given = {(0, shape): columns[of] for shape, of in enumerate(self._of)}
+        for far, shape in {(view.far, view.seen) for view in self._views if view.far}:
+            amounts = self._surfaces[shape].areas[:, None, None] * given[0, shape]
+            given[far, shape] = _times(self._surfaces[shape].coarse[far - 1][2].T, amounts)
+        found = self._applied(self._rows, given)
+        for shape, (of, surface) in enumerate(zip(self._of, self._surfaces, strict=True)):
+            found[of] += _times(surface.kernel, given[0, shape])
+        return found.reshape(charges.shape)
+
+    def refined(self, number: int, charges: Array) -> tuple[Array, Array]:
+        """Places (k, 3) m on one of `magnets`, and amounts (k,) T m² there, with the moments of charges (n,) T."""
+        body, surface = self.magnets[number].body, self._surfaces[self._shape[number]]
+        places, amounts = surface.refined(charges[self.owner == number])
+        return body.center + places @ body.rotation.T, amounts
+
+    def field_beside(self, number: int, charges: Array, points: Array) -> Array:
+        """B (k, 3) T at points (k, 3) m beside magnet `number`, of charges (n,) T on it: as exact as `refined` is."""
+        places, amounts = self.refined(number, charges)
+        areas = self.refined(number, np.ones_like(charges))[1]
+        amounts -= amounts.sum() / areas.sum() * areas  # a magnet has no charge
+        return _field(places, amounts, points)
+
+    def field(self, charges: Array, points: Array) -> Array:
+        """B (k, 3) T at points (k, 3) m off all magnets, of charges (n,) T, by the nodes' own rule."""
+        return _field(self.places, charges * self.areas, points)
+
+    def response(self, field: Array) -> Array:
+        """Charges σ (n, k) T that k fields with n·b (n, k) T of sources elsewhere make; raises as `solved`."""
+        right = self.contrast[:, None] * field
+        if len(right) <= DENSE:
+            return np.asarray(scipy.linalg.lu_solve(self._factors, right))
+        blocks = np.array_split(right, max(1, right.shape[1] // BLOCK), axis=1)
+        return np.concatenate([self._settled(block) for block in blocks], axis=1)
+
+    def _settled(self, right: Array) -> Array:
+        """`solved` of several columns at once, by turns that each leave a part of χ/2, or else one by one."""
+        share = 1 / (1 + self.contrast / 2)[:, None]
+        found = share * right
+        for _ in range(TURNS):
+            before = found
+            found = share * (right + self.contrast[:, None] * self.normal_field(before))
+            if np.abs(found - before).max() <= SOLVED * np.abs(found).max():
+                return np.asarray(found)
+        return np.stack([self.solved(column) for column in right.T], axis=1)
+
+    def solved(self, right: Array, residual: float = SOLVED) -> Array:
+        """σ (n,) T of (1 + χ/2) σ - χ K σ = `right` (n,) T. Raises ComputationError where they do not converge."""
+        share = 1 / (1 + self.contrast / 2)
+        size, changed = (len(right),) * 2, share * self.contrast
+        whole = scipy.sparse.linalg.LinearOperator(size, lambda v: v - changed * self.normal_field(v), dtype=float)
+        rtol = residual * (1 + float(self.contrast.max()))
+        found, failed = scipy.sparse.linalg.gmres(whole, share * right, rtol=rtol, restart=60, maxiter=5)
+        if not failed:
+            return np.asarray(found)
+        if len(right) > DENSE:
+            raise ComputationError("The charges on the magnets' surfaces did not converge. Choose --model fem.")
+        return np.asarray(scipy.linalg.lu_solve(self._factors, right))
+
+    @cached_property
+    def _factors(self) -> tuple[Array, NDArray[np.int32]]:
+        """Of (1 + χ/2) - χ K, for many right-hand sides, or where the iteration of `solved` does not converge."""
+        whole = np.zeros((len(self.places),) * 2, order="F")  # which is factorised in its place
+        for surface, of in zip(self._surfaces, self._of, strict=True):
+            for mine in of.T:
+                whole[np.ix_(mine, mine)] = surface.kernel
+        for view, ways in zip(self._views, self._rows, strict=True):
+            left, right = (self._few(view.far, shape)[2] for shape in (view.seer, view.seen))
+            for rows, pairs in zip(ways, view.pairs, strict=True):
+                if left is not None and right is not None:
+                    rows = left @ rows @ (right.T * self._surfaces[view.seen].areas)
+                for target, source in zip(*pairs, strict=True):
+                    whole[np.ix_(self._of[view.seer][:, target], self._of[view.seen][:, source])] = rows
+        whole *= -self.contrast[:, None]
+        whole[np.diag_indices_from(whole)] += 1 + self.contrast / 2
+        factors, pivots = scipy.linalg.lu_factor(whole, overwrite_a=True)
+        return factors, pivots
+
+    def polarizability(self) -> Array:
+        """(3, 3) A m²/T: the moment of all magnets together that a uniform field induces, ∫ x σ dS/μ0 of a unit one."""
+        found = (self.places * self.areas[:, None]).T @ self.response(self.normals) / MU_0
+        return np.asarray((found + found.T) / 2)
+
+    def beyond(self, carriers: Sequence[Magnet]) -> Array:
+        """σ (n,) T beyond n·J' of uniform `carriers`, one for each of all magnets."""
+        others = [one for one, magnet in zip(carriers, self.all, strict=True) if not magnet.contrast]
+        kept = [one for one, magnet in zip(carriers, self.all, strict=True) if magnet.contrast]
+        uniform = np.array([one.polarization for one in kept])
+        rest = np.array([magnet.polarization for magnet in self.magnets]) - uniform
+        inset = np.array([magnet.body.size.min() for magnet in self.magnets])[self.owner, None] * INSET * self.normals
+        closed = np.sum(remanent_field(others, self.places - inset) * self.normals, axis=1)
+        given, matrices = dict[tuple[int, int], Array](), []
+        for view in self._views:
+            places = view.places - INSET * self._bodies[view.seer].size.min() * view.normals
+            matrices.append(self._by_carrier(view.seen, places, view.normals))
+            given[view.far, view.seen] = uniform[self._shapes[view.seen]].T[..., None]
+        if given:
+            closed += self._applied(matrices, given)[:, 0]
+        right = self.contrast * closed
+        for shape, (numbers, of, surface) in enumerate(zip(self._shapes, self._of, self._surfaces, strict=True)):
+            places = surface.places - INSET * self._bodies[shape].size.min() * surface.normals
+            own = self._by_carrier(shape, places, surface.normals)
+            right[of] += self.contrast[of] * (own @ uniform[numbers].T) + surface.normals @ rest[numbers].T
+        return self.solved(right, SOLVED if self.count > FEW else SOLVED_BY_FEW)
+
+    def _by_carrier(self, shape: int, places: Array, normals: Array) -> Array:
+        """(..., 3) n·h at `places` (..., 3) m, with `normals`, by the polarisation of a body; in its frame."""
+        tensors = demagnetizing_tensor(self._bodies[shape], places.reshape(-1, 3)).reshape(*places.shape, 3)
+        return np.asarray(np.einsum("...a,...ab->...b", normals, tensors))
+
+
+def _field(places: Array, amounts: Array, points: Array) -> Array:
+    """B (k, 3) T at points (k, 3) m of `amounts` (n,) T m² of charge at places (n, 3) m."""
+    found, few = np.empty(points.shape), max(1, PAIRS // len(places))
+    for start in range(0, len(points), few):
+        away = points[start : start + few].T[..., None] - places.T[:, None]
+        square = away[0] ** 2 + away[1] ** 2 + away[2] ** 2
+        found[start : start + few] = np.einsum("pn,apn->pa", amounts / (square * np.sqrt(square)), away)
+    return found / FOUR_PI
+
+
+def _times(matrix: Array, values: Array) -> Array:
+    """(k, ...): a matrix (k, l) times values (l, ...)."""
+    found = matrix @ values.reshape(len(values), -1)
+    return np.asarray(found.reshape(len(matrix), *values.shape[1:]))
