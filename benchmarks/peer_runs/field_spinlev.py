@@ -1,8 +1,8 @@
 """spinlev: the rotor's table to a relative accuracy, from nothing, then the field at the points.
 
 By finite elements, or by charges on surfaces ("surface"). Or by so many nodes of such charges along an edge alone
-("charges"), which as the peers do not say how wrong they are. The tilted cube may also be computed as one that lies
-straight, and turned: a reference without a tilted mesh."""
+("charges"), which as the peers do not say how wrong they are; with 0 the magnets are uniform, each by itself. The
+tilted cube may also be computed as one that lies straight, and turned: a reference without a tilted mesh."""
 
 import sys
 from functools import partial
@@ -34,8 +34,12 @@ rotor = tuple(
 def field():
     """B at the points."""
     if "charges" in sys.argv:
-        uniform, charges = carriers_of(rotor), SurfaceCharges(rotor, int(resolution))
-        return remanent_field(uniform, points) + charges.field(charges.beyond(uniform), points)
+        uniform = carriers_of(rotor)
+        field = remanent_field(uniform, points)
+        if not resolution:
+            return field
+        charges = SurfaceCharges(rotor, int(resolution))
+        return field + charges.field(charges.beyond(uniform), points)
     table = rotor_table(rotor, "surface" if "surface" in sys.argv else "fem", resolution, nearest=0.007)
     return table.evaluate(points @ way)[0] @ way.T
 
