@@ -89,10 +89,6 @@ class Gradient:
         There is none by a key, or no equations, where it is not known: see `reasons`.
         """
         base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), known.currents is not None)
-        if known.kind == LOCKED:
-            why = "derivatives of frequency-locked equilibria of a body that is not round are not known"
-            self.reasons[LOCKED] = why
-            return {}, None, base
         implicit = Implicit(known, base.setting)
         if implicit.at_fold:
             self.reasons["fold"] = "at a fold an equilibrium has no derivatives"
@@ -102,6 +98,13 @@ class Gradient:
         found = {}
         base.prepare(keys)
         for key in keys:
+            of_shape = key.startswith("floater.") and key.rstrip(".0123456789").endswith(("_mm", "permeability"))
+            if known.kind == LOCKED and of_shape:
+                # how it lies about its moment is held by hardly anything: what meshes leave in its tensors is more
+                self.reasons[LOCKED] = (
+                    "derivatives of frequency-locked equilibria by the floater's sizes and permeability are not known"
+                )
+                continue
             if base.with_plate and (why := unknown_over_plate(key)):
                 self.reasons[why] = why
                 continue

@@ -119,7 +119,7 @@ class NearbyScenes:
         if self.averaged:
             scene, interaction, _ = mean_over_turns(scene, interaction)
         scales = Scales.of(scene)
-        values = parameters(scene, scales, frozen_spin=True)
+        values = parameters(scene, scales, frozen_spin=scene.floater.round)
         rates = self.levitation.rates
         if interaction is not self.levitation.interaction or self.averaged:
             rates = (self.setting.rates if "setting" in self.__dict__ else rates).elsewhere(interaction)

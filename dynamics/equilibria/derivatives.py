@@ -48,14 +48,24 @@ class Setting:
     plate: PlateForce | None = None
 
     def linear(self, turn: State, spin: float) -> tuple[Array, Pencil, Array, Array]:
-        """Residual (12 n,) and pencil of n states (n, 3), and what is `conserved` with a body `spin` s."""
-        states, values = self.scales.pack(turn), self.values
+        """Residual (m n,) and pencil of n states (n, 3), and what is `conserved` with a body `spin` s.
+
+        m is 12, or 13 of a body that is not round.
+        """
+        states, values = self.packed(turn), self.values
         if len(states) == 1:  # what shakes a fixed point moves its mean to second order alone
             values = values.copy()
             values[SHAKING] = 0.0
         residual, pencil = OrbitProblem(self.rates, values, self.plate, len(states)).linear(states)
         rate = abs(float(self.values[Parameter.RATE]))
         return residual, pencil, *conserved(states, spin * self.scales.spin_ratio * rate)
+
+    def packed(self, turn: State) -> Array:
+        """Scaled states (n, m); of a turn there are two quaternions, of which all instants have the first one's."""
+        states = self.scales.pack(turn)
+        if self.rates.turning:
+            states[:, 6:10] *= np.sign(states[:, 6:10] @ states[0, 6:10])[:, None]
+        return states
 
     def jacobi(self, turn: State) -> float:
         """Jacobi integral of a fixed point, energy less ω times the angular momentum about the axis, J."""
@@ -88,8 +98,8 @@ class _ModeAt:
 class Tangent:
     """The way of an equilibrium by one number."""
 
-    start: Array  # (n, 12) scaled states
-    change: Array  # (n, 12) their derivatives
+    start: Array  # (n, m) scaled states
+    change: Array  # (n, m) their derivatives
     modes: dict[str, complex]  # derivatives of growth rate + 2πi frequency of each mode, 1/s
     unpack: Callable[[Array], Equilibrium] = field(repr=False)
     unsolved: float = 0.0  # relative error by how far the equilibrium is off
@@ -125,12 +135,12 @@ def _eigenvalue(pencil: Pencil, near: _ModeAt, value: complex) -> complex:
 
 
 class Implicit:
-    """An equilibrium's equations, of a round body or its mean, factorised for derivatives by many numbers."""
+    """An equilibrium's equations, factorised for derivatives by many numbers."""
 
     def __init__(self, known: Equilibrium, setting: Setting) -> None:
         self.known, self.setting = known, setting
-        turn = known.turn or State(*(vector[None] for vector in known.state.vectors))
-        self.start = setting.scales.pack(turn)
+        turn = known.turn or known.state[None]
+        self.start = setting.packed(turn)
         residual, self._pencil, rows, aims = setting.linear(turn, known.spin)
         left, values, right = np.linalg.svd(np.vstack([self._pencil.matrix(0.0), rows]), full_matrices=False)
         self.conditioning = float(values[-1] / values[0])  # zero at a fold
@@ -163,7 +173,7 @@ class Implicit:
         return _ModeAt(name, value, left, right, speed)
 
     def missed(self, nearby: Sequence[Nearby]) -> Array:
-        """F_p (2, 12 n + 2) by a number, from the equations at some values of it, and the same of two orders less."""
+        """F_p (2, m n + 2 or 1) by a number, from the equations at some values of it, and that of two orders less."""
         turn, found = self.setting.scales.unpack(self.start), np.zeros((2, self._inverse.shape[1]))
         for there in nearby:
             residual, _, _, aims = there.setting.linear(turn, self.known.spin)
@@ -175,7 +185,7 @@ class Implicit:
         return np.asarray(-(missed @ self._lost) / (by_parameter @ self._lost))
 
     def _along(self, change: Array) -> Array:
-        """Derivative (12 n + 2,) of F along a change of a periodic motion's states.
+        """Derivative (m n + 2 or 1,) of F along a change of a periodic motion's states.
 
         F_x has the brake of the rotor's metal at each instant's place as if it did not change with the place, which is
         exact where the floater rests in the rotor's frame alone, and else leaves 5e-6 of a derivative.
@@ -248,9 +258,9 @@ class Implicit:
         return replace(found, modes=tuple(modes), growth_per_s=growth)
 
     def _solved(self, setting: Setting, states: Array) -> Array | None:
-        """States (n, 12) near others that are in balance; a fixed point is sought in its five unknowns alone."""
+        """States (n, m) near others that are in balance; a fixed point is sought in its five unknowns alone."""
         spin, size = self.known.spin, np.inf
-        if self.known.turn is None and setting.plate is None:
+        if self.known.turn is None and setting.plate is None and not setting.rates.turning:
             values = setting.values.copy()
             values[SHAKING] = 0.0
             balance = Balance(setting.rates, values, spin * setting.scales.spin_ratio)
@@ -269,9 +279,9 @@ class Implicit:
         return None
 
     def _equilibrium(self, states: Array) -> Equilibrium:
-        """The equilibrium of other states (n, 12), of which the motion alone is right."""
+        """The equilibrium of other states (n, m), of which the motion alone is right."""
         mean = states.mean(axis=0)
-        mean[6:9] /= np.linalg.norm(mean[6:9])
+        mean[6:-3] /= np.linalg.norm(mean[6:-3])
         scales = self.setting.scales
         turn = None if self.known.turn is None else scales.unpack(states)
         return replace(self.known, state=scales.unpack(mean), turn=turn)

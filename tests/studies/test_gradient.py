@@ -25,7 +25,7 @@ from spinlev.geometry.scene.contents import Drag
 from spinlev.geometry.scene.files import changed
 from spinlev.studies.candidates import Candidate
 from spinlev.studies.cli.main import run
-from spinlev.studies.gradient import Gradient, range_ends
+from spinlev.studies.gradient import Gradient, answer_of, derivatives_of, range_ends
 from spinlev.studies.levitation import Levitation
 
 CUBE = {"edge_mm": 10.0, "remanence_T": 1.305}
@@ -316,3 +316,32 @@ def test_a_rigid_cube_has_derivatives_of_its_mean():
     locked = next(e for e in here.levitation.equilibria if e.kind == LOCKED)
     with pytest.raises(sl.InputError, match="not frequency-locked"):
         _ = Candidate(here.levitation, locked, ()).ends
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plate", ["none", "slab"])
+def test_frequency_locked_equilibria_have_derivatives(plate):
+    """Of a cuboid of three unlike edges, alone and over a slab, where it is a periodic motion: against whole ones."""
+    body = {"shape": "cuboid", "size_mm": [9.0, 10.0, 11.0], "remanence_T": 1.305, "density_kg_m3": 7500.0}
+    metal = {"size_mm": [100.0, 240.0, 30.0], "center_mm": [0.0, 0.0, -92.0], "conductivity_S_m": 3.5e7}
+    whole = scene(130.0, sl.tilt(angle_deg=10.0, **CUBE), body, plate=metal)
+    models, names = sl.Models("cuboid", plate, interaction="rigid"), ["distance", "polar_angle", "mode_frequency"]
+
+    def locked(there):
+        return [e for e in Levitation(there, models).equilibria if e.kind == LOCKED]
+
+    gradient = Gradient(Levitation(whole, models))
+    known = next(e for e in gradient.levitation.equilibria if e.kind == LOCKED)
+    keys = ["rotor.remanence_T", "floater.density_kg_m3", "frequency_hz", "floater.size_mm.0"]
+    ways = gradient.ways(known, keys)[0]
+    assert list(ways) == keys[:3]
+    assert "sizes" in gradient.reasons[LOCKED]
+    for key, way in ways.items():
+        value, ends = gradient.numbers[key], list[np.ndarray]()
+        for step in (1e-3, -1e-3, 2e-3, -2e-3):
+            near = locked(changed(whole, {key: value * (1 + step)}))
+            one = min(near, key=lambda e: np.abs(e.state.axes - known.state.axes).max())
+            ends.append(np.concatenate([np.ravel(answer_of(one, name)) for name in names]))
+        expected = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12e-3 * value)
+        found = np.concatenate([np.ravel(part) for part in derivatives_of(known, way, names)])
+        assert found == pytest.approx(expected, rel=1e-5, abs=1e-8 * np.abs(ends[0]).max() / value)
