@@ -47,12 +47,12 @@ class Setting:
     values: Array  # runtime parameters, drag along the moment left out
     plate: PlateForce | None = None
 
-    def linear(self, turn: State, spin: float) -> tuple[Array, Pencil, Array, Array]:
+    def linear(self, turn: State, spin: float, like: Array | None = None) -> tuple[Array, Pencil, Array, Array]:
         """Residual (m n,) and pencil of n states (n, 3), and what is `conserved` with a body `spin` s.
 
-        m is 12, or 13 of a body that is not round.
+        m is 12, or 13 of a body that is not round; `like` as of `packed`.
         """
-        states, values = self.packed(turn), self.values
+        states, values = self.packed(turn, like), self.values
         if len(states) == 1:  # what shakes a fixed point moves its mean to second order alone
             values = values.copy()
             values[SHAKING] = 0.0
@@ -60,11 +60,15 @@ class Setting:
         rate = abs(float(self.values[Parameter.RATE]))
         return residual, pencil, *conserved(states, spin * self.scales.spin_ratio * rate)
 
-    def packed(self, turn: State) -> Array:
-        """Scaled states (n, m); of a turn there are two quaternions, of which all instants have the first one's."""
+    def packed(self, turn: State, like: Array | None = None) -> Array:
+        """Scaled states (n, m); of two quaternions of one turn those on the side of a state `like` (m,), or the first.
+
+        That an equilibrium and its neighbours are on one side, their differences need.
+        """
         states = self.scales.pack(turn)
         if self.rates.turning:
-            states[:, 6:10] *= np.sign(states[:, 6:10] @ states[0, 6:10])[:, None]
+            first = states[0] if like is None else like
+            states[:, 6:10] *= np.sign(states[:, 6:10] @ first[6:10])[:, None]
         return states
 
     def jacobi(self, turn: State) -> float:
@@ -176,7 +180,7 @@ class Implicit:
         """F_p (2, m n + 2 or 1) by a number, from the equations at some values of it, and that of two orders less."""
         turn, found = self.setting.scales.unpack(self.start), np.zeros((2, self._inverse.shape[1]))
         for there in nearby:
-            residual, _, _, aims = there.setting.linear(turn, self.known.spin)
+            residual, _, _, aims = there.setting.linear(turn, self.known.spin, self.start[0])
             found += np.outer([there.weight, there.lower], np.append(residual, aims))
         return found
 
@@ -193,7 +197,9 @@ class Implicit:
         size, ends = float(np.abs(change).max()) or 1.0, []
         for steps in (1, -1, 2, -2):
             states = self.start + (steps * ALONG / size) * change.reshape(self.start.shape)
-            residual, _, _, aims = self.setting.linear(self.setting.scales.unpack(states), self.known.spin)
+            residual, _, _, aims = self.setting.linear(
+                self.setting.scales.unpack(states), self.known.spin, self.start[0]
+            )
             ends.append(np.append(residual, aims))
         return (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) * (size / (12 * ALONG))
 
@@ -212,7 +218,8 @@ class Implicit:
             faster += there.weight / there.setting.scales.time
             if self.at_fold:
                 continue
-            pencil = there.setting.linear(scales.unpack(self.start + there.offset * change), spin)[1]
+            moved = scales.unpack(self.start + there.offset * change)
+            pencil = there.setting.linear(moved, spin, self.start[0])[1]
             for mode in self.modes:
                 if mode.speed:
                     found = np.vdot(mode.left, pencil.applied(mode.right, mode.value))
@@ -243,18 +250,18 @@ class Implicit:
         """
         spin, scales = self.known.spin, setting.scales
         begun = self.start + sum((step * way.change for step, way in tangents), np.zeros_like(self.start))
-        states = self._solved(setting, scales.pack(self.setting.scales.unpack(begun)))
+        states = self._solved(setting, setting.packed(self.setting.scales.unpack(begun), self.start[0]))
         if states is None:
             return None
         if not with_modes:
-            return self._equilibrium(self.setting.scales.pack(scales.unpack(states)))
-        modes, pencil = [], setting.linear(scales.unpack(states), spin)[1]
+            return self._equilibrium(self.setting.packed(scales.unpack(states), self.start[0]))
+        modes, pencil = [], setting.linear(scales.unpack(states), spin, self.start[0])[1]
         for mode in self.modes:
             rate = mode.value / self.setting.scales.time + sum(step * way.modes[mode.name] for step, way in tangents)
             value = _eigenvalue(pencil, mode, complex(rate) * scales.time)
             modes.append(Mode(mode.name, value.real / scales.time, abs(value.imag) / (2 * np.pi * scales.time)))
         growth = max((mode.growth_per_s for mode in modes), default=np.nan)
-        found = self._equilibrium(self.setting.scales.pack(scales.unpack(states)))
+        found = self._equilibrium(self.setting.packed(scales.unpack(states), self.start[0]))
         return replace(found, modes=tuple(modes), growth_per_s=growth)
 
     def _solved(self, setting: Setting, states: Array) -> Array | None:
@@ -268,7 +275,7 @@ class Implicit:
             far = np.abs(position - states[:, :3]).max()
             return balance.states(position, moment) if left[0] < CONVERGED_STEP and far < FARTHEST else None
         for _ in range(NEWTON_STEPS):
-            residual, pencil, rows, aims = setting.linear(setting.scales.unpack(states), spin)
+            residual, pencil, rows, aims = setting.linear(setting.scales.unpack(states), spin, self.start[0])
             step = np.linalg.lstsq(np.vstack([pencil.matrix(0.0), rows]), -np.append(residual, aims))[0]
             before, size = size, float(np.abs(step).max())
             if not size < FARTHEST:
