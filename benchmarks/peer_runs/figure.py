@@ -11,6 +11,8 @@ MARKERS = "osD^vP*X"
 LEAST = 1e-16
 """Errors below are drawn here."""
 DECADE = 10.0
+BESIDE = 3
+"""Panels beside each other, whose labels then have room, where there are more than one more."""
 
 
 def draw(work, curves):
@@ -22,7 +24,8 @@ def draw(work, curves):
 @styled
 def _figure(work, curves):
     cases = [case for case in work.cases if any(one == case for one, _ in curves)]
-    figure, axes = panels(1, len(cases), 3.4, sharey=True)
+    beside = BESIDE if len(cases) > BESIDE + 1 else len(cases)
+    figure, axes = panels(1, len(cases), 3.4 if beside == len(cases) else 2.6, beside, sharey=True)
     names = sorted({peer for _, peer in curves}, key=lambda name: (name != "spinlev", name))
     for panel, case in zip(axes.flat, cases, strict=True):
         for k, name in enumerate(names):
@@ -39,7 +42,8 @@ def _figure(work, curves):
             plain_log(panel.xaxis, [digit * 10.0**k for k in range(-6, 4) for digit in (1, 2, 3, 5, 7)])
         titled(panel, case)
         panel.set_xlabel("processor time (s)")
-    axes.flat[0].set_ylabel("relative error")
+    for panel in axes.flat[::beside]:
+        panel.set_ylabel("relative error")
     axes.flat[0].plot([], [], "-", color="0.3", label="joined: settings that no faster one beats")
     legend_below(figure)
     return figure
