@@ -50,7 +50,7 @@ CHUNK, BESIDE = 512, 128
 # Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
 SINGLE = 250
 GAPS = (0.03, 0.08, 0.16, 0.5, 1.5)  # at which both are compared, in floater radii
-MOST_PLACES = 250  # of dipoles, the responses to which are fitted; many magnets would have thousands
+MOST_PLACES = 200  # of dipoles, the responses to which are fitted; many magnets would have thousands
 SAFETY = 4.0  # for the poses that were not looked at
 MEANS = 0.2  # of what is added, by the difference of two permeabilities whose mean the charges have: 0.09 measured
 CHARGED = 1.0  # error of the finer charges by what the coarser ones differ from them
@@ -111,13 +111,15 @@ OBLIQUE = (
     "one with two permeabilities and an easy axis along none of its edges, which its points cannot follow. Choose "
     "--interaction rigid, give it one recoil_permeability, or turn the body with its magnetisation."
 )
-# Pairs of dipoles that are fitted; how much those at one place count, which alone make the energy; and at one of so
-# many places the rotor's response to the sphere's is
-EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = 8000, 5.0, 6, 6, 3
+# Pairs of dipoles that are fitted, of one magnet and of several; how much those at one place count, which alone make
+# the energy; and at one of so many places the rotor's response to the sphere's is
+EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = (8000, 5000), 5.0, 6, 6, 3
 # Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, of two whose
 # points have weights of their own, and of others
 SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
-SPARE = 1.1  # How many more samples than are `ENOUGH` do for two magnets whose points have weights of their own
+# How many more samples than are `ENOUGH` do for two magnets whose points have weights of their own, and what part of
+# all is taken at least: with fewer the weights of single points are wild near contact
+SPARE, LEAST = 1.1, 0.5
 
 
 def mutual_table(
@@ -168,7 +170,7 @@ def mutual_table(
         places = response.places_around(magnets, floater.radius, distances, around, 2)
         near = response.places_around(magnets, floater.radius, response.NEAR_GAPS, beside, 3)
         if kind == 1:
-            share = _enough_samples(grids, len(facing)) / (len(places) + len(near))
+            share = max(_enough_samples(grids, len(facing)) / (len(places) + len(near)), LEAST)
             places, near = (part[np.arange(0, len(part), max(1.0, 1 / share)).astype(int)] for part in (places, near))
         places = np.concatenate([facing, places])
         both = np.concatenate([places, near])
@@ -188,7 +190,7 @@ def _enough_samples(grids: Sequence[ResponseGrid], facing: int) -> float:
     free = SPARE * ENOUGH * sum(_classes(grid).shape[1] for grid in grids)
     # of the sphere's response four values a place for two weights a power; of what returns twelve at fewer places
     direct = 2 * len(POWERS) / 4 * free - facing
-    return float(max(direct, SPARSE * (2 * len(RETURNED) / 12 * free - facing / FACING), 1.0))
+    return float(max(direct, SPARSE * (2 * len(RETURNED) / 12 * free - facing / FACING)))
 
 
 def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
@@ -228,8 +230,8 @@ def _rotor_fit(
     """
     size = 1 / np.sqrt(np.diag(direct))
     first, second = np.triu_indices(len(direct))
-    if len(first) > EQUATIONS:
-        chosen = np.random.default_rng(0).choice(len(first), EQUATIONS, replace=False)
+    if len(first) > (most := EQUATIONS[len(grids) > 1]):
+        chosen = np.random.default_rng(0).choice(len(first), most, replace=False)
         chosen = np.union1d(chosen, np.flatnonzero(first // 3 == second // 3))
         first, second = first[chosen], second[chosen]
     counts = np.where(first // 3 == second // 3, AT_ONE_PLACE, 1.0)

@@ -89,6 +89,7 @@ def test_nearer_to_contact_the_stated_error_holds(table, fine):
         tilt(np.radians(10.0), 10e-3, 1.305, 1.05),
         vertical(14e-3, 10e-3, 1.305, 1.05),
         vertical(10e-3, 10e-3, 1.305, 1.05),  # touching
+        vertical(14e-3, 6e-3, 1.305, 1.05),  # of few points
     ],
 )
 def test_from_a_millimetre_off_contact_on_cubes_are_met_to_a_thousandth(rotor):
