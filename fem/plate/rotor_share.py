@@ -43,6 +43,8 @@ MOST_TERMS = 16  # Highest number of harmonics, and of points along the way
 # Angles of a turn and depths of the plate at first, at which networks are trained too, with probes between them; and
 # the fewest angles at further depths
 ANGLES, DEPTHS_FIRST, FEWEST = 8, 5, 4
+CHECKED = (0.7, 2.1, 4.4)  # angles, rad, where the series is looked at: several magnets alike have harmonics that
+# equidistant angles take for others, or for none
 TOGETHER = 32  # Places whose signals are computed at once
 NOISE = 1e-10  # Amplitudes below this share of the largest signal are what symmetry forbids
 # Share of a table's tolerance for the sum of what left-out harmonics have in the field of the rotor's currents or in
@@ -213,8 +215,14 @@ def rotor_share(network: PassiveNetwork, rotor: TurningRotor, tolerance: float, 
     series, size = series_of(angles, depths)
     if not size:  # a rotor without a field
         return RotorShare(distance, series[:3, :, :1] * 0.0, 0.0)
-    # of two harmonics: symmetry may forbid one
-    while more(angles // 2, by_angle := float(np.abs(series[-4:]).max() / size)):
+    exact = signals(np.zeros(1), CHECKED)
+
+    def by_angles() -> float:
+        """What harmonics miss: by the highest two, as symmetry may forbid one, and by twice that at other angles."""
+        off = RotorShare(distance, series, 0.0).signals(CHECKED, 0.0) - exact
+        return float(max(np.abs(series[-4:]).max(), 2 * np.abs(off).max()) / size)
+
+    while more(angles // 2, by_angle := by_angles()):
         angles *= 2
         series, size = series_of(angles, depths)
     # At further depths so many angles do that what they take for lower harmonics is half of the tolerance.
