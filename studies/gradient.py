@@ -28,7 +28,7 @@ from ..geometry.scene.files import scene_numbers
 from .cli.console import aligned
 from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, refused
 from .levitation import Levitation
-from .nearby_scenes import NearbyScenes, unknown_over_plate
+from .nearby_scenes import NearbyScenes, unknown_of_locked, unknown_over_plate
 from .plan import SceneLike
 from .result import IN_JSON, MODES, label_of_key, variable, write_dataset
 
@@ -98,14 +98,8 @@ class Gradient:
         found = {}
         base.prepare(keys)
         for key in keys:
-            of_shape = key.startswith("floater.") and key.rstrip(".0123456789").endswith(("_mm", "permeability"))
-            if known.kind == LOCKED and of_shape:
-                # how it lies about its moment is held by hardly anything: what meshes leave in its tensors is more
-                self.reasons[LOCKED] = (
-                    "derivatives of frequency-locked equilibria by the floater's sizes and permeability are not known"
-                )
-                continue
-            if base.with_plate and (why := unknown_over_plate(key)):
+            over_plate = unknown_over_plate(key) if base.with_plate else ""
+            if why := over_plate or (unknown_of_locked(key) if known.kind == LOCKED else ""):
                 self.reasons[why] = why
                 continue
             nearby = base.around(key)

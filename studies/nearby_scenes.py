@@ -51,6 +51,14 @@ def unknown_over_plate(key: str) -> str:
     return ""
 
 
+def unknown_of_locked(key: str) -> str:
+    """Why derivatives of a frequency-locked equilibrium by a key are not known; empty where they are."""
+    # so little resists a turn about its moment that what charges or elements leave in its tensors would decide
+    if key.startswith("floater.") and key.rstrip(".0123456789").endswith(("_mm", "permeability")):
+        return "derivatives of frequency-locked equilibria by the floater's sizes and permeability are not known"
+    return ""
+
+
 def _moves_rotor(key: str) -> bool:
     """Whether a number changes the rotor's field in the plate in more than its strength."""
     still = ("rotor.remanence_T", "rotor.conductivity_S_m")

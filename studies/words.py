@@ -117,6 +117,7 @@ def _least_stable(equilibrium: Equilibrium) -> str:
 
 
 def mode_words(name: str) -> str:
+    """The name of a mode as it is printed."""
     return MODE_NAMES.get(name, name)
 
 
@@ -208,6 +209,7 @@ def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:
 
 
 def flight_words(levitation: Levitation, flight: Trajectory) -> str:
+    """How a trajectory of a `levitation`'s floater ended, in a sentence."""
     kind, time = kind_of_flight(levitation, flight), f"{flight.levitated_s:.4g} s"
     if flight.levitated_s >= 7200:
         time += f" ({flight.levitated_s / 3600:.4g} h)"

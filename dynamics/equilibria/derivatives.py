@@ -26,7 +26,7 @@ from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
 from .balance import CONVERGED_STEP, EVERY, Balance, solve
 from .equilibrium import Equilibrium, Mode
-from .orbits import CONVERGED, ROUNDED, SHAKING, OrbitProblem, Pencil, conserved
+from .orbits import CONVERGED, ROUNDED, SHAKING, OrbitProblem, Pencil, conserved, one_sided
 
 SINGULAR = 1e-9  # Smallest singular value of F_x, by the largest, below which the equilibrium is at a fold to round-off
 SLOWEST = 1e-7  # λ of a mode, rad⁻¹, that is no eigenvalue but one of the kept |m̂| and body spin
@@ -61,15 +61,9 @@ class Setting:
         return residual, pencil, *conserved(states, spin * self.scales.spin_ratio * rate)
 
     def packed(self, turn: State, like: Array | None = None) -> Array:
-        """Scaled states (n, m); of two quaternions of one turn those on the side of a state `like` (m,), or the first.
-
-        That an equilibrium and its neighbours are on one side, their differences need.
-        """
+        """Scaled states (n, m), `one_sided` with a state `like` (m,) or the first, as differences need them."""
         states = self.scales.pack(turn)
-        if self.rates.turning:
-            first = states[0] if like is None else like
-            states[:, 6:10] *= np.sign(states[:, 6:10] @ first[6:10])[:, None]
-        return states
+        return one_sided(states, states[0] if like is None else like) if self.rates.turning else states
 
     def jacobi(self, turn: State) -> float:
         """Jacobi integral of a fixed point, energy less ω times the angular momentum about the axis, J."""
@@ -176,11 +170,15 @@ class Implicit:
             value -= np.vdot(left, self._pencil.applied(right, value)) / speed
         return _ModeAt(name, value, left, right, speed)
 
+    def _linear(self, setting: Setting, turn: State) -> tuple[Array, Pencil, Array, Array]:
+        """Of equations here or nearby, with this body spin and on this side."""
+        return setting.linear(turn, self.known.spin, self.start[0])
+
     def missed(self, nearby: Sequence[Nearby]) -> Array:
         """F_p (2, m n + 2 or 1) by a number, from the equations at some values of it, and that of two orders less."""
         turn, found = self.setting.scales.unpack(self.start), np.zeros((2, self._inverse.shape[1]))
         for there in nearby:
-            residual, _, _, aims = there.setting.linear(turn, self.known.spin, self.start[0])
+            residual, _, _, aims = self._linear(there.setting, turn)
             found += np.outer([there.weight, there.lower], np.append(residual, aims))
         return found
 
@@ -197,15 +195,13 @@ class Implicit:
         size, ends = float(np.abs(change).max()) or 1.0, []
         for steps in (1, -1, 2, -2):
             states = self.start + (steps * ALONG / size) * change.reshape(self.start.shape)
-            residual, _, _, aims = self.setting.linear(
-                self.setting.scales.unpack(states), self.known.spin, self.start[0]
-            )
+            residual, _, _, aims = self._linear(self.setting, self.setting.scales.unpack(states))
             ends.append(np.append(residual, aims))
         return (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) * (size / (12 * ALONG))
 
     def by(self, nearby: Sequence[Nearby]) -> Tangent:
         """The way by a number, from the equations at some values of it."""
-        scales, spin = self.setting.scales, self.known.spin
+        scales = self.setting.scales
         missed = self.missed(nearby)
         changes = (np.nan if self.at_fold else -1.0) * missed @ self._inverse.T
         if self.known.turn is not None and not self.at_fold:
@@ -218,8 +214,7 @@ class Implicit:
             faster += there.weight / there.setting.scales.time
             if self.at_fold:
                 continue
-            moved = scales.unpack(self.start + there.offset * change)
-            pencil = there.setting.linear(moved, spin, self.start[0])[1]
+            pencil = self._linear(there.setting, scales.unpack(self.start + there.offset * change))[1]
             for mode in self.modes:
                 if mode.speed:
                     found = np.vdot(mode.left, pencil.applied(mode.right, mode.value))
@@ -248,14 +243,14 @@ class Implicit:
         `setting`: the equations; `tangents`: steps of numbers with the way by each; `with_modes`: whether its modes are
         computed, or left as they are.
         """
-        spin, scales = self.known.spin, setting.scales
+        scales = setting.scales
         begun = self.start + sum((step * way.change for step, way in tangents), np.zeros_like(self.start))
         states = self._solved(setting, setting.packed(self.setting.scales.unpack(begun), self.start[0]))
         if states is None:
             return None
         if not with_modes:
             return self._equilibrium(self.setting.packed(scales.unpack(states), self.start[0]))
-        modes, pencil = [], setting.linear(scales.unpack(states), spin, self.start[0])[1]
+        modes, pencil = [], self._linear(setting, scales.unpack(states))[1]
         for mode in self.modes:
             rate = mode.value / self.setting.scales.time + sum(step * way.modes[mode.name] for step, way in tangents)
             value = _eigenvalue(pencil, mode, complex(rate) * scales.time)
@@ -275,7 +270,7 @@ class Implicit:
             far = np.abs(position - states[:, :3]).max()
             return balance.states(position, moment) if left[0] < CONVERGED_STEP and far < FARTHEST else None
         for _ in range(NEWTON_STEPS):
-            residual, pencil, rows, aims = setting.linear(setting.scales.unpack(states), spin, self.start[0])
+            residual, pencil, rows, aims = self._linear(setting, setting.scales.unpack(states))
             step = np.linalg.lstsq(np.vstack([pencil.matrix(0.0), rows]), -np.append(residual, aims))[0]
             before, size = size, float(np.abs(step).max())
             if not size < FARTHEST:

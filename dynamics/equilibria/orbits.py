@@ -114,6 +114,13 @@ def _tail(states: Array) -> float:
     return float((np.abs(np.fft.rfft(states, axis=0)) / len(states))[-2:].max())
 
 
+def one_sided(states: Array, like: Array) -> Array:
+    """States (n, 13), of two quaternions of one attitude each with that on the side of a state `like` (13,)."""
+    sides = np.ones_like(states)
+    sides[:, 6:10] = np.sign(states[:, 6:10] @ like[6:10])[:, None]
+    return states * sides
+
+
 def conserved(states: Array, spin: float) -> tuple[Array, Array]:
     """Derivatives (2, 12 n) and values (2,) of |m̂|²/2 - 1/2 and Ω·m̂ - s at first; else (1,) of the quaternion."""
     if states.shape[1] > 12:
@@ -376,8 +383,8 @@ class ForcedMotion:
         """Periodic motion that a fixed point, or one in tilted gravity without plate, becomes; or why it is none."""
         scales, fixed = Scales.of(self.scene), known.without or known
         start = scales.pack(known.state if known.turn is None else known.turn)
-        if known.turn is not None and self.rates.turning:  # of a turn there are two quaternions
-            start[:, 6:10] *= np.sign(start[:, 6:10] @ start[0, 6:10])[:, None]
+        if known.turn is not None and self.rates.turning:
+            start = one_sided(start, start[0])
         orbit, why, part = self._followed(start, known.spin, known.turn is None)
         if orbit is None:
             return LeftOut(known, why, part)

@@ -43,8 +43,9 @@ MOST_TERMS = 16  # Highest number of harmonics, and of points along the way
 # Angles of a turn and depths of the plate at first, at which networks are trained too, with probes between them; and
 # the fewest angles at further depths
 ANGLES, DEPTHS_FIRST, FEWEST = 8, 5, 4
-CHECKED = (0.7, 2.1, 4.4)  # angles, rad, where the series is looked at: several magnets alike have harmonics that
-# equidistant angles take for others, or for none
+# Angles, rad, where the series is looked at: magnets that lie alike have harmonics that equidistant angles take for
+# others, or for none
+CHECKED = (0.7, 2.1, 4.4)
 TOGETHER = 32  # Places whose signals are computed at once
 NOISE = 1e-10  # Amplitudes below this share of the largest signal are what symmetry forbids
 # Share of a table's tolerance for the sum of what left-out harmonics have in the field of the rotor's currents or in
@@ -225,7 +226,7 @@ def rotor_share(network: PassiveNetwork, rotor: TurningRotor, tolerance: float, 
     while more(angles // 2, by_angle := by_angles()):
         angles *= 2
         series, size = series_of(angles, depths)
-    # At further depths so many angles do that what they take for lower harmonics is half of the tolerance.
+    # At further depths so many angles do that what they take for lower harmonics is at most half of the tolerance.
     turning, few = _left_out(np.abs(series).sum(axis=2).max(axis=1) / size), FEWEST
     while few < angles and turning[few - 1] > tolerance / 2:
         few *= 2

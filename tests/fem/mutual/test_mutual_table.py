@@ -20,7 +20,15 @@ from spinlev.fem.mutual.response import (
     response_products,
     two_body,
 )
-from spinlev.fem.mutual.table import effort, image_weights, induced_sources, reflection, response_to_charge
+from spinlev.fem.mutual.table import (
+    POWERS,
+    RETURNED,
+    effort,
+    image_weights,
+    induced_sources,
+    reflection,
+    response_to_charge,
+)
 from spinlev.fem.rotor.table import canonical
 from spinlev.geometry.common import InputError
 from spinlev.geometry.magnets import Magnet, horizontal, tilt, vertical
@@ -226,6 +234,28 @@ def test_written_out_and_by_points_the_energy_is_one(table):
     written = whole(np.ascontiguousarray(np.concatenate([place, moment, flux], axis=1).T))[0]
     np.testing.assert_allclose(written, energy, rtol=1e-10)
     assert_derivatives(table, place, moment)
+
+
+def test_what_points_are_fitted_by_is_what_their_energy_has(table):
+    """The fields of all powers, with their weights, against the energy that is written out and differentiated."""
+    place, direction = poses(0.6, 4, 5)
+    moment = PERMEABLE.moment * direction
+    for whole in table.grids:
+        grid = replace(whole, strengths=0.0 * whole.strengths)
+        energy, slope, _ = grid.energy().derivatives(place, moment)
+        value, by_place, by_moment = np.zeros(4), np.zeros((4, 3)), np.zeros((4, 3))
+        along = np.broadcast_to(grid.box.rotation @ grid.axis, (4, 3))
+        for powers, weights in ((POWERS, grid.degrees), (RETURNED, grid.returned)):
+            of_sphere = powers == POWERS
+            for weight, (field, change) in zip(
+                weights.reshape(len(weights), -1).T, grid.fields(powers, place), strict=True
+            ):
+                mean, factor = weight @ field.reshape(len(weight), -1), along if of_sphere else moment
+                value -= np.sum(mean.reshape(4, 3) * factor, axis=1)
+                by_place -= np.einsum("n,nmik,mi->mk", weight, change, factor)
+                by_moment -= 0.0 if of_sphere else mean.reshape(4, 3)
+        for found, wanted in ((value, energy), (by_place, slope[:, :3]), (by_moment, slope[:, 3:])):
+            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-10 * np.abs(wanted).max())
 
 
 def assert_derivatives(table, places, moments):
