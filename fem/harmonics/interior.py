@@ -18,7 +18,6 @@ U = -Σ Q_l · ∇^(l-1) B degree by degree.  A small turn δ makes δM = δ·G 
 another place is A_k = Σ P_kn R_n(ξ) of its distance ξ.  All matrices are known from polynomials at a few places.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -36,7 +35,9 @@ from .solid import (
     CHUNK,
     FOUR_PI,
     Coefficients,
+    OuterValues,
     both_signs,
+    derivative,
     entries,
     entry,
     factorials,
@@ -99,41 +100,49 @@ def _by_height(degree: int, more: int) -> Array:
     return factorials(degree)[:, :, None] * result
 
 
+class Surroundings:
+    """Points around a ball: the field there of sources in it, and in it that of dipoles and charges there.
+
+    All three are sums of Θ_lm at the points, which are computed once.
+    """
+
+    def __init__(self, points: Array, ball: Ball, degree: int) -> None:
+        """Of `points` (n, 3) m outside of a `ball`, for coefficients up to a `degree` about its centre."""
+        self._radius, self._values = ball.radius, OuterValues(degree + 1, (points - ball.center) / ball.radius)
+
+    def field(self, sources: Coefficients) -> Array:
+        """B (..., n, 3) T at the points, of sources c_lm (T) in the ball, [..., l, m]."""
+        potentials = np.stack([-derivative(sources, axis) for axis in range(3)], axis=-3)
+        return np.moveaxis(self._values.sums(potentials), -2, -1)
+
+    def of_magnetization(self, moments: Array) -> Coefficients:
+        """Coefficients a_lm (T) [..., l, m] of dipoles μ0 M dV (..., n, 3) T m³ at the points.
+
+        (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
+        """
+        sums = self._values.weighted(np.moveaxis(moments, -1, -2))[..., 1:, :]
+        # M·∇Θ_lm by (∂_x ± i ∂_y) Θ_lm = ±Θ_(l+1)(m±1), ∂_z Θ_lm = -Θ_(l+1)m
+        minus = np.concatenate([-np.conj(sums[..., 1:2]), sums[..., :-2]], axis=-1)
+        plus, upright = sums[..., 1:], sums[..., 2, :, :-1]
+        x, y = (plus - minus)[..., 0, :, :] / 2, (plus + minus)[..., 1, :, :] / 2j
+        total = np.tril(x + y - upright)
+        total[..., 0, :] = 0.0  # a constant potential
+        return np.asarray(total / (FOUR_PI * self._radius**3))
+
+    def of_charges(self, charges: Array) -> Coefficients:
+        """Coefficients a_lm (T) of magnetic charges q (n,) T m² at the points.
+
+        (4π radius²)⁻¹ Σ q Θ_lm, exact for these charges.
+        """
+        sums = self._values.weighted(charges)[:-1, :-1] / (FOUR_PI * self._radius**2)
+        sums[0] = 0.0  # a constant potential
+        return np.asarray(sums)
+
+
 def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) of dipoles outside a ball: (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
-
-    Dipoles are `moments` μ0 M dV (..., n, 3) T m³ at `points` (n, 3) m: [..., l, m] up to a `degree` about the centre
-    of `ball`.
-    """
-    kinds = moments.shape[:-2]
-    weights = np.moveaxis(moments, -2, 0).reshape(len(points), 3 * math.prod(kinds))
-    whole = np.zeros((weights.shape[1], degree + 2, degree + 2), complex)
-    for start in range(0, len(points), CHUNK):
-        away = (points[start : start + CHUNK] - ball.center) / ball.radius
-        square = np.sum(away**2, axis=1)[:, None]
-        whole += weighted_sums(degree + 1, away / square, weights[start : start + CHUNK] / np.sqrt(square))
-    whole *= factorials(degree + 1)  # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r
-    sums = whole[:, 1:].reshape(*kinds, 3, degree + 1, degree + 2)
-    # M·∇Θ_lm by (∂_x ± i ∂_y) Θ_lm = ±Θ_(l+1)(m±1), ∂_z Θ_lm = -Θ_(l+1)m
-    minus = np.concatenate([-np.conj(sums[..., 1:2]), sums[..., :-2]], axis=-1)
-    plus, upright = sums[..., 1:], sums[..., 2, :, :-1]
-    x, y = (plus - minus)[..., 0, :, :] / 2, (plus + minus)[..., 1, :, :] / 2j
-    total = np.tril(x + y - upright)
-    total[..., 0, :] = 0.0  # a constant potential
-    return np.asarray(total / (FOUR_PI * ball.radius**3))
-
-
-def from_charges(points: Array, charges: Array, ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) of magnetic charges outside a ball: (4π radius²)⁻¹ Σ q Θ_lm, exact for these charges.
-
-    At `points` (n, 3) m are `charges` q (n,) T m²; up to a `degree` about the centre of `ball`.
-    """
-    away = (points - ball.center) / ball.radius
-    square = np.sum(away**2, axis=1)[:, None]
-    (sums,) = weighted_sums(degree, away / square, charges[:, None] / np.sqrt(square))
-    sums *= factorials(degree) / (FOUR_PI * ball.radius**2)  # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r
-    sums[0] = 0.0  # a constant potential
-    return np.asarray(sums)
+    """`Surroundings.of_magnetization` of points of any number, (n, 3) m, and their `moments` (..., n, 3) T m³."""
+    parts = [slice(start, start + CHUNK) for start in range(0, max(len(points), 1), CHUNK)]
+    return np.asarray(sum(Surroundings(points[p], ball, degree).of_magnetization(moments[..., p, :]) for p in parts))
 
 
 def from_outer(sums: Sequence[Coefficients], radii: Array, centers: Array, ball: Ball, degree: int) -> Coefficients:

@@ -130,9 +130,15 @@ def weighted_sums(degree: int, points: Array, weights: Array) -> Coefficients:
     for start in range(0, len(points), step):
         some = np.ascontiguousarray(points[start : start + step].T)
         total += real_harmonics(degree, some, 1.0) @ weights[start : start + step]
-    found, (l, m, sine) = np.zeros((weights.shape[1], degree + 1, degree + 1), complex), _places(degree)
-    found.real[:, l[~sine], m[~sine]] = total[~sine].T
-    found.imag[:, l[sine], m[sine]] = total[sine].T
+    return _whole(total.T)
+
+
+def _whole(parts: Array) -> Coefficients:
+    """[..., l, m] of parts (..., (degree + 1)²) in the order of `real_harmonics`."""
+    degree = math.isqrt(parts.shape[-1]) - 1
+    found, (l, m, sine) = np.zeros((*parts.shape[:-1], degree + 1, degree + 1), complex), _places(degree)
+    found.real[..., l[~sine], m[~sine]] = parts[..., ~sine]
+    found.imag[..., l[sine], m[sine]] = parts[..., sine]
     return np.asarray(found * _leading(degree))
 
 
@@ -172,6 +178,39 @@ def irregular_gradient(harmonics: dict[tuple[int, int], Any], l: int, m: int) ->
     return [(plus - minus) / 2, (plus + minus) / 2j, -harmonics[l + 1, m]]
 
 
+def _outer_parts(coefficients: Coefficients) -> Array:
+    """(..., (degree + 1)²) of c_lm [..., l, m]: Σ c_lm Θ_lm(r) is their sum over `_outer_harmonics`."""
+    degree = coefficients.shape[-1] - 1
+    l, m, sine = _places(degree)
+    # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r; of c_l(-m) the real part is the same
+    whole = coefficients * (factorials(degree) * _leading(degree) * np.where(np.arange(degree + 1), 2.0, 1.0))
+    return np.where(sine, -whole.imag[..., l, m], whole.real[..., l, m])
+
+
+def _outer_harmonics(degree: int, points: Array) -> Array:
+    """`real_harmonics` of r/r², over r, at points r (3, n)."""
+    inverse = 1 / np.sum(points**2, axis=0)
+    return real_harmonics(degree, points * inverse, np.sqrt(inverse))
+
+
+class OuterValues:
+    """Θ_lm at some points, for sums over them and of them: computed once."""
+
+    def __init__(self, degree: int, points: Array) -> None:
+        """Up to a `degree` at `points` (n, 3)."""
+        self._values = _outer_harmonics(degree, np.ascontiguousarray(points.T))
+
+    def sums(self, coefficients: Coefficients) -> Array:
+        """Σ c_lm Θ_lm (..., n), of [..., l, m] of any lower degree too."""
+        parts = _outer_parts(coefficients)
+        return np.asarray(parts @ self._values[: parts.shape[-1]])
+
+    def weighted(self, weights: Array) -> Coefficients:
+        """Σ_n weight_n Θ_lm [..., l, m] with weights (..., n)."""
+        found = _whole(weights @ self._values.T)
+        return np.asarray(found * factorials(found.shape[-1] - 1))
+
+
 @dataclass(frozen=True, eq=False)
 class OuterSums:
     """Sums Σ c_lm Θ_lm of k functions, about one centre or several."""
@@ -183,11 +222,7 @@ class OuterSums:
     @classmethod
     def of(cls, coefficients: Coefficients) -> Self:
         """Of arrays c_lm (centres, k, l, m)."""
-        degree = coefficients.shape[-1] - 1
-        l, m, sine = _places(degree)
-        # Θ_lm(r) = (l-m)! (l+m)! Υ_lm(r/r²)/r; of c_l(-m) the real part is the same
-        whole = coefficients * (factorials(degree) * _leading(degree) * np.where(np.arange(degree + 1), 2.0, 1.0))
-        parts = np.where(sine, -whole.imag[..., l, m], whole.real[..., l, m])
+        degree, parts = coefficients.shape[-1] - 1, _outer_parts(coefficients)
         used = np.flatnonzero(parts.any(axis=(0, 1)))
         return cls(degree, used, np.ascontiguousarray(parts[..., used].transpose(1, 2, 0)))
 
@@ -201,8 +236,7 @@ class OuterSums:
             for start in range(0, number, block):
                 here = slice(start, start + block)
                 points = np.ascontiguousarray(places[first : first + together, here].reshape(-1, 3).T)
-                inverse = 1 / np.sum(points**2, axis=0)
-                values = real_harmonics(self.degree, points * inverse, np.sqrt(inverse))
+                values = _outer_harmonics(self.degree, points)
                 if len(self.used) < len(values):
                     values = values[self.used]
                 result[here] += (weights @ values.reshape(weights.shape[1], -1)).T

@@ -5,7 +5,7 @@ And samples of them, of which tables are made: by charges on the magnets' surfac
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 from typing import Protocol
 
@@ -24,8 +24,8 @@ from ..closed_forms.uniform import UniformField, remanent_field
 from ..elements.surface_charges import SurfaceCharges
 from ..harmonics import interior
 from ..harmonics.expansion import box_rule, gauss, uniform_moments
-from ..harmonics.interior import Ball
-from ..harmonics.solid import FOUR_PI, Coefficients, derivative, factorials, outer_sums, weighted_sums
+from ..harmonics.interior import Ball, Surroundings
+from ..harmonics.solid import FOUR_PI, Coefficients, factorials, weighted_sums
 from .table import ResponseGrid, effort, induced_sources, point_counts, reflection
 
 DEGREES = range(6, 41)
@@ -135,6 +135,7 @@ class ChargeResponse:
             rest = [m.permeability_in_rotor - m.recoil_permeability * np.eye(3) for m in magnets]
             self._across = closed_dipoles(carriers, rest, ACROSS)
         self._closed = [UniformField(magnet) for magnet in carriers]
+        self._around = lru_cache(maxsize=1)(self._around_ball)  # two bodies respond to each other again and again
 
     @cached_property
     def _moments(self) -> list[Coefficients]:
@@ -166,26 +167,27 @@ class ChargeResponse:
                 found[: few + 1, : few + 1] += interior.interior_coefficients(form.field, ball, few)
             if len(places):  # so small a part needs fewer degrees for the same error
                 few = _degrees(share - np.log(self._part), decay, degree)
-                found[: few + 1, : few + 1] += interior.from_charges(places, amounts, ball, few)
+                found[: few + 1, : few + 1] += Surroundings(places, ball, few).of_charges(amounts)
         if most:
             sums = [self._moments[k][: int(ends[k]) + 1, : int(ends[k]) + 1] for k in far]
             found[: most + 1, : most + 1] += interior.from_outer(sums, radii[far], centers[far], ball, most)
-        return found + interior.from_magnetization(*self._across, ball, degree) if self.permeable else found
+        across = self.permeable and len(self._across[0])
+        return found + interior.from_magnetization(*self._across, ball, degree) if across else found
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
         """See `RotorResponse`."""
         if not self.permeable:
             return np.zeros((degree + 1, degree + 1), complex)
-        potentials = [-derivative(sources, axis) for axis in range(3)]
-        points, tensors = self.direct([float(m.body.distance(ball.center)) for m in self.magnets])
-        places = np.concatenate([self.charges.places, points])
-        field, direct = np.split(
-            outer_sums(potentials, (places - ball.center) / ball.radius), [len(self.charges.places)]
-        )
-        beyond = self.beyond(np.sum(field * self.charges.normals, axis=1)[:, None])[:, 0]
-        induced = np.einsum("na,nab->nb", direct, tensors)
-        found = interior.from_charges(self.charges.places, self.charges.areas * beyond, ball, degree)
-        return found + interior.from_magnetization(points, induced, ball, degree)
+        surface, inside, tensors = self._around(ball, degree)
+        normal = np.sum(surface.field(sources) * self.charges.normals, axis=1)
+        beyond = self.beyond(normal[:, None])[:, 0]
+        induced = np.einsum("na,nab->nb", inside.field(sources), tensors)
+        return surface.of_charges(self.charges.areas * beyond) + inside.of_magnetization(induced)
+
+    def _around_ball(self, ball: Ball, degree: int) -> tuple[Surroundings, Surroundings, Array]:
+        """Places of charges and of the first part, for coefficients up to a degree, and the latter's tensors."""
+        points, tensors = self.direct([float(magnet.body.distance(ball.center)) for magnet in self.magnets])
+        return Surroundings(self.charges.places, ball, degree), Surroundings(points, ball, degree), tensors
 
     def direct(self, nearest: ArrayLike) -> tuple[Array, Array]:
         """Points (n, 3) m and μ0 M dV by b (n, 3, 3) m³ of the first part, see `direct_rule`."""
@@ -473,11 +475,9 @@ def point_response(
     and `coupling` (3n, 3n) A m²/T are for the magnets as a whole.
     """
     places = np.concatenate([*(grid.places for grid in grids), inner])
-    potentials = np.stack([-derivative(sources, axis) for axis in range(3)], axis=1)
-    fields = outer_sums([*np.concatenate(potentials)], (places - ball.center) / ball.radius)
-    by_source = fields.reshape(len(places), -1, 3).swapaxes(0, 1)
-    *seen, whole = np.split(by_source, np.cumsum([len(grid.points) for grid in grids]), axis=1)
+    around = Surroundings(places, ball, sources.shape[-1] - 1)
+    *seen, whole = np.split(around.field(sources), np.cumsum([len(grid.points) for grid in grids]), axis=1)
     frames = [grid.box.rotation for grid in grids]
     moments = [(b @ r * grid.strengths) @ r.T for grid, r, b in zip(grids, frames, seen, strict=True)]
     moments.append((whole.reshape(len(sources), -1) @ coupling.T).reshape(whole.shape))
-    return interior.from_magnetization(places, MU_0 * np.concatenate(moments, axis=1), ball, sources.shape[-1] - 1)
+    return around.of_magnetization(MU_0 * np.concatenate(moments, axis=1))
