@@ -26,8 +26,8 @@ from ..geometry.common import ComputationError
 
 PATIENCE = 5.0  # seconds for a process to tidy up its unfinished files before it is killed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NGS_NUM_THREADS")
-BEGIN = "import sys, pickle; from multiprocessing.connection import Connection; c = Connection(int(sys.argv[1])); \
-sys.path[:] = pickle.loads(c.recv_bytes()); from {module} import serve; serve(c)"
+BEGIN = "import gc, sys, pickle; from multiprocessing.connection import Connection; gc.set_threshold(100_000); \
+c = Connection(int(sys.argv[1])); sys.path[:] = pickle.loads(c.recv_bytes()); from {module} import serve; serve(c)"
 Function = Callable[[Any], Iterable[Any]]
 Answers = Generator[tuple[Any, Any], None, None]  # with their items
 

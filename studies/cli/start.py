@@ -1,6 +1,7 @@
 """Start of the command line: streams, signals and a home folder, before anything large is loaded."""
 
 import errno
+import gc
 import os
 import signal
 import sys
@@ -22,6 +23,7 @@ def main() -> None:
     # Parallel work is by processes, and idle threads wait busily; the user's own setting wins.
     for threads in ("OMP_NUM_THREADS", "NGS_NUM_THREADS"):
         os.environ.setdefault(threads, "1")
+    gc.set_threshold(100_000)  # the libraries' many objects stay: looking for garbage among them took 0.6 s of a run
     os.environ["PYTHONSAFEPATH"] = "1"  # no process begun here loads what lies in the folder that it is begun in
     try:
         from .console import make_readable
