@@ -191,7 +191,7 @@ def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
         for kind in ("png", "pdf"):
             files.append(str(out / f"{name}.{kind}"))
             write_whole(out / f"{name}.{kind}", figure_bytes(figure, kind))
-            figure.set_layout_engine("none")  # the places found for the first format are those of the second
+            figure.set_layout_engine(None)  # the places found for the first format are those of the second
     return files
 
 
