@@ -55,12 +55,12 @@ def drawn_field(scene: Scene, table: FieldTable) -> Callable[[Array], Array]:
 
     NaN inside the magnets.
     """
-    sources = rotor_table(scene.rotor, "cuboid"), table
+    sources = table, rotor_table(scene.rotor, "cuboid")
 
     def field(points: Array) -> Array:
         found = np.full(points.shape, np.nan)
         for source in sources:
-            known = source.in_range(points)
+            known = np.isnan(found[:, 0]) & source.in_range(points)
             found[known] = source.evaluate(points[known])[0]
         return found
 
