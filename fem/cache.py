@@ -55,6 +55,7 @@ FORMATS = {
     "floating": 2,
     "floating-free": 1,
     "equilibria": 16,
+    "flight": 1,
     "experiment": 3,
     "code": 1,
 }

@@ -13,7 +13,7 @@ from ..dynamics.equilibria.equilibrium import FOLD, LOCKED, PAST_TABLE, Equilibr
 from ..dynamics.equilibria.search import FixedPoints, cached_points, free_of_bodies, of_whole_body, survey, with_plate
 from ..dynamics.flights.flight import initial_state, most_like_levitation, simulate, starting_point
 from ..dynamics.flights.live import LiveFlight
-from ..dynamics.flights.trajectory import Checkpoint, FlightStopped, Trajectory
+from ..dynamics.flights.trajectory import FLIGHTS, Checkpoint, FlightStopped, Trajectory
 from ..dynamics.motion.effect import Interaction, interaction_of
 from ..dynamics.motion.effects import mutual_choice, with_effects
 from ..dynamics.motion.events import plate_depth
@@ -415,8 +415,10 @@ class Levitation:
             return quiet.equilibria
         return with_plate(quiet.still, quiet.interaction, quiet.without_plate, self.wider, quiet.rates).equilibria
 
-    def flight(self, duration: float, checkpoint: Checkpoint | None = None) -> Trajectory:
+    def flight(self, duration: float, checkpoint: Checkpoint | None = None, cached: bool = False) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
+
+        If `cached`, it is from the user's cache where the same motion was simulated before, and is kept there.
 
         A floater that leaves the range of the plate's table begins anew with one for where it goes: states of other
         currents begin without the earlier ones. Where none can be made, the trajectory ends there as lost
@@ -442,7 +444,9 @@ class Levitation:
             note("Motion ...")
             with progress("Motion") as bar:
                 how: dict[str, Any] = {"progress": bar, "memory": plate, "checkpoint": checkpoint}
-                simulated = simulate(self.scene, table, duration, known, **how)
+                fly = partial(simulate, self.scene, table, duration, known, **how)
+                decisive = self.scene, table, duration, known, plate
+                simulated = FLIGHTS.cached(decisive, fly, note)[0] if cached else fly()
             left = simulated.left_plate_table
             beyond = left and self.follow(simulated.lab.position[-1:], simulated.time[-1:])
             if not beyond and (left or not self._plate_matters(simulated)):

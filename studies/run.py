@@ -278,7 +278,7 @@ def main_job(
     result, flight = Result(levitation, survey, comparison=compared, failed=str(failure or "")), None
     if failure is None or isinstance(scene.start, AbsoluteStart):
         try:
-            flight = levitation.flight(duration)
+            flight = levitation.flight(duration, cached=True)
             result = replace(result, flight=flight)
             note_details(flight)
         except EquilibriumError as error:

@@ -34,6 +34,7 @@ SOLVERS = {
     "floating": "fem/plate/floating.py",
     "floating-free": "fem/plate/floating.py",
     "equilibria": "dynamics/equilibria/search.py",
+    "flight": "dynamics/flights/flight.py",
     "experiment": "studies/catalogue/experiment_design.py",
 }
 """The module that makes the tables of each number."""

@@ -11,6 +11,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
+from ...fem.cache import TableKind
 from ...geometry.common import Array, ComputationError, InputError, html_table, millimetres
 from ...geometry.files import seal, unsealed, write_whole
 from ..equilibria.balance import Indices
@@ -100,6 +101,9 @@ class Trajectory:
     def rotor(self) -> State:
         """Motion (n, 3) along the rotor's axes, SI units."""
         return (self.lab if self.pose is None else self.lab.brought_back(*self.pose)).to_rotor(self.angle)
+
+
+FLIGHTS = TableKind("flight", Trajectory, "Trajectory of a floater", most=2**27)
 
 
 class FlightStopped(KeyboardInterrupt):

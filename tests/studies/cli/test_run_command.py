@@ -20,13 +20,13 @@ NO_PLATE = ("--plate-model", "none")
 GOOD = (SCENES / "horizontal.toml").read_text()
 
 
-def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path, points):
-    status, out, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
+def test_run_writes_everything_and_finds_its_tables_and_flight_again(spinlev, tmp_path, points, monkeypatch):
+    status, written, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
     assert status == 0, err
     assert re.search(
         r"Point-dipole model, same conditions without the plate: levitation distance [\d.]+ mm, "
         r"0\.16\(1\) mm more than",
-        out,
+        written,
     )
     made = {path.name for path in (tmp_path / "out").iterdir()}
     drawn = set() if unavailable() else {"scene.png"}
@@ -36,6 +36,9 @@ def test_run_writes_everything_and_finds_its_table_again(spinlev, tmp_path, poin
     assert summary["comparison"]["difference_error_mm"] < 0.01 * abs(summary["comparison"]["difference_mm"])
     status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points, "--json")
     assert json.loads(out)["tables_from_cache"] == ["fem"]
+    monkeypatch.setattr("spinlev.studies.levitation.simulate", pytest.fail)
+    again = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE, "--out", "again")
+    assert again[:2] == (0, written.replace("out/", "again/"))
 
 
 @pytest.mark.usefixtures("undrawn")
