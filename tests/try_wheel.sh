@@ -46,5 +46,5 @@ PYTHON
   venv/bin/python -c 'import json; print("distance", json.load(open("answer.json"))["equilibria"][0]["position_mm"][2], "mm")'
 done
 venv/bin/python -m pytest -q -m "not slow" -p no:cacheprovider tests/fem/closed_forms/test_closed_form.py \
-  tests/geometry/scenes/test_scene_file.py tests/dynamics/flights/test_integration.py tests/studies/sweeps/test_sweep.py \
-  tests/studies/interface/test_api.py tests/studies/command_line/test_command_line.py
+  tests/geometry/scene/test_scene_file.py tests/dynamics/flights/test_integration.py tests/studies/test_sweep.py \
+  tests/studies/test_api.py tests/studies/cli/test_command_line.py

@@ -28,6 +28,9 @@ def test_files_that_are_named_exist():
         links = re.findall(r"\]\((?!https?:)([^)#]+)", text)
         missing += [f"{page.name}: {name}" for name in NAMED.findall(text) if not (ROOT / name).exists()]
         missing += [f"{page.name}: {link}" for link in links if not (page.parent / link).exists()]
+    for script in (ROOT / "Makefile", ROOT / "tests" / "try_wheel.sh", *(ROOT / ".ci").iterdir()):
+        named = re.findall(r"\b(?:tests|docs|benchmarks)/[\w/]+\.(?:py|sh)", script.read_text(encoding="utf-8"))
+        missing += [f"{script.name}: {name}" for name in named if not (ROOT / name).exists()]
     assert missing == []
 
 
