@@ -54,7 +54,7 @@ FORMATS = {
     "floater-currents": 3,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 16,
+    "equilibria": 17,
     "flight": 1,
     "experiment": 3,
     "code": 1,

@@ -33,21 +33,26 @@ STEPS_TOGETHER, CELL, COARSER, AWAY = 3, 0.1, 1.3, 1.0
 # circle of others and never come back to their start.
 STEPS = Steps(longest=0.1, shortest=1e-6, turn=0.15, most=1000, first=1 / 4, far=3.0)
 DEEP = 0.1  # Radii of an overlap up to which a curve may come out of it
-FARTHEST = 0.1  # Largest depth at which equilibria are looked for, and distance from the axis, m
+# Equilibria are looked for up to a depth, and distance from the axis, of the rotor's own reach and so many times the
+# radii of floater and largest magnet, so that a scene ten times as large has the same; and at least to so many metres.
+SIZES, LEAST = 4.0, 0.1
 TOGETHER = 8  # Curves that are followed at once
 
 
 @dataclass(frozen=True, eq=False)
 class SearchRange:
-    """Positions below the rotor, from contact with it to `farthest`, in floater radii."""
+    """Positions below the rotor, from contact with it to `bound`, in floater radii."""
 
     scene: Scene  # its rotor and floater
-    farthest: float = FARTHEST  # largest depth, and distance from the axis, m
     ball: bool = False  # whether the whole ball about the floater has to be free, where its multipoles hold
 
-    @property
+    @cached_property
     def bound(self) -> float:
-        return self.farthest / self.scene.floater.radius
+        """Largest depth, and distance from the axis."""
+        bodies, radius = [magnet.body for magnet in self.scene.rotor], self.scene.floater.radius
+        reach = max((body.farthest(np.zeros(3)) for body in bodies), default=0.0)
+        size = radius + max((body.circumradius for body in bodies), default=0.0)
+        return max(LEAST, reach + SIZES * size) / radius
 
     def holds(self, position: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Which of the scaled positions (n, 3) belong to the range, or lie at most a margin (radii) outside: (n,)."""

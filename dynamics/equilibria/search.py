@@ -29,7 +29,7 @@ from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, left_product, matrices_of, quaternions_of
 from .balance import CONVERGED_STEP, DUPLICATE_DISTANCE, EVERY, Balance, place_error, solve, tangent_basis
-from .curves import FARTHEST, SearchRange, fixed_points
+from .curves import SearchRange, fixed_points
 from .equilibrium import (
     AVERAGED,
     LOCKED,
@@ -93,17 +93,16 @@ def find_equilibria(
     scene: Scene,
     table: FieldTable,
     spin: float = 0.0,
-    farthest: float = FARTHEST,
     rates: Rates | None = None,
     memory: PlateMemory | None = None,
 ) -> list[Equilibrium]:
     """All synchronous equilibria free of the bodies, the stable ones first, then by distance.
 
-    `scene`, `table`, `spin`, `farthest`, `rates`: see `survey`, as for what it raises; `memory`: the plate's currents;
+    `scene`, `table`, `spin`, `rates`: see `survey`, as for what it raises; `memory`: the plate's currents;
     None leaves them out.
     """
     rates = rates or Rates(with_effects(scene, table))
-    found = survey(scene, table, spin, farthest, rates)
+    found = survey(scene, table, spin, rates)
     found = free_of_bodies(scene, found) if memory is None else with_plate(scene, table, found, memory, rates)
     return list(found.equilibria)
 
@@ -112,12 +111,11 @@ def survey(
     scene: Scene,
     table: FieldTable,
     spin: float = 0.0,
-    farthest: float = FARTHEST,
     rates: Rates | None = None,
     remembered: Remembered = lambda search, _: search(),
     watch: Watch = unwatched,
 ) -> Survey:
-    """All synchronous equilibria with z < 0 between contact with the rotor and `farthest`, with their stability.
+    """All synchronous equilibria with z < 0 between contact with the rotor and the `bound` of a `SearchRange`.
 
     Raises EquilibriumError: the rotor is at rest and the floater does not spin. Returns equilibria, the stable ones
     first, then by distance, accurate to round-off in the table's field.
@@ -128,7 +126,6 @@ def survey(
     table : the rotor's field
     spin : body spin s = Ω·m̂/ω, which magnetic torque does not change; beside a rotor at rest the scene's start says
         how fast the floater spins about its moment, of which stability depends, as of a spinning top
-    farthest : largest depth, and distance from the axis, m
     rates : `Rates` of the same table, to compile them once for many scenes
     remembered : gets a search with its kind and gives what it finds, perhaps from an earlier one, see `cached_points`
     watch : progress of the search
@@ -136,7 +133,7 @@ def survey(
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
     """
     check_turning(scene)
-    search = _Search(farthest, remembered, watch)
+    search = _Search(remembered, watch)
     if not scene.floater.round:
         return _survey_of_any_body(scene, table, spin, rates, search)
     if scene.floater.mean:
@@ -155,12 +152,11 @@ def survey(
 class _Search:
     """What `survey` has of a search."""
 
-    farthest: float
     remembered: Remembered
     watch: Watch
 
     def found(self, scene: Scene, table: FieldTable, balance: Balance, kind: str) -> FixedPoints:
-        return self.remembered(lambda: _searched(scene, table, balance, self.farthest, self.watch), kind)
+        return self.remembered(lambda: _searched(scene, table, balance, self.watch), kind)
 
 
 def _survey_of_mean(
@@ -176,7 +172,7 @@ def _survey_of_mean(
     values, own = parameters(round_scene, scales, frozen_spin=True), _own_spin(scene) * scales.time * ratio
     about = Balance(quick or Rates(roughly), values, spin * ratio, own)
     seeds = search.found(round_scene, exactly, about, AVERAGED)
-    exact, points, doubts = _by_whole_body(scene, exactly, about, seeds.points, search.farthest)
+    exact, points, doubts = _by_whole_body(scene, exactly, about, seeds.points)
     return survey_of(round_scene, exact, FixedPoints.at(exact, points, doubts, seeds.curves))
 
 
@@ -197,9 +193,7 @@ def _survey_of_any_body(scene: Scene, table: FieldTable, spin: float, rates: Rat
         still = Balance(quick, values, round_scene.floater.spin_ratio, still=True)
         seeds = search.found(round_scene, exactly, still, LOCKED)
         rates = rates or Rates(with_effects(scene, table))
-        locked = _survey(
-            _locked(scene, with_effects(scene, table), seeds, search.farthest, rates), curves or seeds.curves
-        )
+        locked = _survey(_locked(scene, with_effects(scene, table), seeds, rates), curves or seeds.curves)
         if np.any(scene.gravity[:2]):
             alone = replace(scene, plate=None)
             locked = _forced(ForcedMotion(alone, rates, parameters(scene, Scales.of(scene)), None), locked)
@@ -208,7 +202,7 @@ def _survey_of_any_body(scene: Scene, table: FieldTable, spin: float, rates: Rat
     return _survey(found, curves, left_out)
 
 
-def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, farthest: float, rates: Rates) -> list[Equilibrium]:
+def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, rates: Rates) -> list[Equilibrium]:
     """Frequency-locked equilibria near those of the body's mean, `seeds`, gravity along the axis."""
     scales, floater = Scales.of(scene), scene.floater
     if not len(seeds.points):
@@ -223,7 +217,7 @@ def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, farthest: floa
         axes += [across @ turn @ across.T @ plain for turn in turns]
     places = np.repeat(seeds.points[:, :3], TURNS, axis=0)
     position, quaternion = locked_poses(rates, values, places, np.array(axes))
-    inside = SearchRange(scene, farthest).holds(position)
+    inside = SearchRange(scene).holds(position)
     known, doubts = field_doubts(table, position[inside] * scales.length)
     chosen = np.flatnonzero(inside)[known]
     doubts = _with_shape(doubts, scene, table, position[chosen], matrices_of(quaternion[chosen]))
@@ -232,15 +226,15 @@ def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, farthest: floa
     return without_twins([one for one in found if rotor_gap(scene, one.position, one.state.orientation) > 0])
 
 
-def _searched(scene: Scene, table: FieldTable, balance: Balance, farthest: float, watch: Watch) -> FixedPoints:
+def _searched(scene: Scene, table: FieldTable, balance: Balance, watch: Watch) -> FixedPoints:
     scales = Scales.of(scene)
     balance.rates.compile()
-    curves, where = fixed_points(balance, SearchRange(scene, farthest), watch)
+    curves, where = fixed_points(balance, SearchRange(scene), watch)
     known, doubts = field_doubts(table, where[:, :3] * scales.length)
     if not (scene.floater.is_sphere or scene.floater.mean):
         free, errors = _of_shape(scene, table, known, doubts, where)
         if free is None:
-            balance, where, doubts = _by_whole_body(scene, table, balance, where, farthest)
+            balance, where, doubts = _by_whole_body(scene, table, balance, where)
             known = np.ones(len(where), bool)
         else:
             known, doubts = free, errors
@@ -272,15 +266,13 @@ def _of_shape(
     return kept, np.reshape(more, (-1, doubts.shape[1]))
 
 
-def _by_whole_body(
-    scene: Scene, table: FieldTable, balance: Balance, where: Array, farthest: float
-) -> tuple[Balance, Array, Array]:
+def _by_whole_body(scene: Scene, table: FieldTable, balance: Balance, where: Array) -> tuple[Balance, Array, Array]:
     """Balance of as many dipoles all over a floater as its force takes, points (n, 6) where it vanishes, and doubts."""
     round_scene, exactly, _ = mean_over_turns(scene, table)
     scales = Scales.of(round_scene)
     exact = replace(balance, rates=Rates(exactly), values=parameters(round_scene, scales, frozen_spin=True))
     place, moment, step = solve(exact, where[:, :3], where[:, 3:], EVERY)
-    found = (step < CONVERGED_STEP) & SearchRange(scene, farthest).holds(place)
+    found = (step < CONVERGED_STEP) & SearchRange(scene).holds(place)
     points = np.column_stack([place, moment])[found]  # two may have become one
     points = points[np.sort(np.unique(np.round(points / DUPLICATE_DISTANCE), axis=0, return_index=True)[1])]
     (body,) = (effect for effect in exactly.effects if isinstance(effect, BodyShape))

@@ -118,7 +118,7 @@ BRUTE = [("vertical", 30.0, 0.0), ("tilt", 80.0, -0.5), ("horizontal", 110.0, 0.
 )
 def test_none_is_missed_that_brute_force_finds(name, frequency, spin):
     scene = replace(SCENES[name], frequency=frequency)
-    table, scales, where = table_of(scene, "dipole"), Scales.of(scene), SearchRange(scene, 0.1)
+    table, scales, where = table_of(scene, "dipole"), Scales.of(scene), SearchRange(scene)
     balance, generator, number = Balance(Rates(table), parameters(scene, scales), spin), np.random.default_rng(5), 4000
     height, across = np.exp(generator.uniform(np.log([[0.5], [0.02]]), np.log([[15.0], [3.0]]), (2, number)))
     azimuth, moment = generator.uniform(0, 2 * np.pi, number), generator.normal(size=(number, 3))
@@ -186,7 +186,7 @@ PUBLISHED = [  # PHYSICS.md, "the family matters": scene, frequency, body spin, 
 def test_starts_thinned_on_the_way_find_what_all_find(name, free, monkeypatch):
     scene = SCENES[name]
     rates, values = Rates(table_of(scene, "cuboid")), parameters(scene, Scales.of(scene), frozen_spin=True)
-    balance, where = Balance(rates, values, 0.0), SearchRange(scene, 0.1)
+    balance, where = Balance(rates, values, 0.0), SearchRange(scene)
     thinned = searching.from_starts(balance, where, free)
     monkeypatch.setattr(searching, "CELL", 1e-12)
     monkeypatch.setattr(searching, "AWAY", np.inf)
