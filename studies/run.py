@@ -45,7 +45,7 @@ from .words import flight_words, headline, left_out_words, note_details
 
 MODELS = ("dipole", "cuboid", "fem")
 SHOWN = 20  # points whose field is printed, at most
-DEEPEST = 0.05  # the field figure reaches this far below the rotor's origin, m
+DEEPEST, SIZES = 0.05, 5.0  # the field figure's depth below the rotor's origin, m, or below the rotor, in largest radii
 
 
 def field_job(scene: Scene, points: Array, requested: Models, out: Path) -> Answer:
@@ -321,7 +321,8 @@ def _static_dataset(levitation: Levitation, survey: Survey, alone: Mapping[str, 
     """Field, force and equilibria free of the bodies: with the plate's currents where they act, and all without."""
     scene, chosen = levitation.scene, levitation.table.model
     lowest = min(float(corner[2]) for magnet in scene.rotor for corner in magnet.box.corners)
-    heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - 1e-3, -DEEPEST), 200)
+    largest = max(scene.floater.radius, *(magnet.body.circumradius for magnet in scene.rotor))
+    heights = np.linspace(min(lowest - scene.floater.radius, -1e-3), min(lowest - SIZES * largest, -DEEPEST), 200)
     surveys = {**alone, chosen: survey}
     equilibria = {}
     for model, found in alone.items():

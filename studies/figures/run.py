@@ -154,15 +154,17 @@ def force_figure(result: xr.Dataset) -> Figure:
                 place = depth.values[(chosen & (result["equilibrium_model"] == model)).values]
                 panel.plot(place, 0 * place + weight, marker, color=COLORS[model], ms=5, **white)
         panel.set(xlabel=DISTANCE)
-    axes.set(xlim=(5, 60), ylabel="axial magnetic force (mN), up positive")
+    nearest, farthest = min([12.0, *depth.values]), max([0.0, *depth.values])
+    far = 60.0 if nearest == 12.0 and farthest < 60 else 1.3 * farthest
+    axes.set(xlim=(far / 12, far), ylabel="axial magnetic force (mN), up positive")
     if weight > 0:
         axes.set_ylim(-2.5 * weight, min(1.1 * max(peaks), 30 * weight))
     first = depth.values[(kinds != "unstable").values][:1]
     if first.size and weight > 0:
-        near.set(xlim=(first[0] - 1.0, first[0] + 1.0), ylim=(0.0, 2 * weight))
+        near.set(xlim=(0.95 * first[0], 1.05 * first[0]), ylim=(0.0, 2 * weight))
         near.locator_params(nbins=5)
     else:
-        near.set_axis_off()
+        near.set_visible(False)
     return figure
 
 

@@ -57,10 +57,10 @@ def test_fields_of_any_size_have_room(size):
     assert has_room(field_figure(result))
 
 
-@pytest.mark.parametrize("weight", [1e-6, 0.08, 900.0])
-def test_forces_of_any_size_have_room(weight):
-    """A floater of a milligram to one of 90 kg, with all lines that a legend can have."""
-    depth = np.linspace(-0.06, -0.005, 60)
+@pytest.mark.parametrize(("weight", "size"), [(1e-6, 0.03), (0.08, 1.0), (900.0, 30.0)])
+def test_forces_of_any_size_have_room(weight, size):
+    """A floater of a milligram to one of 90 kg, with all lines that a legend can have, and its equilibria are shown."""
+    depth = size * np.linspace(-0.06, -0.005, 60)
     place = np.stack([0 * depth, 0 * depth, depth], axis=1)
     along = ("curve_point", "axis")
     models = np.repeat(["dipole", "cuboid", "map"], 20)
@@ -68,7 +68,7 @@ def test_forces_of_any_size_have_room(weight):
         "curve_model": (("curve_point",), models),
         "curve_number": (("curve_point",), np.zeros(60, int)),
         "curve_position": (along, place),
-        "curve_force": (("curve_point",), weight * np.cos(100 * depth)),
+        "curve_force": (("curve_point",), weight * np.cos(100 * depth / size)),
         "equilibrium_model": (("equilibrium",), np.array(["dipole", "map"])),
         "equilibrium_position": (("equilibrium", "axis"), place[[20, 40]]),
         "equilibrium_stable": (("equilibrium",), np.array([1, 0])),
@@ -76,6 +76,10 @@ def test_forces_of_any_size_have_room(weight):
     }
     figure = force_figure(xr.Dataset(columns, {"axis": ["x", "y", "z"]}, {"weight_N": -weight}))
     assert has_room(figure)
+    for axes, shown in zip(figure.axes, (place[[20, 40]], place[[20]]), strict=True):
+        low, high = axes.get_xlim()
+        distance = -1e3 * shown[:, 2]
+        assert low < distance.min() <= distance.max() < high < -5e3 * depth[0]
     (legend,) = figure.legends
     label = min(axes.get_tightbbox().y0 for axes in figure.axes)
     assert legend.get_window_extent().y1 < label + 1
