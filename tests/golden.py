@@ -202,8 +202,11 @@ def _plates() -> dict[str, list[float]]:
 
 
 def main(arguments: list[str]) -> int:
-    """Record or compare; 1 where something differs."""
-    do, *chosen = arguments
+    """Record or compare; 1 where something differs, 2 where it is not known what to do."""
+    do, *chosen = arguments or [""]
+    if do not in ("record", "compare") or not set(chosen) <= set(names()):
+        print(__doc__, "NAME:", ", ".join(names()), sep="\n")
+        return 2
     GOLDEN.mkdir(exist_ok=True)
     different = 0
     for name in chosen or names():
