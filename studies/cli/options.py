@@ -115,10 +115,10 @@ def read_points(path: Path) -> Array:
     try:
         rows = csv.reader(io.StringIO(content.decode("utf-8-sig"), newline=""), skipinitialspace=True)
         header = [name.strip() for name in next(rows, [])]
-        if any(column not in header for column in COLUMNS):
-            received = shown(", ".join(header))
+        if any(header.count(column) != 1 for column in COLUMNS):
+            received, once = shown(", ".join(header)), ", each once" * all(column in header for column in COLUMNS)
             raise InputError(
-                f"{path}: Input header must have the columns {', '.join(COLUMNS)}; instead received {received}."
+                f"{path}: Input header must have the columns {', '.join(COLUMNS)}{once}; instead received {received}."
             )
         where = [header.index(column) for column in COLUMNS]
         filled = (each for each in enumerate(rows, start=2) if any(cell.strip() for cell in each[1]))

@@ -190,6 +190,7 @@ def test_wrong_command_lines_end_with_status_2(spinlev, tmp_path, points, argume
     [
         ("", "must have the columns"),
         ("x,y,z\n0,0,-20\n", "must have the columns"),
+        ("x_mm,y_mm,z_mm,x_mm\n0,0,-20,1\n", "must have the columns x_mm, y_mm, z_mm, each once"),
         ("x_mm,y_mm,z_mm\n", "at least one line"),
         ("x_mm,y_mm,z_mm\n0,0,deep\n", "line 2 must have three finite numbers; instead received 'deep'"),
         ("x_mm,y_mm,z_mm\n0,0,-20\n0,0,nan\n", "line 3"),
