@@ -26,7 +26,7 @@ from ..figures import run as drawing
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
 from ..figures.style import save_figures
-from ..figures.view import SEEN, Currents, current_places, near_plate
+from ..figures.view import SEEN, Currents, current_places, near_plate, unit
 from ..levitation import Levitation
 from ..plan import sources
 from ..question import Question
@@ -174,7 +174,7 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     view = last_view(scene, table, time, motion)
     if scene.plate is not None:
         note("Currents in the plate ...")
-        places = current_places(near_plate(scene.plate.body, SEEN), view.position)
+        places = current_places(near_plate(scene.plate.body, SEEN * unit(scene)), view.position)
         floater = replace(State(*(vector[-1] for vector in motion.vectors)), position=view.position)
         density = plate_currents(scene, scene.plate, sources(table), floater, places)
         view = replace(view, currents=Currents(places, density))

@@ -14,7 +14,7 @@ from ...fem.rotor.table import FieldTable, RotorTable
 from ...geometry.common import Array
 from ...geometry.meshes.plate import MeshRule, plate_mesh
 from ...geometry.scene.contents import Plate, Scene
-from .view import FieldPlane, Frames, View, field_lines, frame_times
+from .view import FieldPlane, Frames, View, field_lines, frame_times, unit
 
 ORDER = 3  # Of the elements: a picture needs no more
 PATH = 12  # Turns of the rotor at the end of a trajectory whose path is drawn
@@ -25,8 +25,8 @@ ANGLES = 8  # Of the rotor, from which the part of its field at the rotor's freq
 def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> View:
     """The end of a trajectory as of `seen_from`, and the field by the rotor's `table`."""
     view, field = seen_from(scene, time, motion), drawn_field(scene, table)
-    depth = max(abs(1e3 * float(view.position[2])), 10.0)
-    width = max(1.6 * depth, 30.0)
+    depth = max(abs(1e3 * float(view.position[2])), 10.0 * unit(scene))
+    width = max(1.6 * depth, 30.0 * unit(scene))
     plane = FieldPlane(width, depth, field(1e-3 * FieldPlane.points(width, depth)))
     low, high = 1e-3 * np.array([(-width, -width, -1.6 * depth), (width, width, 0.8 * depth)])
     lines = field_lines(scene, lambda points: np.nan_to_num(field(points)), low, high)

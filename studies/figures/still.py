@@ -19,7 +19,7 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ...geometry.shapes import Box, rotation_matrix
 from ...geometry.solids import Solids
-from .view import FINE, SEEN, Currents, Frames, View, arrow, near_plate, triangles
+from .view import FINE, SEEN, Currents, Frames, View, arrow, near_plate, triangles, unit
 
 NORTH, METAL, DARK = "#D55E00", "#9AA5B1", "#4C566A"
 PER_SECOND = 12
@@ -40,17 +40,20 @@ def scene_picture(view: View) -> bytes:
         _add_field(plotter, view)
     radius = 1e3 * scene.floater.radius
     beside = center + np.array([1.2 * radius, 0.0, 0.0])
-    rotor = _rotor_corners(scene)
-    names = {"floater": beside, f"rotor, {scene.frequency:g} Hz": [rotor[:, 0].max() + 3.0, 0.0, rotor[:, 2].max()]}
+    rotor, size = _rotor_corners(scene), unit(scene)
+    names = {
+        "floater": beside,
+        f"rotor, {scene.frequency:g} Hz": [rotor[:, 0].max() + 3.0 * size, 0.0, rotor[:, 2].max()],
+    }
     if scene.plate is not None:
-        near = near_plate(scene.plate.body, SEEN)
+        near = near_plate(scene.plate.body, SEEN * unit(scene))
         corners = 1e3 * near.corners
         whole = np.allclose(near.size, scene.plate.body.size)
         names["plate" if whole else "part of the plate"] = corners[corners[:, 1].argsort()[:4]].mean(axis=0)
     if path:
         names[f"path, {view.frame}"] = beside - np.array([0.0, 0.0, 0.8 * radius])
     if scene.frequency:
-        names["axis of rotation"] = [1.0, 0.0, rotor[:, 2].max() + 8.0]
+        names["axis of rotation"] = [size, 0.0, rotor[:, 2].max() + 8.0 * size]
     plotter.add_point_labels(np.array(list(names.values())), list(names), **NAME)
     _look(plotter, scene)
     plotter.add_axes()
@@ -146,7 +149,7 @@ def add_plate(plotter: pv.Plotter, scene: Scene, currents: Currents | None = Non
     """Draw the part of the plate near the rotor, if there is one, with its `currents`: the longest arrow is 12 mm."""
     if scene.plate is None:
         return
-    _add_body(plotter, near_plate(scene.plate.body, SEEN), METAL, opacity=0.2)
+    _add_body(plotter, near_plate(scene.plate.body, SEEN * unit(scene)), METAL, opacity=0.2)
     if currents is not None:
         cloud = pv.PolyData(1e3 * currents.points)
         cloud["J"], cloud[CURRENT] = 1e-6 * currents.density, 1e-6 * np.linalg.norm(currents.density, axis=1)
@@ -188,18 +191,18 @@ def _add_rotor(plotter: pv.Plotter, scene: Scene) -> list[pv.Actor]:
 
 def _add_turning(plotter: pv.Plotter, scene: Scene, depth: float) -> None:
     """The axis, and above the rotor an arrow in the sense in which it turns: in front of the field's plane."""
-    corners = _rotor_corners(scene)
-    height, radius = float(corners[:, 2].max()) + 3.0, float(np.linalg.norm(corners[:, :2], axis=1).max())
+    corners, size = _rotor_corners(scene), unit(scene)
+    height, radius = float(corners[:, 2].max()) + 3.0 * size, float(np.linalg.norm(corners[:, :2], axis=1).max())
     angles = np.radians(np.linspace(-185, -25, 60))
     arc = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(60, height)])
-    plotter.add_mesh(pv.MultipleLines(arc).tube(radius=0.45), color="black")
-    tip = pv.Cone(center=arc[-1], direction=arc[-1] - arc[-3], height=4.0, radius=1.6, resolution=30)
+    plotter.add_mesh(pv.MultipleLines(arc).tube(radius=0.45 * size), color="black")
+    tip = pv.Cone(center=arc[-1], direction=arc[-1] - arc[-3], height=4.0 * size, radius=1.6 * size, resolution=30)
     plotter.add_mesh(tip, color="black")
-    plotter.add_mesh(pv.Line((0, 0, -depth), (0, 0, height + 5)).tube(radius=0.12), color="black")
+    plotter.add_mesh(pv.Line((0, 0, -depth), (0, 0, height + 5 * size)).tube(radius=0.12 * size), color="black")
 
 
 def _add_field(plotter: pv.Plotter, view: View) -> None:
-    """|B| on the plane y = 0 about the rotor, field lines, and how long 10 mm are."""
+    """|B| on the plane y = 0 about the rotor, field lines, and how long 10 mm, or what is round of the scene, are."""
     plane = view.plane
     assert plane is not None
     size = 1e3 * np.linalg.norm(plane.field, axis=1)
@@ -220,9 +223,10 @@ def _add_field(plotter: pv.Plotter, view: View) -> None:
     shown.SetLookupTable(table)
     if view.lines:
         plotter.add_mesh(_polylines(view.lines).tube(radius=0.004 * width), color="#2E3440")
-    ends = np.array([(-width, 0.0, 0.8 * depth + 2), (10 - width, 0.0, 0.8 * depth + 2)])
-    plotter.add_mesh(pv.Line(*ends).tube(radius=0.3), color="black")
-    plotter.add_point_labels(ends[1:] + 1.0, ["10 mm"], **NAME)
+    mm = unit(view.scene)
+    ends = np.array([(-width, 0.0, 0.8 * depth + 2 * mm), (10 * mm - width, 0.0, 0.8 * depth + 2 * mm)])
+    plotter.add_mesh(pv.Line(*ends).tube(radius=0.3 * mm), color="black")
+    plotter.add_point_labels(ends[1:] + mm, [f"{10 * mm:g} mm"], **NAME)
 
 
 def _polylines(lines: Any) -> pv.PolyData:

@@ -16,7 +16,7 @@ FINE = 161  # Points of a plane of the field along each of its edges
 TURNS, FRAMES = 3, 16  # Turns of the rotor that an animation shows at once, and frames for each
 LINES = 36  # Field lines, each followed both ways
 STEP, STEPS = 1e-3, 200  # Length of a step along a field line, m, and how many in one direction at most
-SEEN = 0.016  # How far along its edges a plate is drawn in a picture, m
+SEEN = 0.016  # How far along its edges a plate is drawn in a picture, m; both times the `unit` of the scene
 SIDES = 48  # Of what is round
 Surface: TypeAlias = "tuple[Array, NDArray[np.intp]]"
 SQUARES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
@@ -95,6 +95,16 @@ class Sample:
         from .still import sample_picture
 
         yield sample_picture()
+
+
+def unit(scene: Scene) -> float:
+    """A tenth of a round length (1, 2 or 5 with noughts, mm) that floater and largest magnet are: 1 of the article's.
+
+    Arrows, names, steps and margins of a picture are some of these, so that a small scene is not hidden behind them.
+    """
+    size = 1e3 * (scene.floater.radius + max((magnet.body.circumradius for magnet in scene.rotor), default=0.0))
+    digit = 10.0 ** np.floor(np.log10(size))
+    return float(max(factor for factor in (1, 2, 5) if factor * digit <= size) * digit / 10)
 
 
 def current_places(box: Solids, floater: Array) -> Array:
@@ -188,7 +198,8 @@ def field_lines(scene: Scene, field: Callable[[Array], Array], low: Array, high:
         b = field(places)
         return np.asarray(b / np.maximum(np.linalg.norm(b, axis=1, keepdims=True), 1e-30))
 
-    for step in (-STEP, STEP):
+    length = STEP * unit(scene)
+    for step in (-length, length):
         active, places = np.arange(len(start)), start
         for _ in range(STEPS):
             one = slope(places)
@@ -197,7 +208,7 @@ def field_lines(scene: Scene, field: Callable[[Array], Array], low: Array, high:
             places = places + step / 6 * (one + 2 * two + 2 * three + slope(places + step * three))
             free = ((places > low) & (places < high)).all(axis=1)
             for magnet in scene.rotor:
-                free &= magnet.body.distance(places) > 0.2 * STEP
+                free &= magnet.body.distance(places) > 0.2 * length
             active, places = active[free], places[free]
             for k, place in zip(active, places, strict=True):
                 found[k].insert(0 if step < 0 else len(found[k]), place)

@@ -13,7 +13,7 @@ from places import OVER_PLATE
 
 from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
 from spinlev.geometry.scene.files import load_scene, parse_scene
-from spinlev.studies.figures.view import field_lines
+from spinlev.studies.figures.view import field_lines, unit
 from spinlev.studies.levitation import Levitation
 from spinlev.studies.page.state import first_state
 from spinlev.studies.page.work import (
@@ -35,21 +35,36 @@ from spinlev.studies.words import left_out_words
 STATE = replace(first_state(load_scene(OVER_PLATE)), model="dipole", plate_model="none")
 
 
+def dipole_along_x(points):
+    """Its field (n, 3), of no unit."""
+    r = np.linalg.norm(points, axis=1, keepdims=True)
+    return 3 * points * points[:, :1] / r**5 - np.array([1.0, 0.0, 0.0]) / r**3
+
+
 def test_lines_of_a_dipoles_field_are_its_field_lines():
     """r = a sin² of the angle from the moment, along every line; the moment is along x here."""
     scene = replace(STATE.changed("rotor.angle_deg", 0.0).scene, plate=None)
-
-    def field(points):
-        r = np.linalg.norm(points, axis=1, keepdims=True)
-        return 3 * points * points[:, :1] / r**5 - np.array([1.0, 0.0, 0.0]) / r**3
-
-    lines = field_lines(scene, field, *SIGHT)
+    lines = field_lines(scene, dipole_along_x, *SIGHT)
     assert len(lines) > 10
     for one in lines:
         r = np.linalg.norm(one, axis=1)
         sine = 1 - (one[:, 0] / r) ** 2
         assert r / sine == pytest.approx((r / sine)[len(r) // 2], rel=2e-3)  # steps of 1 mm beside a cube of 10 mm
         assert np.abs(one[:, 1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("times", [0.1, 10.0])
+def test_lines_and_names_of_a_scene_ten_times_the_size_are_ten_times_the_size(times):
+    """Their steps are parts of the bodies; the same picture, whose scale says another length."""
+    text = "frequency_hz = {f}\n[rotor]\nconfiguration = 'tilt'\nangle_deg = 10.0\nedge_mm = {e}\nremanence_T = 1.3\n"
+    text += "[floater]\ndiameter_mm = {d}\nremanence_T = 1.3\ndensity_kg_m3 = 7500.0\n"
+    plain, scaled = (parse_scene(text.format(f=130 / k, e=10 * k, d=12.7 * k)) for k in (1.0, times))
+    assert (unit(plain), unit(scaled)) == (1.0, pytest.approx(times))
+    lines = field_lines(plain, dipole_along_x, *SIGHT)
+    other = field_lines(scaled, dipole_along_x, *(times * np.array(SIGHT)))
+    assert len(lines) == len(other) > 10
+    for one, two in zip(lines, other, strict=True):
+        np.testing.assert_allclose(two, times * one, rtol=0, atol=1e-9 * times)  # m; the lines are some 50 mm long
 
 
 def test_where_there_is_no_field_there_are_no_lines():
