@@ -62,7 +62,7 @@ def mutual_errors(
     """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque found at poses with these gaps.
 
     `table` and `floater` are compared with both bodies; `coarse` and `rotor` have two numbers of nodes, which tell the
-    table's error and their own. `watch` is called with the progress.
+    table's error and their own, of the response to the moment alone. `watch` is called with the progress.
     """
     generator = np.random.default_rng(4)
     apart = max(float(np.ptp(np.linalg.eigvalsh(m.permeability_in_rotor))) for m in rotor.magnets)
@@ -75,9 +75,7 @@ def mutual_errors(
             direction /= np.linalg.norm(direction)
             degree = response.enough_degree(rotor.magnets, Ball(place, floater.radius), taken.degrees)
             both = response.two_body(rotor, floater, place, direction, degree, taken.series)
-            added = both.total - both.rigid
-            rough = response.two_body(coarse, floater, place, direction, degree, taken.series)
-            unsure = added - (rough.total - rough.rigid)
+            added, unsure = both.total - both.rigid, both.differing(coarse)
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
             _, force, torque = table.added(place[None], floater.moment * direction[None], field[None], gradient[None])
             missed = [

@@ -26,7 +26,7 @@ from ..harmonics import interior
 from ..harmonics.expansion import box_rule, gauss, uniform_moments
 from ..harmonics.interior import Ball, Surroundings
 from ..harmonics.solid import FOUR_PI, Coefficients, factorials, weighted_sums
-from .table import ResponseGrid, effort, induced_sources, point_counts, reflection
+from .table import PARALLEL, ResponseGrid, effort, induced_sources, point_counts, reflection
 
 DEGREES = range(6, 41)
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
@@ -264,12 +264,18 @@ class TwoBody:
     floater_answer: Wrench  # what the sphere's response to the rotor's own field adds
     rotor_answer: Wrench  # what the rotor's response to the rigid dipole adds
     total: Wrench  # both respond to both; the sum of the three but for products of two responses
-    # own, incident, sources: a_lm (T) of the rotor alone, a_lm and c_lm (T) of the total
+    # own, permanent, incident, sources: a_lm (T) of the rotor alone, c_lm (T) of the dipole, both of the total
     own: Coefficients
+    permanent: Coefficients
     incident: Coefficients
     sources: Coefficients
     terms: int  # of the series
     tail: float  # estimated relative error by the degrees left out, of what the responses add
+
+    def differing(self, rotor: RotorResponse) -> Wrench:
+        """By how much another rotor's response to the rigid dipole adds less: most of what its response differs by."""
+        answer = rotor.answer(self.permanent, self.ball, len(self.permanent) - 1)
+        return self.rotor_answer - _wrench(answer, self.permanent, self.ball)
 
 
 def two_body(
@@ -316,6 +322,7 @@ def two_body(
         rotor_answer=_wrench(reflected, permanent, ball),
         total=_wrench(incident, sources, ball),
         own=own,
+        permanent=permanent,
         incident=incident,
         sources=sources,
         terms=terms,
@@ -361,12 +368,13 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
 def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float]) -> Array:
     """Centres (n, 3) m of floaters before the middles of faces and edges and the corners of magnets, where they fit.
 
-    At `gaps` from a magnet, in floater radii (`radius`, m). Beside a lone one of `magnets` on one side, and of many
-    before the faces' middles alone.
+    At `gaps` from a magnet, in floater radii (`radius`, m). Beside a lone one of `magnets` none that is another's mirror
+    image, and of many before the faces' middles alone.
     """
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     if len(magnets) == 1:
-        ways = ways[len(ways) // 2 :]
+        along_an_axis = np.count_nonzero(np.abs(magnets[0].polarization) > PARALLEL) <= 1
+        ways = ways[(ways >= 0).all(axis=1)] if along_an_axis else ways[len(ways) // 2 :]
     if not effort(len(magnets)).corners:
         ways = ways[np.count_nonzero(ways, axis=1) == 1]
     ways /= np.linalg.norm(ways, axis=1)[:, None]
