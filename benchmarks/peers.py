@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import magpylib
 import numpy as np
 from scipy.integrate import quad
@@ -9,6 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from spinlev.fem.plate.slab import Slab
+from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.scene.contents import Plate
 from spinlev.geometry.scene.files import load_scene
@@ -27,6 +30,14 @@ def around(magnet, count, seed=0):
     way = generator.normal(size=(count, 3))
     distance = generator.uniform(0.013, 0.04, (count, 1))
     return magnet.box.center + distance * way / np.linalg.norm(way, axis=1)[:, None]
+
+
+def moved_rotors(displacements, model="dipole"):
+    """The scene with its cube at so many displacements, m, and the fields of these."""
+    (cube,) = SCENE.rotor
+    rotors = [(replace(cube, body=replace(cube.body, center=np.array([x, 0.0, 0.0]))),) for x in displacements]
+    first = rotor_table(SCENE.rotor, model, 3e-6, SCENE.floater.radius)
+    return [replace(SCENE, rotor=rotor) for rotor in rotors], [first.transformed(cube.body, *r) for r in rotors]
 
 
 def magpylib_rotor(rotor):

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from peers import PLATE, SCENE, around
+from peers import PLATE, SCENE, around, moved_rotors
 
 from spinlev.dynamics.continuation.map import equilibrium_map
-from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
 from spinlev.fem.closed_forms.moments import carriers_of
 from spinlev.fem.closed_forms.potentials import unit_dipoles
@@ -88,8 +87,7 @@ def test_turns(benchmark, turns):
 @pytest.mark.parametrize("side", [10, 20, 40, 80])
 def test_grid(benchmark, side):
     """Maps with more and more points."""
-    family = rotor_family(SCENE, "horizontal", "dipole", nearest=SCENE.floater.radius)
-    axes = np.linspace(50.0, 250.0, side), np.linspace(1e-3, 8e-3, side)
-    assert family.rates is not None  # compiled
     benchmark.extra_info["size"] = side**2
-    assert benchmark.pedantic(equilibrium_map, (family, *axes), rounds=1).stable.any()
+    columns = moved_rotors(np.linspace(1e-3, 8e-3, side))
+    found = benchmark.pedantic(equilibrium_map, (*columns, np.linspace(50.0, 250.0, side)), rounds=1)
+    assert found.stable.any()

@@ -1,6 +1,5 @@
 from .continuation.branch import BranchPoint as BranchPoint, Family as Family, follow_branch as follow_branch
 from .continuation.map import EquilibriumMap as EquilibriumMap, equilibrium_map as equilibrium_map
-from .continuation.rotor_family import RotorFamily as RotorFamily, rotor_family as rotor_family
 from .continuation.slow_drift import Drift as Drift, drift as drift
 from .equilibria.equilibrium import (
     Equilibrium as Equilibrium,

@@ -18,7 +18,7 @@ from ..dynamics.motion.effect import Interaction, interaction_of
 from ..dynamics.motion.effects import mutual_choice, with_effects
 from ..dynamics.motion.events import plate_depth
 from ..dynamics.motion.plate import PlateMemory
-from ..dynamics.motion.rates import Rates
+from ..dynamics.motion.rates import Rates, code_of
 from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..dynamics.motion.state import Scales
 from ..fem.mutual.making import cached_mutual_table, mutual_key
@@ -204,7 +204,12 @@ class Levitation:
     @property
     def rates(self) -> Rates:
         """The equations of motion in the rotor's field, compiled."""
-        return self._tables.once(f"rates {self.equations_key}", lambda: Rates(self.interaction))
+
+        def made() -> Rates:
+            first = self._tables.once(f"{code_of(self.interaction)}", lambda: Rates(self.interaction))
+            return first.elsewhere(self.interaction)
+
+        return self._tables.once(f"rates {self.equations_key}", made)
 
     # Equilibria
 

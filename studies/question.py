@@ -13,64 +13,39 @@ import numpy as np
 import xarray as xr
 
 from ..dynamics.continuation.map import surveys
-from ..dynamics.continuation.rotor_family import rotor_family
 from ..dynamics.flights.balls import is_long
 from ..dynamics.flights.batch import simulate_together
 from ..dynamics.flights.flight import initial_state
 from ..fem.cache import key_of
 from ..fem.rotor.models import of_true_moment
-from ..fem.rotor.table import canonical
 from ..geometry.common import Array, InputError, SpinlevError
 from ..geometry.scene.contents import Scene
-from ..geometry.scene.files import changed, scene_digest, scene_keys, scene_text, startless_text
+from ..geometry.scene.files import changed, scene_digest, scene_text, startless_text
 from .cli.options import NAMES, Models, Quantity, positive
 from .compare import compared_models
 from .levitation import Levitation
-from .plan import check_coils, equations_key, nearest_faces, sources
+from .plan import check_coils, sources
 from .result import AXIS, found_dataset, label_of_key, variable
 from .study import Point
 from .words import kind_of_flight
 
 
-def _family(levitation: Levitation) -> tuple[str, str, float]:
-    """All that decides the equations but the displacement or tilt of one of the article's lone magnets.
-
-    With it the magnet's configuration, and its displacement (m) or tilt (rad). Raises what the field's table raises.
-    """
-    scene, rotor = levitation.scene, scene_keys(levitation.scene)["rotor"]
-    kind = rotor.get("configuration")
-    if kind is None or len(scene.rotor) > 1 or scene.conductors or scene.field_map:
-        return levitation.equations_key, "", 0.0
-    measure = float(np.radians(rotor["angle_deg"])) if kind == "tilt" else 1e-3 * rotor["displacement_mm"]
-    home = equations_key(replace(scene, rotor=canonical(scene.rotor)), levitation.models)
-    return f"{kind} {levitation.table.model} {levitation.interaction_model} {home}", kind, measure
-
-
-def _find_together(members: Sequence[tuple[Levitation, str, float, tuple[int, ...]]]) -> None:
-    """Search scenes of one family, each with its configuration, measure and place in the grid of what is varied."""
+def _find_together(members: Sequence[tuple[Levitation, tuple[int, ...]]]) -> None:
+    """Search scenes whose equations have the same code, each with its place in the grid of what is varied."""
     same: dict[str, list[Levitation]] = {}  # scenes that differ in where a trajectory begins have one survey
     chosen = []
-    for member in members:
-        one = member[0]
+    for one, place in members:
         with suppress(SpinlevError):
             check_coils(one.scene)
-            one.interaction  # noqa: B018  # equations are shared, the limits of what acts in each scene are not
             key = f"{startless_text(one.scene)} {one.spin!r}"
-            chosen += [] if key in same else [member]
+            chosen += [] if key in same else [(one, one.rates, place)]
             same.setdefault(key, []).append(one)
     if not chosen:
         return
-    firsts, kinds, measures, places = zip(*chosen, strict=True)
-    first = firsts[0]
-    if len({one.equations_key for one in firsts}) == 1:
-        rates, measures = first.rates, (0.0,)
-    else:
-        scene, nearest = replace(first.scene, plate=None), nearest_faces(first.scene.floater)
-        field = first.table.model, first.models.rtol, nearest
-        rates = rotor_family(scene, kinds[0], *field, interaction=first.interaction_model).rates
+    firsts, rates, places = zip(*chosen, strict=True)
     near = np.array([np.unique(column, return_inverse=True)[1] for column in np.array(places).T]).T
     spin, tables = np.array([one.spin for one in firsts]), [one.interaction for one in firsts]
-    found = surveys([one.scene for one in firsts], tables, spin, near, rates, np.array(measures))
+    found = surveys([one.scene for one in firsts], tables, spin, near, rates)
     for some, (survey, searched) in zip(same.values(), found, strict=True):
         for one in some:
             one.adopt(survey, searched)
@@ -169,7 +144,7 @@ class Question:
         """Functions that compute the points, which share what they can; one that cannot be raises when called."""
         jobs: list[Callable[[], xr.Dataset]] = [partial(self, point) for point in points]
         axes = {key: sorted({point[key] for point in points}) for key in points[0]}
-        made, families = list[Levitation](), dict[str, list[Any]]()
+        made, families = list[Levitation](), dict[Any, list[tuple[Levitation, tuple[int, ...]]]]()
         for k, point in enumerate(points):
             with suppress(SpinlevError):  # what cannot be made or found here is left to each scene, which says why
                 one = self.levitation(point)
@@ -182,11 +157,11 @@ class Question:
                 requested = self.ask == "equilibria" or (
                     self.ask == "flight" and (one.scene.plate is not None or not one.absolute)
                 )
-                for each in (one, *dipoles):
+                place = tuple(axis.index(point[name]) for name, axis in axes.items())
+                for role, each in enumerate((one, *dipoles)):
                     if requested and each.scene.frequency and each.scene.floater.is_sphere:
-                        key, *family = _family(each)
-                        place = tuple(axis.index(point[name]) for name, axis in axes.items())
-                        families.setdefault(key, []).append((each, *family, place))
+                        key = role, each.table.model, len(each.scene.rotor), each.rates.code
+                        families.setdefault(key, []).append((each, place))
         for members in families.values():
             if len(members) > 1:
                 with suppress(SpinlevError):

@@ -2,7 +2,8 @@
 
 from places import HORIZONTAL
 
-from spinlev.geometry.magnets import horizontal
+from spinlev.fem.rotor.choice import rotor_table
+from spinlev.geometry.magnets import horizontal, tilt, vertical
 from spinlev.geometry.scene.contents import Drag, Scene
 from spinlev.geometry.scene.files import load_scene
 from spinlev.geometry.scene.floater import Floater
@@ -20,3 +21,10 @@ NO_DRAG = Drag(0.0, 0.0)
 SCENE = Scene(110.0, MAGNETS, FLOATER, NO_DRAG)
 BALL = sphere(diameter_mm=12.7, remanence_T=1.305, density_kg_m3=7500.0)
 """The floater as the table of a scene's file."""
+
+
+def moved_rotors(name, measures, model="dipole", floater=PERMEABLE, rtol=1e-4):
+    """Scenes whose permeable rotors differ in displacement (m) or tilt (rad), and their fields."""
+    make = {"horizontal": horizontal, "vertical": vertical, "tilt": tilt}[name]
+    scenes = [Scene(110.0, make(x, 10e-3, 1.305, 1.05), floater, NO_DRAG) for x in measures]
+    return scenes, [rotor_table(scene.rotor, model, rtol) for scene in scenes]

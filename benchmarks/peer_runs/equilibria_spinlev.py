@@ -4,12 +4,11 @@ import sys
 from importlib.metadata import version
 
 import numpy as np
-from equilibria_scene import SCENE, rows
+from equilibria_scene import SCENE, rows, scenes
 from problems import MAP_DISPLACEMENTS, MAP_FREQUENCIES
 from said import measure, say
 
 from spinlev.dynamics.continuation.map import equilibrium_map
-from spinlev.dynamics.continuation.rotor_family import rotor_family
 from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.fem.rotor.choice import rotor_table
 
@@ -23,8 +22,9 @@ def one_scene():
 
 def whole_map():
     """The same of each scene of the map."""
-    family = rotor_family(SCENE, "horizontal", "cuboid", nearest=SCENE.floater.radius, interaction="rigid")
-    found = equilibrium_map(family, np.array(MAP_FREQUENCIES), np.array(MAP_DISPLACEMENTS))
+    columns = scenes(case)[:: len(MAP_FREQUENCIES)]
+    tables = [rotor_table(one.rotor, "cuboid", nearest=SCENE.floater.radius) for one in columns]
+    found = equilibrium_map(columns, tables, np.array(MAP_FREQUENCIES))
     places = [(k, n) for k in range(len(MAP_DISPLACEMENTS)) for n in range(len(MAP_FREQUENCIES))]
     return [found.position[(found.column == k) & (found.row == n)] for k, n in places]
 

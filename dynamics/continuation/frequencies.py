@@ -353,7 +353,7 @@ def _levitating_frequency(scene: Scene, table: FieldTable, memory: PlateMemory |
     upright = replace(scene, plate=None, gravity=np.array([0.0, 0.0, scene.gravity[2]]))
     tried = [replace(upright, frequency=float(f)) for f in own * WIDEST ** np.linspace(-1, 1, FREQUENCIES)]
     places = np.arange(FREQUENCIES)[:, None]
-    found = surveys(tried, [table] * FREQUENCIES, np.zeros(FREQUENCIES), places, rates)
+    found = surveys(tried, [table] * FREQUENCIES, np.zeros(FREQUENCIES), places, [rates] * FREQUENCIES)
     holding = [any(e.stable for e in survey.equilibria) for survey, _ in found]
     windows = []
     for stable, run in groupby(range(FREQUENCIES), lambda k: holding[k]):

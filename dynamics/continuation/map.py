@@ -1,25 +1,27 @@
 """Equilibria at the points of a map or a sweep, each with its stability: searched at some, continued to all others."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from ...fem.rotor.table import FieldTable
-from ...geometry.common import Array
+from ...fem.rotor.table import FieldFormula, FieldTable
+from ...fem.rotor_metal import check_metal, pieces_of
+from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import Scene
 from ..equilibria.balance import DUPLICATE_DISTANCE, EVERY, Balance, Indices
 from ..equilibria.curves import SearchRange, newton_search
 from ..equilibria.equilibrium import MARGINAL, EquilibriumError, Modes, Survey, is_stable, spectra
 from ..equilibria.path import continued
 from ..equilibria.search import FixedPoints, check_turning, field_doubts, survey_of
+from ..motion.effects import mean_over_turns, with_effects
 from ..motion.equations import parameters
+from ..motion.floater_effects import check_floater_metal
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
-from .rotor_family import RotorFamily
 
 FAR_APART = 1.5  # Equilibria are followed up to so many times the farthest distance of the ranges
 SPACING = 5  # Points of the map between two searches
@@ -36,9 +38,9 @@ MARGIN = 0.3  # Sheets are followed so far beyond the range (radii): what its bo
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Problems at points with whole-numbered coordinates, all in one rotor's field."""
+    """Problems at points with whole-numbered coordinates, whose equations have the same code."""
 
-    rates: Rates  # compiled for that field
+    rates: Rates  # of the points' tables
     values: Array  # (n, p) runtime parameters of the points
     spin: Array  # (n,) body spin s, as of a `Balance`
     ranges: Sequence[SearchRange]  # in which equilibria are looked for
@@ -139,10 +141,9 @@ def filled(grid: Grid, nodes: Indices) -> tuple[Indices, Array, Array]:
 class EquilibriumMap:
     """Equilibria (k,) of a map, point by point; rotor's frame."""
 
-    #: frequencies, measures: axes of the map, Hz and m or rad
-    frequencies: Array
-    measures: Array
-    #: row, column: (k,) place of each equilibrium on them
+    grid: Grid  #: its points, row by row
+    frequencies: Array  #: of the rows, Hz; a column is a scene
+    #: row, column: (k,) place of each equilibrium
     row: Indices
     column: Indices
     #: position, moment: (k, 3) m and direction
@@ -165,34 +166,41 @@ class EquilibriumMap:
 
     @property
     def number(self) -> tuple[Indices, Indices]:
-        """Equilibria, and those that are `lasting`: two of (frequencies, measures)."""
-        shape = len(self.frequencies), len(self.measures)
+        """Equilibria, and those that are `lasting`: two of (frequencies, scenes)."""
+        shape = len(self.frequencies), len(self.grid) // len(self.frequencies)
         place, size = self.row * shape[1] + self.column, shape[0] * shape[1]
         every, stable = np.bincount(place, minlength=size), np.bincount(place[self.lasting], minlength=size)
         return every.reshape(shape), stable.reshape(shape)
 
 
 def equilibrium_map(
-    family: RotorFamily, frequencies: ArrayLike, measures: ArrayLike, spin: float = 0.0, spacing: int = SPACING
+    scenes: Sequence[Scene],
+    tables: Sequence[FieldFormula],
+    frequencies: ArrayLike,
+    spin: float = 0.0,
+    spacing: int = SPACING,
 ) -> EquilibriumMap:
     """All synchronous equilibria with z < 0 over a grid, with their stability; gravity along the axis, no plate.
 
-    Raises EquilibriumError: a frequency is zero, or gravity has a part across the axis.
+    Raises EquilibriumError: a frequency is zero, or gravity has a part across the axis; InputError: at a frequency the
+    rotor turns too fast for its metal or the floater's, or the floater's moment is along none of its principal axes.
 
     Parameters
     ----------
-    family : the scenes; nothing is compiled again within a family
-    frequencies, measures : axes, Hz and m or rad
+    scenes : of the columns, from neighbour to neighbour, as of a rotor that is moved; each at all frequencies. A
+        floater that is not round about its moment is its mean over turns about that, by its multipoles
+    tables : (n,) the rotors' fields, with their effects if they are `Interaction`s; all have the same ones
+    frequencies : of the rows, Hz
     spin : body spin s
     spacing : steps of the grid between two searches; a sheet between them is missed if it meets no other in a fold
     """
-    axes = np.atleast_1d(np.asarray(frequencies, float)), np.atleast_1d(np.asarray(measures, float))
-    if not axes[0].all() or np.any(family.scene.gravity[:2]):
+    frequencies = np.atleast_1d(np.asarray(frequencies, float))
+    if not frequencies.all() or any(np.any(scene.gravity[:2]) for scene in scenes):
         raise EquilibriumError(
             "Equilibria are fixed points only where the rotor turns and gravity is along its axis. Elsewhere use "
             "find_equilibria."
         )
-    grid = family_grid(family, *axes, spin)
+    grid = map_grid(scenes, tables, frequencies, spin)
     nodes = grid.coarse(spacing)
     point, position, moment = filled(grid, nodes)
     row, column = grid.places[point].T
@@ -203,8 +211,8 @@ def equilibrium_map(
         states = balance.states(position, moment)
         found = spectra(states, balance.rates(states, balance.values)[1])
     return EquilibriumMap(
-        frequencies=axes[0],
-        measures=axes[1],
+        grid=grid,
+        frequencies=frequencies,
         row=row,
         column=column,
         position=position * length,
@@ -216,17 +224,42 @@ def equilibrium_map(
     )
 
 
-def family_grid(family: RotorFamily, frequencies: Array, measures: Array, spin: float) -> Grid:
-    """The points of a map, numbered row by row: `frequencies` (Hz), `measures` of a `family`, body `spin`."""
-    row, column = (part.ravel() for part in np.indices((len(frequencies), len(measures))))
+def map_grid(scenes: Sequence[Scene], tables: Sequence[FieldFormula], frequencies: Array, spin: float) -> Grid:
+    """The points of a map, numbered row by row; all as of `equilibrium_map`."""
+    fastest, rates, columns = float(np.abs(frequencies).max()), list[Rates](), list[Scene]()
+    for scene, table in zip(scenes, tables, strict=True):
+        floater = scene.floater
+        if not (floater.round or floater.turns_freely):
+            raise InputError(
+                "Input floater must have its moment along a principal axis of inertia for a map, as the equilibria of "
+                "another body are of no one kind; instead it has not. Take one scene a point (spinlev.sweep)."
+            )
+        columns.append(replace(scene, floater=floater if floater.round else floater.averaged))
+        check_metal(pieces_of(scene.rotor, scene.conductors), fastest, floater.radius)
+        check_floater_metal(replace(scene, frequency=fastest))
+        mean = columns[-1].floater.mean
+        whole = mean_over_turns(columns[-1], table)[2] if mean else with_effects(columns[-1], table)
+        rates.append(rates[0].elsewhere(whole) if rates else Rates(whole, optimised=True))
+    scenes = columns
+    row, column = (part.ravel() for part in np.indices((len(frequencies), len(scenes))))
+    points = [replace(scene, frequency=float(f)) for f in frequencies for scene in scenes]
+    values, together = _together(points, [rates[k] for k in column])
     return Grid(
-        rates=family.rates,
-        values=family.values(frequencies[row], measures[column]),
-        spin=np.full(len(row), spin * family.scene.floater.spin_ratio),
-        ranges=[SearchRange(family.at(frequencies[0], x), ball=family.scene.floater.mean) for x in measures],
+        rates=together,
+        values=values,
+        spin=spin * np.array([scenes[k].floater.spin_ratio for k in column]),
+        ranges=[SearchRange(scene, ball=scene.floater.mean) for scene in points[: len(scenes)]],
         region=column,
         places=np.column_stack([row, column]),
     )
+
+
+def _together(scenes: Sequence[Scene], rates: Sequence[Rates]) -> tuple[Array, Rates]:
+    """Runtime parameters (n, p) of scenes, with the drag along the moment left out, and the rates of all of them."""
+    values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
+    different = list(dict.fromkeys(rates))
+    values[:, Parameter.TABLE] = [different.index(one) for one in rates]
+    return values, different[0].among(different) if len(different) > 1 else different[0]
 
 
 def surveys(
@@ -234,8 +267,7 @@ def surveys(
     tables: Sequence[FieldTable],
     spin: Array,
     places: Indices,
-    rates: Rates,
-    measures: ArrayLike = 0.0,
+    rates: Sequence[Rates],
 ) -> list[tuple[Survey, bool]]:
     """Survey of each scene as by `equilibria.survey`, without curves; neighbours help each other as in a map.
 
@@ -244,19 +276,17 @@ def surveys(
 
     Parameters
     ----------
-    scenes : n scenes with one rotor, or of one family of rotors; their plates are left out
+    scenes : n scenes; their plates are left out
     tables : (n,) the rotors' fields, for their errors
-    rates : compiled for the rotor or the family
     spin : (n,) body spin s
     places : (n, axes) whole-numbered coordinates by which scenes are neighbours
-    measures : (n,) of the rotors in their family, see `RotorFamily`
+    rates : (n,) of one code; scenes with one table share them
     """
     for scene in scenes:
         check_turning(scene)
-    values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
-    values[:, Parameter.MEASURE] = measures
+    values, together = _together(scenes, rates)
     spin = spin * np.array([scene.floater.spin_ratio for scene in scenes])
-    grid = Grid(rates, values, spin, [SearchRange(scene) for scene in scenes], np.arange(len(scenes)), places)
+    grid = Grid(together, values, spin, [SearchRange(scene) for scene in scenes], np.arange(len(scenes)), places)
     nodes = grid.coarse(SPACING if places.shape[1] > 1 else 2 * SPACING)
     point, position, moment = filled(grid, nodes)
     poses, found = np.concatenate([position, moment], axis=1), []

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.common import Array
+from ..motion.state import Parameter
 from .balance import CONVERGED_STEP, EVERY, Balance, Indices, solve, tangent_basis
 
 Truth = NDArray[np.bool_]
@@ -230,8 +231,8 @@ WAY_STEPS = Steps(longest=0.1, shortest=1e-5, turn=0.2, most=300)
 
 
 @dataclass(frozen=True, eq=False)
-class _Ways(BalanceCurve):
-    """The ways from balances, one of each curve, to others with the same equations; the parameter grows from 0 to 1."""
+class Ways(BalanceCurve):
+    """The ways from balances, one of each curve, to others with the same code; the parameter grows from 0 to 1."""
 
     start: Balance
     end: Balance
@@ -240,6 +241,8 @@ class _Ways(BalanceCurve):
     def balances(self, parameter: Array, which: Indices) -> Balance:
         start, end = self.start.at(which), self.end.at(which)
         values = start.values + parameter[:, None] * (end.values - start.values)
+        values[:, Parameter.NEXT], values[:, Parameter.BETWEEN] = end.values[:, Parameter.TABLE], parameter
+        values[:, Parameter.TABLE] = start.values[:, Parameter.TABLE]
         spin = np.asarray(start.spin)
         return replace(start, values=values, spin=spin + parameter * (np.asarray(end.spin) - spin))
 
@@ -258,7 +261,7 @@ def continued(
     good = (size < CONVERGED_STEP) & (apart < NEAR)
     rest = np.flatnonzero(~good)
     begin = np.column_stack([position, moment, np.zeros(len(position))])[rest]
-    ways = _Ways(start.at(rest), end.at(rest))
+    ways = Ways(start.at(rest), end.at(rest))
     ends: list[tuple[Indices, Array]] = [(rest[:0], begin[:0])]
 
     def watch(which: Indices, points: Array, tangents: Array, lengths: Array) -> NDArray[np.int_]:

@@ -61,10 +61,6 @@ class BesideCoils:
     def _compiled(self) -> CompiledField:
         return CompiledField(self.table.expressions)
 
-    def at(self, measures: Array) -> "BesideCoils":
-        """That beside a rotor with another measure, see `MovableField`."""
-        return replace(self, table=self.table.at(measures)) if hasattr(self.table, "at") else self
-
     @keeps_shape
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         field, gradient = self.table.evaluate(points)

@@ -4,7 +4,7 @@ What a rotor's field and its effects are about a pose, the runtime parameters te
 a table computes.  So the code depends on which effects there are, and on nothing else of a scene.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cached_property
 from typing import Any
@@ -34,8 +34,8 @@ class Rates:
 
     def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
         whole = interaction_of(table)
-        self._field, self._effects = _derived(whole), whole.effects
-        self._rough = False
+        self._field = _derived(whole)
+        self._rough, self._each = False, tuple[Rates, ...]()
         # where the field was asked for last, m, and what it is: other parameters there, as frequencies, need it again
         self._last = NOWHERE
         self._placed: list[Placeable] = []
@@ -48,7 +48,7 @@ class Rates:
                 self._placed.append(effect)
                 first += effect.count
             effects.append(effect)
-        self.turning = whole.turning
+        self.turning, self.code = whole.turning, code_of(whole)
         self._equations = equations_of_motion(Interaction(self._local, tuple(effects), whole.turning))
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._level = 1 if optimised else 0
@@ -57,9 +57,7 @@ class Rates:
     def elsewhere(self, table: FieldFormula) -> "Rates":
         """The rates in another table, by the same code where its effects differ by runtime parameters alone."""
         whole, first = interaction_of(table), self._local.first + self._local.count
-        # what effects have in their code beside their kind, as places of dipoles, must be the same
-        kinds = [[(one.name, getattr(one, "compiled_in", None)) for one in e] for e in (self._effects, whole.effects)]
-        if kinds[0] != kinds[1] or whole.turning != self.turning:
+        if code_of(whole) != self.code:
             return Rates(table, bool(self._level))
         found = copy(self)
         found.__dict__.pop("rough", None)
@@ -68,6 +66,17 @@ class Rates:
             if isinstance(effect, Placeable):
                 found._placed.append(effect.placed(first))
                 first += effect.count
+        return found
+
+    def among(self, each: Sequence["Rates"]) -> "Rates":
+        """Rates of rows of parameters with tables of their own, all of the same `code`.
+
+        A row has those of the number `Parameter.TABLE` in `each`, or is on the straight way from these to those of
+        `NEXT`, at the part `BETWEEN` of it.
+        """
+        found = copy(self)
+        found.__dict__.pop("rough", None)
+        found._each = tuple(each)
         return found
 
     def compile(self) -> None:
@@ -151,21 +160,18 @@ class Rates:
         """
         count = len(position)
         rows = np.broadcast_to(values, (count, len(Parameter)))
-        field = self._field.at(rows[:, Parameter.MEASURE]) if hasattr(self._field, "at") else self._field
-        places = position * rows[:, [Parameter.LENGTH]]
+        if self._each:
+            return self._mixed(position, turn, rows)
+        field, places = self._field, position * rows[:, [Parameter.LENGTH]]
         moment, quaternion = turn, None
         if self.turning:
             pointing = rows[:, Parameter.POINTING_X : Parameter.POINTING_Z + 1]
             moment, quaternion = (matrices_of(turn) @ pointing[..., None])[..., 0], turn
-        last, slopes = self._last
-        if field is not self._field:
-            slopes = field.derivatives(places, LocalField.ORDER)
-        else:
-            once = places[: count // times]
-            if not np.array_equal(once, last):
-                slopes = field.derivatives(once, LocalField.ORDER)
-                self._last = once, slopes
-            slopes = np.concatenate([slopes] * times) if times > 1 else slopes
+        (last, slopes), once = self._last, places[: count // times]
+        if not np.array_equal(once, last):
+            slopes = field.derivatives(once, LocalField.ORDER)
+            self._last = once, slopes
+        slopes = np.concatenate([slopes] * times) if times > 1 else slopes
         parts = [rows, places, slopes]
         if self._rough:
             parts += [np.zeros((count, part.count)) for part in self._placed]
@@ -173,6 +179,26 @@ class Rates:
             poses = Poses(position, moment, slopes[:, :3], rows, quaternion)
             parts += [part.numbers(field, poses) for part in self._placed]
         return np.ascontiguousarray(np.concatenate([part.T for part in parts]))
+
+    def _mixed(self, position: Array, turn: Array, rows: Array) -> Array:
+        """`_about` with the tables that the `rows` (n, p) name."""
+        first, following, part = rows[:, [Parameter.TABLE, Parameter.NEXT, Parameter.BETWEEN]].T
+        part = np.where(first == following, 0.0, part)
+        size = len(Parameter) + self._local.count + sum(effect.count for effect in self._placed)
+        found = np.zeros((size, len(rows)))
+        for table, weight in ((first, 1 - part), (following, part)):
+            order = np.argsort(table, kind="stable")
+            order = order[weight[order] != 0]
+            for here in np.split(order, np.flatnonzero(np.diff(table[order])) + 1) if len(order) else ():
+                one = self._each[int(table[here[0]])]
+                one = one.rough if self._rough else one
+                found[:, here] += weight[here] * one._about(position[here], turn[here], rows[here])
+        return found
+
+
+def code_of(whole: Interaction) -> tuple[Any, ...]:
+    """What decides the code of rates: of effects their kind, and what they have in it, as places of dipoles."""
+    return whole.turning, *((one.name, getattr(one, "compiled_in", None)) for one in whole.effects)
 
 
 def _derived(table: Interaction) -> Any:

@@ -28,7 +28,8 @@ class Parameter(IntEnum):
     the body's axes: those of a body that is not round about its moment.
     Of a rotor that is moved: TILT_X, _Y is the direction across its axis about which that turns, at TILT_RATE, by TILT
     at t = 0, MOVE_X to _Z its velocity; these and gravity along the axes that it had, before its turn, where TILT is 0.
-    MEASURE is that of a rotor whose shape is a parameter, m or rad (`rotor_family`); no other rotor has it.
+    TABLE is the number of a row's table where there are several (`Rates.among`), on the way to that of NEXT by the part
+    BETWEEN.
     """
 
     RATE = 0
@@ -57,7 +58,9 @@ class Parameter(IntEnum):
     POINTING_X = auto()
     POINTING_Y = auto()
     POINTING_Z = auto()
-    MEASURE = auto()
+    TABLE = auto()
+    NEXT = auto()
+    BETWEEN = auto()
     ACCELERATION = auto()
     ANGLE = auto()
     TILT_X = auto()

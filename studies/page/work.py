@@ -11,19 +11,18 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ...dynamics.continuation.map import EquilibriumMap, equilibrium_map
-from ...dynamics.continuation.rotor_family import RotorFamily, rotor_family
-from ...dynamics.equilibria.balance import CONVERGED_STEP, EVERY, Balance, solve
+from ...dynamics.equilibria.balance import CONVERGED_STEP, EVERY, solve
 from ...dynamics.equilibria.equilibrium import MARGINAL, STABILITIES, Equilibrium, is_stable, nearest_of, spectra
-from ...dynamics.equilibria.path import NEAR, NEWTON_STEPS
+from ...dynamics.equilibria.path import NEAR, NEWTON_STEPS, Ways
 from ...dynamics.equilibria.search import survey
 from ...dynamics.flights.live import LiveFlight, Piece
 from ...dynamics.motion.events import plate_depth
-from ...dynamics.motion.state import Scales, polar_angle
+from ...dynamics.motion.state import Parameter, polar_angle
 from ...fem.cache import NotKeptError, kept_only
 from ...fem.rotor.choice import PERMEABLE
 from ...fem.rotor.models import of_true_moment
-from ...geometry.common import Array, ComputationError, InputError, SpinlevError
-from ...geometry.scene.files import canonical_keys, scene_text
+from ...geometry.common import Array, ComputationError, SpinlevError
+from ...geometry.scene.files import canonical_keys, changed, scene_text
 from ..candidates import survey_near
 from ..catalogue import article
 from ..cli.console import to_json
@@ -247,25 +246,26 @@ def article_points(state: PageState) -> dict[str, Any]:
     return {"tested": known.tested, "levitated": known.levitated, "flights": ARTICLE_FLIGHTS.get(kind, ())}
 
 
-def regions(state: PageState, spans: Sequence[tuple[float, float]], model: str, points: int) -> Regions:
+def regions(state: PageState, spans: Sequence[tuple[float, float]], model: FieldModel, points: int) -> Regions:
     """Where something levitates stably without plate over `spans` of frequency (Hz) and measure (mm or °).
 
     For a `state`, by a `model` of the field at so many `points` along each axis; magnets that move against each other
     have the closed form. Raises ComputationError: the scene has no such map.
     """
     configuration = state.keys["rotor"]["configuration"]
-    axes = [np.linspace(*span, points) for span in spans]
-    unit = np.radians(1.0) if configuration == "tilt" else 1e-3
+    axes, key = [np.linspace(*span, points) for span in spans], f"rotor.{MEASURES[configuration][0]}"
+    models = replace(state.models, model=model)
+    if configuration == "vertical":  # magnets that move against each other would need seconds a distance
+        models = replace(models, model="cuboid" if model in PERMEABLE else model, interaction="rigid")
     try:
-        try:  # magnets that move against each other have no one field by finite elements over a whole map
-            family = rotor_family(state.scene, configuration, model)
-        except InputError:
-            model = "cuboid"
-            family = rotor_family(state.scene, configuration, model)
-        found = equilibrium_map(family, axes[0], axes[1] * unit, state.spin)
+        columns = [Levitation(changed(state.scene, {key: value}, state.source), models) for value in axes[1].tolist()]
+        for column in columns[1:]:
+            column.share(columns[0], changed=True)
+        tables = [column.interaction for column in columns]
+        found = equilibrium_map([column.scene for column in columns], tables, axes[0], state.spin)
     except ValueError as error:
         raise ComputationError(str(error)) from None
-    stable, ends = found.number[1] > 0, _ends(family, found, state.spin)
+    stable, ends = found.number[1] > 0, _ends(found)
     cells, border = list[list[Place]](), list[tuple[Place, ...]]()
     # Marching squares: a cell's stable corners, and between a stable and another one where stability ends. Only points
     # are classified, so that a tongue narrower than a step of the map is lost.
@@ -283,10 +283,10 @@ def regions(state: PageState, spans: Sequence[tuple[float, float]], model: str, 
                 outline.append(crossed[-1])
         cells += [outline] if outline else []
         border += [tuple(crossed[k : k + 2]) for k in range(0, len(crossed), 2)]
-    return Regions(model, cells, border)
+    return Regions(str(models.model), cells, border)
 
 
-def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple[tuple[int, int], ...], float]:
+def _ends(found: EquilibriumMap) -> dict[tuple[tuple[int, int], ...], float]:
     """Where the stable equilibrium of a point of a map ends on the way (0 to 1) to a neighbour that has none."""
     stable = found.number[1] > 0
     pairs = [
@@ -301,22 +301,21 @@ def _ends(family: RotorFamily, found: EquilibriumMap, spin: float) -> dict[tuple
     # Of several stable equilibria at a point the first (the list is reversed, and a later key replaces an earlier one).
     which = {(int(found.row[k]), int(found.column[k])): k for k in np.flatnonzero(found.lasting)[::-1]}
     first = np.array([which[one] for one, _ in pairs])
-    position, moment = found.position[first] / family.scene.floater.radius, found.moment[first]
-    axes = found.frequencies, found.measures
-    places = np.array([[[axis[k] for axis, k in zip(axes, node, strict=True)] for node in pair] for pair in pairs])
-    begin, end = places[:, 0], places[:, 1]
-    low, high, spin = np.zeros(len(pairs)), np.ones(len(pairs)), spin * family.scene.floater.spin_ratio
+    begin, end = (np.ravel_multi_index(np.array(nodes).T.tolist(), stable.shape) for nodes in zip(*pairs, strict=True))
+    ways = Ways(found.grid.balance(begin), found.grid.balance(end))
+    length, time = ways.start.values[:, [Parameter.LENGTH]], ways.start.values[:, Parameter.TIME]
+    position, moment = found.position[first] / length, found.moment[first]
+    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
     # All pairs are halved together: a call of compiled code costs more than the pairs in it.
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        values = family.values(*(begin + middle[:, None] * (end - begin)).T)
-        balance = Balance(family.rates, values, np.full(len(pairs), spin))
+        balance = ways.balances(middle, np.arange(len(pairs)))
         places, turned, size = solve(balance, position, moment, EVERY, NEWTON_STEPS)
         apart = np.linalg.norm(places - position, axis=1)
         good = np.flatnonzero((size < CONVERGED_STEP) & (apart < 3 * NEAR))  # not a number is neither
         there = balance.at(good)
         states = there.states(places[good], turned[good])
-        linear, slow = spectra(states, there.rates(states, there.values)[1]), MARGINAL * Scales.of(family.scene).time
+        linear, slow = spectra(states, there.rates(states, there.values)[1]), MARGINAL * time[good, None]
         good = good[is_stable(linear.eigenvalues, np.maximum(linear.errors, slow))]
         position[good], moment[good], low[good] = places[good], turned[good], middle[good]
         high[np.setdiff1d(np.arange(len(pairs)), good)] = middle[np.setdiff1d(np.arange(len(pairs)), good)]

@@ -23,9 +23,17 @@ def question(**values):
     return Question(SCENE, "scene", "equilibria", Models(**ALONE), 0.0, 3.0, (0.0, 0.0, -0.02)), combinations(values)
 
 
-def test_many_points_have_what_each_has_alone():
-    """Two axes through folds: as many equilibria, places and growth rates to 1e-10; most points are not searched."""
-    asked, points = question(frequency_hz=list(np.linspace(85.0, 175.0, 5)), spin=[-0.2, 0.3])
+@pytest.mark.parametrize(
+    "varied",
+    [
+        {"frequency_hz": list(np.linspace(85.0, 175.0, 5)), "spin": [-0.2, 0.3]},
+        {"floater.diameter_mm": list(np.linspace(10.0, 15.0, 5)), "rotor.remanence_T": [1.1, 1.3]},
+    ],
+)
+def test_many_points_have_what_each_has_alone(varied):
+    """Two axes through folds, one table for all or each its own: as many equilibria, places and growth rates to 1e-10;
+    most points are not searched."""
+    asked, points = question(**varied)
     together = [job() for job in asked.prepared(points)]
     assert {str(found["found_by"].values[0]) for found in together} == {"search", "neighbours"}
     assert len({found.sizes["equilibrium"] for found in together}) > 1

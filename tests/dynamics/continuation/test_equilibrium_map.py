@@ -4,33 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from article import PERMEABLE
+from article import PERMEABLE, moved_rotors
 
-from spinlev.dynamics.continuation.map import equilibrium_map, family_grid
-from spinlev.dynamics.continuation.rotor_family import rotor_family
+from spinlev.dynamics.continuation.map import equilibrium_map
 from spinlev.dynamics.equilibria.curves import fixed_points
 from spinlev.dynamics.equilibria.equilibrium import EquilibriumError
 from spinlev.dynamics.equilibria.search import find_equilibria
+from spinlev.dynamics.motion.effect import Interaction
+from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rates import Rates
-from spinlev.dynamics.motion.state import Parameter
-from spinlev.fem.rotor.choice import rotor_table
+from spinlev.dynamics.motion.rotor_effects import Mutual
+from spinlev.dynamics.motion.state import Parameter, Scales
+from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.geometry.common import InputError
-from spinlev.geometry.magnets import Magnet, horizontal, tilt, vertical
-from spinlev.geometry.scene.contents import Drag, Scene
+from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.scene.floater import Floater, FloaterPart
 from spinlev.geometry.shapes import Box
 
-SHAPE = (10e-3, 1.305, 1.05)
-ROTORS = {
-    "horizontal": (horizontal(2e-3, *SHAPE), np.linspace(1e-3, 4e-3, 9)),
-    "vertical": (vertical(14e-3, *SHAPE), np.linspace(10e-3, 18e-3, 9)),
-    "tilt": (tilt(np.radians(10.0), *SHAPE), np.radians(np.linspace(5.0, 20.0, 9))),
+MEASURES = {
+    "horizontal": np.linspace(1e-3, 4e-3, 9),
+    "vertical": np.linspace(10e-3, 18e-3, 9),
+    "tilt": np.radians(np.linspace(5.0, 20.0, 9)),
 }
 FREQUENCIES = np.linspace(60.0, 180.0, 13)
-
-
-def scene_of(name):
-    return Scene(110.0, ROTORS[name][0], PERMEABLE, Drag(0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -38,20 +34,19 @@ def scene_of(name):
     [
         ("horizontal", "dipole"),
         *(pytest.param(name, "dipole", marks=pytest.mark.slow) for name in ("vertical", "tilt")),
-        *(pytest.param(name, "cuboid", marks=pytest.mark.slow) for name in ROTORS),
+        *(pytest.param(name, "cuboid", marks=pytest.mark.slow) for name in MEASURES),
         pytest.param("horizontal", "fem", marks=pytest.mark.slow),
     ],
 )
 @pytest.mark.slow
 def test_map_equals_searches_at_random_points(name, model):
-    """All equilibria, their places to 1e-9 m, growth and stability, of a table made for the point's own rotor."""
-    family, measures = rotor_family(scene_of(name), name, model, 1e-4, interaction="rigid"), ROTORS[name][1]
+    """All equilibria, their places to 1e-9 m, growth and stability."""
+    scenes, tables = moved_rotors(name, MEASURES[name], model)
     spacing = 8 if name == "horizontal" else 3
-    found, rng = equilibrium_map(family, FREQUENCIES, measures, spacing=spacing), np.random.default_rng(1)
+    found, rng = equilibrium_map(scenes, tables, FREQUENCIES, spacing=spacing), np.random.default_rng(1)
     assert found.number[0].sum() == len(found.row)
-    for row, column in rng.integers((len(FREQUENCIES), len(measures)), size=(4, 2)):
-        scene = family.at(FREQUENCIES[row], measures[column])
-        expected = find_equilibria(scene, rotor_table(scene.rotor, model, 1e-4))
+    for row, column in rng.integers(found.number[0].shape, size=(4, 2)):
+        expected = find_equilibria(replace(scenes[column], frequency=FREQUENCIES[row]), tables[column])
         here = np.flatnonzero((found.row == row) & (found.column == column))
         assert len(here) == len(expected)
         assert found.number[1][row, column] == sum(e.stable for e in expected)
@@ -70,37 +65,61 @@ def test_map_equals_searches_at_random_points(name, model):
 @pytest.mark.parametrize("name", ["horizontal", "vertical"])
 def test_map_misses_nothing_that_a_search_finds(name, model):
     """At thirty random points; sheets that leave the range, such as z > 0, and come back are followed outside it."""
-    family, measures = rotor_family(scene_of(name), name, model, 1e-4), ROTORS[name][1]
-    grid = family_grid(family, FREQUENCIES, measures, 0.0)
-    found = equilibrium_map(family, FREQUENCIES, measures, spacing=3)
-    places = np.concatenate([found.position / PERMEABLE.radius, found.moment], axis=1)
+    found = equilibrium_map(*moved_rotors(name, MEASURES[name], model), FREQUENCIES, spacing=3)
+    grid, places = found.grid, np.concatenate([found.position / PERMEABLE.radius, found.moment], axis=1)
     for point in np.random.default_rng(5).choice(len(grid), 30, replace=False):
-        here = places[found.row * len(measures) + found.column == point]
+        here = places[found.row * len(MEASURES[name]) + found.column == point]
         for place in fixed_points(grid.alone(int(point)), grid.range(int(point)))[1]:
             assert np.linalg.norm(here - place, axis=1).min() < 1e-6
 
 
-@pytest.mark.parametrize("name", ROTORS)
-def test_a_moved_rotor_has_the_field_of_its_own_table(name):
-    """Rates at random states: the field with a runtime measure, and a table made for that measure; round-off."""
-    family = rotor_family(scene_of(name), name, "cuboid")
-    measure = ROTORS[name][1][3]
-    scene = family.at(110.0, measure)
-    values = family.values(110.0, measure)
-    assert values[0, Parameter.MEASURE] == measure
-    states = np.random.default_rng(0).normal(size=(5, 12)) * 0.3 + np.eye(12)[2] * -4.0
-    expected = Rates(rotor_table(scene.rotor, "cuboid"))(states, values[0])
-    for ours, theirs in zip(family.rates(states, np.repeat(values, 5, axis=0)), expected, strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=1e-13 * np.abs(theirs).max())
+def test_rows_of_parameters_have_their_own_tables():
+    """Rates of one call at random states, where tables and floaters differ: those of each by itself, and between two
+    the mean of both fields, to round-off."""
+    small = replace(PERMEABLE, radius=5e-3)
+    scenes, tables = moved_rotors("tilt", [0.1, 0.2], "cuboid")
+    one, other = scenes[0], replace(scenes[1], floater=small)
+    each = [Rates(tables[0])]
+    each.append(each[0].elsewhere(tables[1]))
+    values = np.array([parameters(scene, Scales.of(scene)) for scene in (one, other)])
+    values[:, Parameter.TABLE] = 0, 1
+    states = np.random.default_rng(0).normal(size=(6, 12)) * 0.3 + np.eye(12)[2] * -4.0
+    found = each[0].among(each)(states, values[[0, 1, 1, 0, 1, 0]])
+    for k, number in enumerate([0, 1, 1, 0, 1, 0]):
+        expected = Rates(tables[number])(states[[k]], values[number])
+        for ours, theirs in zip(found, expected, strict=True):
+            np.testing.assert_allclose(ours[k], theirs[0], atol=1e-13 * np.abs(theirs).max())
+    between = values[[0]]
+    between[:, Parameter.NEXT], between[:, Parameter.BETWEEN] = 1, 0.25
+    (here,), (there,) = (Rates(table)(states[:1], values[0])[0] for table in tables)
+    mixed = each[0].among(each)(states[:1], between)[0][0]
+    np.testing.assert_allclose(mixed, 0.75 * here + 0.25 * there, atol=1e-13 * np.abs(here).max())
+
+
+@pytest.mark.slow
+def test_a_map_of_floaters_of_all_sizes_is_that_of_each():
+    """A seventh smaller to a seventh larger, of mutual magnetisation: as many equilibria, at the places of searches."""
+    sizes = np.linspace(5.5e-3, 7.2e-3, 5)
+    (scene,), (table,) = moved_rotors("horizontal", [2e-3], "fem")
+    scenes = [replace(scene, floater=replace(PERMEABLE, radius=radius)) for radius in sizes]
+    answers = [cached_mutual_table(scene.rotor, one.floater, print)[0] for one in scenes]
+    wholes = [
+        Interaction(table, (Mutual(one, scene.floater.moment),)) for one, scene in zip(answers, scenes, strict=True)
+    ]
+    found = equilibrium_map(scenes, wholes, [110.0], spacing=4)
+    assert found.searches == 2
+    for k, (one, whole) in enumerate(zip(scenes, wholes, strict=True)):
+        expected, here = find_equilibria(one, whole), found.position[found.column == k]
+        assert len(here) == len(expected)
+        assert max(np.linalg.norm(here - e.position, axis=1).min() for e in expected) < 1e-9
 
 
 @pytest.mark.slow
 def test_sheets_are_found_around_their_folds():
     """With one search in a corner of the map, far beyond the folds: the same as with searches all over it."""
-    family, measures = rotor_family(scene_of("horizontal"), "horizontal", "dipole"), ROTORS["horizontal"][1]
-    frequencies = FREQUENCIES[2:]
-    one = equilibrium_map(family, frequencies, measures, spacing=100)
-    many = equilibrium_map(family, frequencies, measures, spacing=4)
+    columns, frequencies = moved_rotors("horizontal", MEASURES["horizontal"]), FREQUENCIES[2:]
+    one = equilibrium_map(*columns, frequencies, spacing=100)
+    many = equilibrium_map(*columns, frequencies, spacing=4)
     assert one.searches == 4
     assert many.searches > 8
     np.testing.assert_array_equal(one.number, many.number)
@@ -111,25 +130,40 @@ def test_a_cube_has_the_map_of_its_mean():
     """Where it levitates by its multipoles about the moment: 3 µm from where all its charges have it."""
     body = Box((10e-3,) * 3)
     cube = Floater(body.circumradius, 1.305, 1.0, 7500.0, None, body)
-    scene = replace(scene_of("horizontal"), floater=cube)
-    family = rotor_family(scene, "horizontal", "cuboid", interaction="rigid")
-    found = equilibrium_map(family, [105.0, 110.0], [2e-3])
+    (scene,), (table,) = moved_rotors("horizontal", [2e-3], "cuboid", cube)
+    found = equilibrium_map([scene], [table], [105.0, 110.0])
     assert found.stable.sum() == 2
     for row, place in zip(found.row[found.stable], found.position[found.stable], strict=True):
         at = replace(scene, frequency=float(found.frequencies[row]))
-        (true,) = (e for e in find_equilibria(at, rotor_table(at.rotor, "cuboid")) if e.stable)
+        (true,) = (e for e in find_equilibria(at, table) if e.stable)
         assert 0 < np.linalg.norm(place - true.position) < 1e-5
 
 
+@pytest.mark.slow
+def test_a_map_has_mutual_magnetisation():
+    """Places to 1e-9 m of a search with the tables of that rotor."""
+    frequencies, (scenes, tables) = np.array([120.0, 125.0]), moved_rotors("tilt", np.radians([9.5, 10.0]), "cuboid")
+    answers = [cached_mutual_table(scene.rotor, PERMEABLE, print)[0] for scene in scenes]
+    wholes = [Interaction(table, (Mutual(one, PERMEABLE.moment),)) for table, one in zip(tables, answers, strict=True)]
+    found, there = equilibrium_map(scenes, wholes, frequencies), replace(scenes[1], frequency=120.0)
+    expected, rigid = find_equilibria(there, wholes[1]), find_equilibria(there, tables[1])
+    here = (found.row == 0) & (found.column == 1)
+    apart = [np.linalg.norm(found.position[here] - e.position, axis=1).min() for e in expected]
+    assert here.sum() == len(expected)
+    assert max(apart) < 1e-9
+    assert abs(expected[0].position[2] - rigid[0].position[2]) > 3e-5
+
+
 def test_what_has_no_map_says_so():
-    body = Box((4e-3, 6e-3, 10e-3))
+    body, (scenes, tables) = Box((4e-3, 6e-3, 10e-3)), moved_rotors("horizontal", [1e-3])
     oblique = FloaterPart(Magnet(body, 1.3 * np.array([0.0, 0.6, 0.8])), 7500.0)
     with pytest.raises(InputError, match="its moment along a principal axis"):
-        rotor_family(replace(scene_of("horizontal"), floater=Floater.composed([oblique])), "horizontal", "dipole")
-    family = rotor_family(scene_of("horizontal"), "horizontal", "dipole")
+        equilibrium_map([replace(scenes[0], floater=Floater.composed([oblique]))], tables, [100.0])
     with pytest.raises(EquilibriumError, match="only where the rotor turns"):
-        equilibrium_map(family, [0.0, 10.0], [1e-3])
-    with pytest.raises(ValueError, match="configuration must be one of"):
-        rotor_family(scene_of("horizontal"), "vertical", "dipole")
-    with pytest.raises(InputError, match="model must be dipole or cuboid for a family of rotors whose magnets move"):
-        rotor_family(scene_of("vertical"), "vertical", "fem")
+        equilibrium_map(scenes, tables, [0.0, 10.0])
+    copper = replace(scenes[0], floater=replace(PERMEABLE, conductivity=5.8e7))
+    with pytest.raises(InputError, match=r"floater.conductivity_S_m must leave its skin depth large"):
+        equilibrium_map([copper], tables, [50.0, 400.0])
+    conducting = replace(scenes[0], rotor=tuple(replace(m, conductivity=6e7) for m in scenes[0].rotor))
+    with pytest.raises(InputError, match="must leave its skin depth large"):
+        equilibrium_map([conducting], tables, [110.0])

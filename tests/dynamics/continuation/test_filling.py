@@ -2,35 +2,25 @@
 
 import numpy as np
 import pytest
-from article import PERMEABLE
+from article import PERMEABLE, moved_rotors
 
 from spinlev.dynamics.continuation import map as filling
-from spinlev.dynamics.continuation.map import equilibrium_map, family_grid
-from spinlev.dynamics.continuation.rotor_family import rotor_family
+from spinlev.dynamics.continuation.map import equilibrium_map, map_grid
 from spinlev.dynamics.equilibria.balance import EVERY
 from spinlev.dynamics.equilibria.curves import newton_search
-from spinlev.geometry.magnets import horizontal, tilt, vertical
-from spinlev.geometry.scene.contents import Drag, Scene
 
-SHAPE = (10e-3, 1.305, 1.05)
-ROTORS = {
-    "horizontal": (horizontal(2e-3, *SHAPE), (0.6e-3, 5e-3)),
-    "vertical": (vertical(14e-3, *SHAPE), (10e-3, 20e-3)),
-    "tilt": (tilt(np.radians(10.0), *SHAPE), (np.radians(3.0), np.radians(25.0))),
-}
-CASES = [(name, model) for model in ("dipole", "cuboid") for name in ROTORS]
+ENDS = {"horizontal": (0.6e-3, 5e-3), "vertical": (10e-3, 20e-3), "tilt": (np.radians(3.0), np.radians(25.0))}
+CASES = [(name, model) for model in ("dipole", "cuboid") for name in ENDS]
 
 
 def map_of(name, side, model="dipole"):
-    """The family and the axes of a map of side × side points."""
-    magnets, ends = ROTORS[name]
-    family = rotor_family(Scene(110.0, magnets, PERMEABLE, Drag(0.0, 0.0)), name, model)
-    return family, np.linspace(20.0, 300.0, side), np.linspace(*ends, side)
+    """Scenes, fields and frequencies of a map of side × side points."""
+    return *moved_rotors(name, np.linspace(*ENDS[name], side), model, rtol=3e-6), np.linspace(20.0, 300.0, side)
 
 
 def grid_of(name, side, model="dipole"):
     """Its points."""
-    return family_grid(*map_of(name, side, model), 0.0)
+    return map_grid(*map_of(name, side, model), 0.0)
 
 
 def found_by(grid, points, random=None, reach=filling.REACH, far=filling.FAR):
