@@ -368,8 +368,8 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
 def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float]) -> Array:
     """Centres (n, 3) m of floaters before the middles of faces and edges and the corners of magnets, where they fit.
 
-    At `gaps` from a magnet, in floater radii (`radius`, m). Beside a lone one of `magnets` none that is another's mirror
-    image, and of many before the faces' middles alone.
+    At `gaps` from a magnet, in floater radii (`radius`, m). Beside a lone one of `magnets` none is another's mirror
+    image, and of many only those before the faces' middles are taken.
     """
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     if len(magnets) == 1:
