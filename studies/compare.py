@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ..dynamics.continuation.branch import BranchPoint
-from ..dynamics.continuation.frequencies import levitates, on_branch, stable_ranges
+from ..dynamics.continuation.frequencies import levitates, nearest_range, on_branch
 from ..dynamics.equilibria.equilibrium import CRITERION, STABILITIES, Equilibrium, Survey, nearest_of
 from ..dynamics.flights.flight import most_like_levitation
 from ..fem.rotor.models import of_true_moment
@@ -141,13 +141,11 @@ def _nearest(equilibria: Sequence[Equilibrium], to: Equilibrium | None) -> Equil
 
 def _with_branch(one: Compared) -> Compared:
     """The same with the branch of its equilibrium, where gravity is along the axis, so that there is one."""
-    frequency, here = one.levitation.scene.frequency, _nearest(one.levitation.without_plate.equilibria, one.found)
-    if here is None:
+    if (here := _nearest(one.levitation.without_plate.equilibria, one.found)) is None:
         return one
     points = branch_of(one.levitation, here, "The range of stable frequencies is")
-    ranges = [(run.low.parameter, run.high.parameter) for run in stable_ranges(points)]
-    nearest = min(ranges, key=lambda ends: max(ends[0] - frequency, frequency - ends[1]), default=None)
-    return replace(one, branch=points, stable=nearest)
+    run = nearest_range(points, one.levitation.scene.frequency)
+    return replace(one, branch=points, stable=None if run is None else (run.low.parameter, run.high.parameter))
 
 
 def compared_dataset(scene: Scene, rows: Sequence[Compared], frequencies: Array | None = None) -> xr.Dataset:

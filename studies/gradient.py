@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..dynamics.continuation.branch import BranchPoint
-from ..dynamics.continuation.frequencies import BORDER, CONTACT, stable_ranges
+from ..dynamics.continuation.frequencies import BORDER, CONTACT, nearest_range
 from ..dynamics.equilibria.derivatives import Implicit, Nearby, Tangent
 from ..dynamics.equilibria.equilibrium import AVERAGED, FOLD, LOCKED, Equilibrium, EquilibriumError
 from ..dynamics.equilibria.search import of_whole_body
@@ -258,13 +258,13 @@ def range_ends(gradient: Gradient, keys: Sequence[str]) -> tuple[Array, Array, A
     contact so that the bodies touch. Raises EquilibriumError: the scene's equilibrium is in no such range.
     """
     levitation = gradient.levitation
-    frequency, every = gradient.scene.frequency, stable_ranges(levitation.branch)
-    runs = [run for run in every if run.low.parameter <= frequency <= run.high.parameter]
-    if not runs:
+    frequency = gradient.scene.frequency
+    run = nearest_range(levitation.branch, frequency)
+    if run is None or not run.low.parameter <= frequency <= run.high.parameter:
         raise EquilibriumError(
             "The equilibrium is in no range of stable frequencies, whose ends would have derivatives."
         )
-    ends = runs[0].low, runs[0].high
+    ends = run.low, run.high
     found = np.full((2, len(keys), 2), np.nan)
     for row, point in zip(found, ends, strict=True):
         if point.kind == BORDER:

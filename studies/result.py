@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..dynamics.continuation.frequencies import nearest_range
 from ..dynamics.equilibria.equilibrium import LIBRATION, SIDE, TILT, Equilibrium, ForceCurve, LeftOut, Survey
 from ..dynamics.flights.trajectory import Trajectory
 from ..dynamics.motion.plate import PlateMemory
@@ -143,7 +144,7 @@ class Result:
             }
             if flight.given is not None:
                 momentum, work = flight.given[-1].tolist()
-                stable = words.stable_near_start(levitation)
+                stable = nearest_range(levitation.branch, levitation.scene.frequency)
                 values |= {
                     "lost_at_hz": flight.lost_at_hz,
                     "ended_at_hz": float(flight.rate[-1]) / (2 * np.pi),

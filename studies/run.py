@@ -31,7 +31,7 @@ from .catalogue.runner import figures_of
 from .cli.console import note, to_json
 from .cli.options import COLUMNS, Answer, Models, refused
 from .compare import compared_models
-from .fields import coils_at_start, write_working_point
+from .fields import MODELS, coils_at_start, write_working_point
 from .figures.pictures import last_view
 from .figures.renderer import RenderError, render
 from .figures.style import save_figures
@@ -43,7 +43,6 @@ from .result import Result, axis_dataset, curve_dataset, equilibria_dataset, lef
 from .uncertainty import uncertainty_job
 from .words import flight_words, headline, left_out_words, note_details
 
-MODELS = ("dipole", "cuboid", "fem")
 SHOWN = 20  # points whose field is printed, at most
 DEEPEST, SIZES = 0.05, 5.0  # the field figure's depth below the rotor's origin, m, or below the rotor, in largest radii
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..dynamics.continuation.branch import OSCILLATORY, REAL
-from ..dynamics.continuation.frequencies import BORDER, CONTACT, StableRange, stable_ranges
+from ..dynamics.continuation.frequencies import BORDER, CONTACT, nearest_range
 from ..dynamics.equilibria import equilibrium as why
 from ..dynamics.equilibria.equilibrium import MODE_NAMES, STABILITIES, Equilibrium, LeftOut, Survey
 from ..dynamics.flights.trajectory import DRIFTING, GROWING, STABLE, Trajectory, flight_kind
@@ -229,13 +229,6 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
     return f"Simulated {time}: still levitating{how}."
 
 
-def stable_near_start(levitation: Levitation) -> StableRange | None:
-    """Frequencies about that of the start at which the equilibrium where it begins is stable without the plate."""
-    frequency = levitation.scene.frequency
-    found = stable_ranges(levitation.branch)
-    return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter), default=None)
-
-
 def drive_words(levitation: Levitation, flight: Trajectory) -> list[str]:
     """What the motor gave, and between which frequencies the equilibria are stable; nothing without a drive."""
     if flight.given is None:
@@ -246,7 +239,7 @@ def drive_words(levitation: Levitation, flight: Trajectory) -> list[str]:
         f"Motor, beside the rotor's own inertia and friction: {torque:.2g} N m and {power:.2g} W on the mean, "
         f"{work:.2g} J in all."
     ]
-    if stable := stable_near_start(levitation):
+    if stable := nearest_range(levitation.branch, levitation.scene.frequency):
         ends = [f"{end.parameter:.2f} Hz ({ENDS[end.kind]})" for end in (stable.low, stable.high)]
         plate = " without the plate" if levitation.scene.plate else ""
         lines.append(f"Equilibria at steady frequencies{plate} are stable from {ends[0]} to {ends[1]}.")

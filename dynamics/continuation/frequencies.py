@@ -202,15 +202,20 @@ def stable_ranges(points: Sequence[BranchPoint]) -> list[StableRange]:
     ]
 
 
+def nearest_range(points: Sequence[BranchPoint], hz: float) -> StableRange | None:
+    """The interval of stability on a branch that holds a frequency or is nearest to it; None without any."""
+    return min(stable_ranges(points), key=lambda r: max(r.low.parameter - hz, hz - r.high.parameter), default=None)
+
+
 def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange:
     """The interval of stability that holds `frequency` (Hz) or is nearest to it, its ends good to round-off.
 
     On the branch through the equilibrium of `scene` and `rates` near `start` (12,) there. Raises EquilibriumError where
     there is none.
     """
-    if not (found := stable_ranges(branch_through(scene, rates, start, frequency))):
+    if (found := nearest_range(branch_through(scene, rates, start, frequency), frequency)) is None:
         raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
-    return min(found, key=lambda run: max(run.low.parameter - frequency, frequency - run.high.parameter))
+    return found
 
 
 def at_frequency(
