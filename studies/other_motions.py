@@ -143,7 +143,7 @@ OVER_COILS: Columns = {
 
 def modes_of(scene: Scene, rtol: float = 1e-3) -> tuple[FloatingModes | FreeModes, bool]:
     """The modes of a scene's floater over its coils, and whether they were cached. Raises what `heights_over` does."""
-    heights, supply = conductor.heights_over(scene), conductor.Supply(scene.coils, conductor.sources_of(scene.coils))
+    heights, supply = conductor.heights_over(scene), conductor.Supply(scene.coils)
     region = heights if conductor.on_axis(scene) else conductor.room_over(scene)
     frequency = max(conductor.LOWEST, *(coil.frequency for coil in scene.coils))
     assert scene.floater.conductivity is not None
@@ -159,8 +159,7 @@ def coils_summary(scene: Scene, duration: float, modes: FloatingModes | FreeMode
     else:
         motion = conductor.conductor_motion(scene, modes, duration)
         if all(isinstance(coil.current, float) for coil in scene.coils):  # no table of time
-            supply = conductor.Supply(scene.coils, conductor.sources_of(scene.coils))
-            height = conductor.levitation_height(modes, supply, -scene.floater.mass * float(scene.gravity[2]))
+            height = conductor.levitation_height(scene, modes)
     currents = np.stack([coil.amperes(motion.time) for coil in scene.coils], axis=1)
     spin = np.einsum("nab,nb->na", motion.axes, motion.spin)
     found = columns(OVER_COILS, (motion.position, motion.velocity, motion.axes, spin, motion.heat, currents))

@@ -15,7 +15,7 @@ these, and the same fluxes, whose rate is that of the coils' field at the moving
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from time import process_time
 
 import numpy as np
@@ -38,21 +38,20 @@ RASTER = 1e-4  # Ends of that range are multiples of this, m, so that motions th
 SIDEWAYS = 4.0  # Of one that moves freely, how far aside of its start, in the height over the coils where it begins
 
 
-def sources_of(coils: Sequence[Coil]) -> list[list[int]]:
-    """The numbers of the coils of each source: those with currents in the same proportion at all times."""
-    found: dict[object, list[int]] = {}
-    for k, coil in enumerate(coils):
-        table = isinstance(coil.current, np.ndarray)
-        found.setdefault(("table", k) if table else (coil.frequency, coil.phase), []).append(k)
-    return list(found.values())
-
-
 @dataclass(frozen=True, eq=False)
 class Supply:
     """The current of each source: of its first coil, which is not zero."""
 
     coils: Sequence[Coil]
-    groups: Sequence[Sequence[int]]
+
+    @cached_property
+    def groups(self) -> list[list[int]]:
+        """The numbers of the coils of each source: those with currents in the same proportion at all times."""
+        found: dict[object, list[int]] = {}
+        for k, coil in enumerate(self.coils):
+            table = isinstance(coil.current, np.ndarray)
+            found.setdefault(("table", k) if table else (coil.frequency, coil.phase), []).append(k)
+        return list(found.values())
 
     @property
     def shares(self) -> list[list[float]]:
@@ -161,12 +160,12 @@ def heights_over(scene: Scene) -> tuple[float, float]:
     return float(top + half + low), float(top + half + high)
 
 
-def levitation_height(modes: FloatingModes, supply: Supply, weight: float) -> float:
-    """Height (m) of the centre where the mean force carries a weight and falls with height; NaN where there is none.
+def levitation_height(scene: Scene, modes: FloatingModes) -> float:
+    """Height (m) of the centre where the mean force carries the floater and falls with height; NaN: there is none.
 
-    The `modes` are of the conductor over the coils, `supply` is that of sinusoidal currents, `weight` is in N.
+    The currents of the `scene` are sinusoidal, the `modes` those of its floater over its coils.
     """
-    leaders = supply.leaders
+    leaders, weight = Supply(scene.coils).leaders, -scene.floater.mass * float(scene.gravity[2])
     phasors = np.array([coil.current * np.exp(1j * (coil.phase - np.pi / 2)) for coil in leaders])
     frequencies = np.array([coil.frequency for coil in leaders])
 
@@ -187,7 +186,7 @@ def conductor_motion(scene: Scene, modes: FloatingModes, duration: float) -> Con
     """
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)
-    supply = Supply(scene.coils, sources_of(scene.coils))
+    supply = Supply(scene.coils)
     mass, gravity, brake, rates = floater.mass, -float(scene.gravity[2]), scene.drag.linear, modes.rates
     low, high = modes.heights
     kept = supply.kept(rates)
@@ -285,7 +284,7 @@ def free_motion(scene: Scene, modes: FreeModes, duration: float) -> ConductorMot
     """
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)
-    supply, (box, floor) = Supply(scene.coils, sources_of(scene.coils)), room_over(scene)
+    supply, (box, floor) = Supply(scene.coils), room_over(scene)
     body, mass, inertia, rates = floater.bodies[0], floater.mass, floater.principal_inertia, modes.rates
     places = body.center + modes.places @ body.rotation.T  # along the floater's axes
     moments = (modes.moments @ body.rotation.T).reshape(len(rates), -1)

@@ -66,9 +66,7 @@ def measured_heights() -> tuple[Array, Array]:
 
 def resting_height(scene: Scene, modes: FloatingModes) -> float:
     """Height (m) of the lower face at which the mean forces balance."""
-    weight = -scene.floater.mass * float(scene.gravity[2])
-    supply = conductor.Supply(scene.coils, conductor.sources_of(scene.coils))
-    return conductor.levitation_height(modes, supply, weight) - float(scene.floater.bodies[0].half_edges[2])
+    return conductor.levitation_height(scene, modes) - float(scene.floater.bodies[0].half_edges[2])
 
 
 def in_phase(scene: Scene, phase: float) -> Scene:
@@ -83,8 +81,7 @@ def _with_coils(scene: Scene, *coils: Coil) -> Scene:
 def _modes(scene: Scene, order: int, heights: tuple[float, float] | None = None) -> FloatingModes:
     """Modes of a scene's disc over its coils by finite elements of an order, and of one order less for the error."""
     (disc,), coils = scene.floater.bodies, scene.coils
-    shares = conductor.Supply(coils, conductor.sources_of(coils)).shares
-    over = Levitated(disc, ALUMINIUM, coils, shares, coils[0].frequency)
+    over = Levitated(disc, ALUMINIUM, coils, conductor.Supply(coils).shares, coils[0].frequency)
     return floating_modes(over, heights or conductor.heights_over(scene), order=order)
 
 

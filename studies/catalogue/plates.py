@@ -26,6 +26,7 @@ from ..figures.style import PALETTE, drawn, panels, plain_log
 from ..levitation import Levitation
 from ..result import AXIS, MODES, Columns, columns, variable
 from ..study import Point, Study, cases_with, each_case, study_of_one
+from ..words import mode_words
 from . import article, showing
 
 # What a plate does to each mode of the floater, against its place, conductivity, thickness, and the rotor.
@@ -175,7 +176,7 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
             varied = part["rotor_frequency"] if sweep == "frequency" else part["value"] * SWEEPS[sweep][2]
             for mode, color in zip(result["mode"].values, PALETTE, strict=False):
                 _damped(panel, varied, part["growth"].sel(mode=mode), part["error"], style, color=color, mfc=fill)
-                showing.explain(panel, {showing.mode_label(mode): "-"}, color=color)
+                showing.explain(panel, {mode_words(mode): "-"}, color=color)
             showing.explain(panel, {words: style}, mfc=fill, ms=4)
         panel.set_xlabel(SWEEPS[sweep][1])
         if sweep != "frequency":
@@ -242,7 +243,7 @@ def _damping_lines(result: xr.Dataset) -> list[str]:
                 where = f"plate {sweep}, face at {1e3 * value:.1f} mm"
             cells, worst = ["no equilibrium", "", *[""] * len(MEANS)], float(one["growth"].max("mode"))
             if np.isfinite(worst):
-                mode = showing.mode_label(one["mode"].values[int(one["growth"].argmax("mode"))])
+                mode = mode_words(one["mode"].values[int(one["growth"].argmax("mode"))])
                 rate = showing.uncertain(worst, abs(worst) * one["error"])
                 cells = [mode, rate, *(f"{float(mean(one)):.3g}" for _, mean in MEANS.values())]
             before = f"{float(one['growth_without'].max()):+.1g}"

@@ -145,11 +145,6 @@ def explain(axes: Axes, formats: Mapping[str, str], **style: Any) -> None:
         axes.plot([], [], shape, **{**grey, "label": words, **style})
 
 
-def mode_label(mode: str) -> str:
-    """A mode of a result in words."""
-    return {"bounce": "axial", "side, backward": "backward whirl", "side, forward": "forward whirl"}.get(mode, mode)
-
-
 def text_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
     """Lines with aligned columns below their heads; numbers with four significant digits, NaN as a dash."""
 

@@ -15,7 +15,6 @@ from spinlev.dynamics.flights.conductor import (
     heights_over,
     levitation_height,
     room_over,
-    sources_of,
 )
 from spinlev.fem.closed_forms.coil import CoilField
 from spinlev.fem.closed_forms.eddy_bodies import thin_field_torque
@@ -34,8 +33,7 @@ BODY, WEIGHT = SCENE.floater.bodies[0], SCENE.floater.mass * 9.81
 
 
 def conductor(scene, frequency):
-    shares = Supply(scene.coils, sources_of(scene.coils)).shares
-    return Levitated(scene.floater.bodies[0], 3.4e7, scene.coils, shares, frequency)
+    return Levitated(scene.floater.bodies[0], 3.4e7, scene.coils, Supply(scene.coils).shares, frequency)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +58,7 @@ def test_mean_force_at_rest_is_that_of_coaxial_rings(modes, rings, height):
 
 def test_height_is_that_of_coaxial_rings(modes, rings):
     theirs = brentq(lambda z: rings.mean_force(SCENE.coils, z, 50.0) - WEIGHT, 0.01, 0.016, xtol=1e-8)
-    ours = levitation_height(modes, Supply(SCENE.coils, sources_of(SCENE.coils)), WEIGHT)
+    ours = levitation_height(SCENE, modes)
     assert ours - 1.5e-3 == pytest.approx(theirs - 1.5e-3, rel=1e-3)
 
 
@@ -84,8 +82,8 @@ def test_table_of_time_is_the_sine_that_it_follows(modes):
 def test_tables_are_sources_of_their_own():
     times = np.array([[0.0, 1.0], [1.0, 2.0]])
     coils = [SCENE.coils[0], replace(SCENE.coils[0], current=times), SCENE.coils[1], replace(SCENE.coils[0], phase=1.0)]
-    assert sources_of(coils) == [[0, 2], [1], [3]]
-    assert Supply(coils, sources_of(coils)).shares[0] == [1.0, 0.0, -1.0, 0.0]
+    assert Supply(coils).groups == [[0, 2], [1], [3]]
+    assert Supply(coils).shares[0] == [1.0, 0.0, -1.0, 0.0]
 
 
 def test_without_current_it_falls_onto_the_coils(modes):
