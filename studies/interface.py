@@ -333,7 +333,7 @@ def ensemble(
         `position_rotor_frame` is where the end is in the frame that turns with the rotor; beside a plate
         `left_plate_table` says which ended, as "lost", where its currents are not known farther on.
         Accuracy: the field errs by 1e-6 of its gradient, steps by round-off; of a body that is not round the field
-        errs by 1e-5, about an equilibrium by 1e-4; a plate's currents are known to `plate_rtol`.
+        errs by 1e-5, about an equilibrium by 2e-5; a plate's currents are known to `plate_rtol`.
 
     Raises
     ------

@@ -68,6 +68,7 @@ SHORT_TURNS = 1000.0
 STRAIGHT_TURNS = 2e5
 LOOKED_AHEAD = 16.0  # Turns in the middle of whose way a ball is put: three periods of the axial mode
 MOST_SAMPLES, SAMPLES_PER_TURN = 20000, 32
+AT_ONCE = 256  # Samples whose energy is computed at once: each has a copy of all runtime parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +145,7 @@ class Flight:
             began = perf_counter()
             equations, events = self.equations(degree)
             thorough = THOROUGH if self.whole.turning and degree and not self.memory else OPTIMISATION
+            steps = self._turns * (2 if self.whole.turning else 1)  # in those of a sphere's turns
             falling = hy.event_direction.negative
             small = [kind.number for kind in self.balls.kinds[:-1]] if self.balls else []
             integrator = compiled(
@@ -152,7 +154,7 @@ class Flight:
                 np.zeros(len(equations.variables) + 1),
                 tol=self.step_error(degree),
                 compact_mode=not self._straight or (self.balls is not None and degree not in small),
-                opt_level=thorough if self.memory or self._turns > SHORT_TURNS else 0,
+                opt_level=thorough if self.memory or steps > SHORT_TURNS else 0,
                 t_events=[hy.t_event(each, direction=falling) for each, _ in events],
             )
             terms, given = list(equations.jacobi), list(equations.variables)
@@ -185,15 +187,17 @@ class Flight:
 
         `values` are the runtime parameters (p,) of all of them.
         """
-        function = self.part(self.degree(values)).jacobi
-        pars = np.empty((max(function.nparams, len(Parameter)), len(times)))
-        pars[:] = values[: len(pars), None]
+        function, found = self.part(self.degree(values)).jacobi, []
+        pars = np.repeat(values[: max(function.nparams, len(Parameter)), None], min(len(times), AT_ONCE), axis=1)
         pars[Parameter.PLATE_SPEED] = 0.0
-        if self.scene.plate is not None:
-            depth = plate_depth(self.scene.plate, times * self.scales.time)
-            pars[Parameter.PLATE_DEPTH] = depth / self.scales.length
-        inputs = np.ascontiguousarray(states[:, :-1].T)
-        return np.asarray(function(inputs, pars=pars[: function.nparams], time=times))
+        for start in range(0, len(times), AT_ONCE):
+            now, inputs = times[start : start + AT_ONCE], states[start : start + AT_ONCE, :-1].T
+            if self.scene.plate is not None:
+                depth = plate_depth(self.scene.plate, now * self.scales.time)
+                pars[Parameter.PLATE_DEPTH, : len(now)] = depth / self.scales.length
+            given = np.ascontiguousarray(pars[: function.nparams, : len(now)])
+            found.append(function(np.ascontiguousarray(inputs), pars=given, time=now))
+        return np.concatenate(found, axis=1)
 
     def balanced(self, values: Array, times: Array, states: Array) -> Array:
         """The floater's own at scaled times (n,), and J - work, from states (n, s) under parameters `values`.

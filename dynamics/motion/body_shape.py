@@ -124,7 +124,7 @@ class BodyShape:
     def _way(self) -> int:
         """Degree of what the multipoles feel, in a place within the ball."""
         assert self.ball is not None
-        return self.ball.degree - LESS
+        return max(self.ball.degree - LESS, 2)
 
     @property
     def _known(self) -> NDArray[np.bool_]:

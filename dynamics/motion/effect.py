@@ -20,7 +20,7 @@ from .state import STEADY, Given, Parameter, State, Turn, Vector
 ZERO = hy.expression(0.0)
 NOTHING = (ZERO, ZERO, ZERO)
 PARAMETERS = Given()
-SMALLEST = 5  # Degree of the ball in which a body that is not round moves about an equilibrium, see `flights.balls`
+SMALLEST = 4  # Degree of the ball in which a body that is not round moves about an equilibrium, see `flights.balls`
 
 
 @dataclass(frozen=True, eq=False)

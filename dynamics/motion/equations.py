@@ -33,7 +33,7 @@ a sweep may change is a runtime parameter; only the tables' own geometry is comp
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import heyoka as hy
 import numpy as np
@@ -221,7 +221,8 @@ def equations_of_motion(
     modelled, and `first` the number of the first of their runtime parameters, which are `given`. The rotor's rate
     changes in time if it is `driven`, and it is moved, too, if it is `moving`. `frame` is that of `Scales`.
     """
-    whole, rotor = interaction_of(table), moved() if moving else DRIVEN if driven else STEADY
+    whole, steady = interaction_of(table), replace(STEADY, rate=given[Parameter.RATE])
+    rotor = moved() if moving else DRIVEN if driven else steady
     names = EVEN_NAMES if frame is not None else TURNING_NAMES if whole.turning else ROUND_NAMES
     variables = list(hy.make_vars(*CENTRE, *names))
     position, velocity, turn_states, spin_states = variables[:3], variables[3:6], variables[6:-3], variables[-3:]

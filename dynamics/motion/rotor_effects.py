@@ -92,7 +92,7 @@ class _Near:
 MUTUAL = "mutual magnetisation"
 # Degrees of u, the three of V, and xx, xy, xz, yy, yz, zz of H in a ball; V is small.
 IN_BALL = (2, *(1, 1, 1), *(2, 2, 2, 2, 2, 2))
-# The same in the smallest ball of a body that is not round: 3e-5 of the force at its surface, as much as the field errs
+# The same in the smallest ball of a body that is not round: 3e-5 of the force at its surface
 IN_SMALLEST = (1, *(0, 0, 0), *(1, 1, 1, 1, 1, 1))
 # Whether q, u, V and H are odd in y where the rotor is its own mirror image, and which monomials are
 ODD_PARTS = (False, False, *(i == 1 for i in range(3)), *((a == 1) != (b == 1) for a, b in PAIRS))

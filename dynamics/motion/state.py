@@ -72,12 +72,13 @@ class Parameter(IntEnum):
     MOVE_Z = auto()
 
 
-# That nothing changes during a trajectory, and those of them in which a whole number is meant where one is near
+# That nothing changes during a trajectory at one frequency; in those that are `WHOLE` a number that nearly is, is one
 FIXED = {
     *(Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG, Parameter.TILT_DRAG),
     *(Parameter.PLATE_MOMENT, Parameter.PLATE_SHARE, Parameter.INDUCED),
 }
 OF_BODY = range(Parameter.INERTIA_X, Parameter.POINTING_Z + 1)
+WHOLE = {Parameter.RATE, *OF_BODY}
 SAME = 1e-12  # By which moments of inertia over their mean may differ that are taken as equal, and a moment's direction
 
 
@@ -92,10 +93,10 @@ class Given:
     values: Array | None = None
 
     def __getitem__(self, which: Parameter) -> hy.expression:
-        if self.values is None or not (which in FIXED or which in OF_BODY):
+        if self.values is None or which not in {*FIXED, *WHOLE}:
             return hy.par[which]
         value = float(self.values[which])
-        whole = which in OF_BODY and abs(value - round(value)) < SAME
+        whole = which in WHOLE and abs(value - round(value)) < SAME
         return hy.expression(float(round(value)) if whole else value)
 
 
@@ -167,7 +168,7 @@ def turned(vector: Vector, rate: hy.expression, across: Vector = ()) -> list[hy.
 
     W is a `rate` about z, with a part `across` it (2), if there is one.
     """
-    about_z = [-rate * vector[1], rate * vector[0], hy.expression(0.0)]
+    about_z = [-(rate * vector[1]), rate * vector[0], hy.expression(0.0)]
     if not across:
         return about_z
     return add(about_z, cross([*across, hy.expression(0.0)], vector))

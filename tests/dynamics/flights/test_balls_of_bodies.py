@@ -101,13 +101,13 @@ def test_a_cube_moves_in_small_balls_as_in_a_large_one(start, monkeypatch):
 
 
 def test_a_cube_costs_what_its_steps_cost(start):
-    """A step has fewer operations than a sphere's in balls, and a turn 2.3 times its steps at most."""
+    """A step has 0.81 of the operations of a sphere's in balls, and a turn 2.3 times its steps at most."""
     ball = initial_state(SPHERE, TABLE)[0]
     flights = in_balls(LEVITATING, TABLE, 0.05), in_balls(SPHERE, TABLE, 0.05)
     flown = [integrate(flight, begun, 0.05) for flight, begun in zip(flights, (start, ball), strict=True)]
     cube, sphere = (len(next(iter(flight.parts.values())).integrator.decomposition) for flight in flights)
     print(f"\noperations: cube {cube}, sphere {sphere}; steps: {flown[0].steps}, {flown[1].steps}")
-    assert cube < 0.95 * sphere
+    assert cube < 0.85 * sphere
     assert flown[0].steps < 2.3 * flown[1].steps
 
 
