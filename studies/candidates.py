@@ -86,14 +86,16 @@ class Candidate:
 
     @cached_property
     def ends(self) -> tuple[BranchPoint, BranchPoint]:
-        """Where stable levitation ends below and above the frequency, without plate, for the mean if not round."""
-        followed = self.levitation if self.levitation.scene.floater.round else self.levitation.mean
+        """Where stable levitation ends below and above the frequency, without plate.
+
+        Of a body that is not round for its mean, or for the frequency-locked equilibrium, of whose thirteen states all
+        six modes decide.
+        """
+        whole = self.levitation.scene.floater.round or self.bare.kind == LOCKED
+        followed = self.levitation if whole else self.levitation.mean
         scene = replace(followed.still, plate=None)
-        if scene.gravity[:2].any() or self.bare.kind == LOCKED:
-            raise InputError(
-                "Input margin must be asked for where gravity is along the axis and the equilibrium not frequency-"
-                "locked; instead this scene's is not so."
-            )
+        if scene.gravity[:2].any():
+            raise InputError("Input margin must be asked for where gravity is along the axis; instead it is not.")
         family, found = frequencies.by_frequency(scene, followed.rates, self.levitation.spin), []
         start = Scales.of(scene).pack(self.bare.start)
         for number, border in enumerate((frequencies.LOWEST, frequencies.HIGHEST)):
@@ -102,7 +104,7 @@ class Candidate:
                 moved = float(self.near.ends_by[number] @ self.step) if "ends_by" in self.near.__dict__ else 0.0
                 end = frequencies.tracked_end(scene, family, self.near.ends[number], moved)
             if end is None:  # tracked from a scene nearby, it may be on the other side of the frequency
-                if not frequencies.levitates(family.point(start[:3], start[6:9], scene.frequency)):
+                if not frequencies.levitates(family.point(start[:3], start[6:-3], scene.frequency)):
                     raise EquilibriumError(f"At {scene.frequency:.4g} Hz it is not stable without the plate.")
                 far = frequencies.LONG_STEPS
                 walk = frequencies.one_way(scene, family, start, scene.frequency, border, far)
@@ -279,7 +281,7 @@ class Search:
                 levitation.adopt(survey)
             elif levitation.scene.floater.is_sphere and not levitation.scene.gravity[:2].any():
                 return None
-            found = nearest_of(levitation.equilibria, place)
+            found = nearest_of([e for e in levitation.equilibria if e.kind == near.known.kind], place)
             return None if found is None else Candidate(levitation, found, self.keys, near, step)
         except SpinlevError:
             return None

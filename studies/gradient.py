@@ -122,6 +122,9 @@ class Gradient:
             implicit = Implicit(known, base.setting)
             self._end.append((known, base, implicit, base.around("frequency_hz")))
         known, base, implicit, by_frequency = self._end[0]
+        if known.kind == LOCKED and (why := unknown_of_locked(key)):
+            self.reasons[why] = why
+            return np.nan, np.nan
         nearby = base.around(key)
         if point.kind == FOLD:
             value, lower = implicit.fold_by(implicit.missed(nearby), implicit.missed(by_frequency)).tolist()
@@ -276,9 +279,12 @@ def range_ends(gradient: Gradient, keys: Sequence[str]) -> tuple[Array, Array, A
 
 
 def equilibrium_at(levitation: Levitation, point: BranchPoint) -> Equilibrium:
-    """The equilibrium of a point of a branch, at whose frequency the scene is, of the mean if that is not round."""
-    scene, kind = levitation.still, ""
-    if not scene.floater.round:
+    """The equilibrium of a point of a branch, at whose frequency the scene is; of a body that is not round its mean's.
+
+    Or a frequency-locked one, if the point is.
+    """
+    scene, kind = levitation.still, LOCKED if len(point.state) == 13 else ""
+    if not scene.floater.round and not kind:
         scene, kind = replace(scene, floater=scene.floater.averaged), AVERAGED
     scales = Scales.of(scene)
     motion, state = point.motion.in_seconds(scales.time), scales.unpack(point.state)

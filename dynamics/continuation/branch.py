@@ -11,10 +11,11 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ..equilibria.balance import CONVERGED_STEP, EVERY, Balance, Indices, solve
 from ..equilibria.equilibrium import FOLD, EquilibriumError, Modes, modes
-from ..equilibria.path import END, ON, SHORTER, BalanceCurve, Steps, directions, follow, stepped
+from ..equilibria.path import DIFFERENCE, END, ON, SHORTER, BalanceCurve, Steps, directions, follow, stepped
+from ..equilibria.search import locked_modes, locked_poses
 from ..motion.equations import parameters
 from ..motion.rates import Rates
-from ..motion.state import Parameter, Scales
+from ..motion.state import Parameter, Scales, left_product, matrices_of
 
 # Parameter -> values of the runtime parameters, with the drag along the moment left out, and body spin s.
 Problem = Callable[[float], tuple[Array, float]]
@@ -27,7 +28,7 @@ def frequencies(scene: Scene, spin: float = 0.0) -> Problem:
 
     def problem(frequency: float) -> tuple[Array, float]:
         there = replace(scene, frequency=frequency, drive=())
-        return parameters(there, Scales.of(there), frozen_spin=True), spin
+        return parameters(there, Scales.of(there), frozen_spin=scene.floater.round), spin
 
     return problem
 
@@ -45,8 +46,9 @@ class BranchPoint:
     parameter: float  #: where on the axis of the parameter
     spin: float  #: body spin s
     position: Array  #: (3,) m, rotor's frame
-    state: Array  #: (12,) scaled
-    tangent: Array  #: (7,) unit direction of the branch: scaled position, moment, and the parameter by its unit
+    state: Array  #: (12,) scaled, or (13,) of a frequency-locked body
+    #: (7 or 8,) unit direction of the branch: scaled position, moment or quaternion, and the parameter by its unit
+    tangent: Array
     motion: Modes  #: its modes, in scaled time
     time_unit: float  #: s
     kind: str = ""  #: what is marked here: "fold", "oscillatory", "real"; "" at an ordinary point
@@ -54,6 +56,11 @@ class BranchPoint:
     @property
     def distance(self) -> float:
         return float(np.linalg.norm(self.position))
+
+    @property
+    def orientation(self) -> Array:
+        """Direction (3,) of the moment, or axes (3, 3) of a frequency-locked body."""
+        return self.state[6:9] if len(self.state) == 12 else matrices_of(self.state[6:10])
 
     @property
     def growth_per_s(self) -> float:
@@ -100,7 +107,7 @@ class Family(BalanceCurve):
         return Balance(self.rates, np.array(values), np.array(spins) * self.spin_ratio)
 
     def solution(self, guess: Array, parameter: float) -> Array | None:
-        """Unknowns (7,) of the equilibrium near a place and moment (6,) at one value of the parameter."""
+        """Unknowns (7,) of the equilibrium near a place and moment (6,) at one value of the parameter, or None."""
         position, moment, size = solve(self.balance(parameter), guess[None, :3], guess[None, 3:], EVERY)
         if not size[0] < CONVERGED_STEP:
             return None
@@ -118,13 +125,52 @@ class Family(BalanceCurve):
         """The equilibrium a `step` along the branch from `unknowns` (7,) on a `tangent`. Raises EquilibriumError."""
         points, tangents, good = stepped(self, unknowns[None], tangent[None], np.array([step]))
         if not good[0]:
-            raise EquilibriumError(f"Lost the branch at {unknowns[6] * self.unit:.6g}: give it shorter steps.")
-        return self.at(points[0], tangents[0], float(points[0, 6]) * self.unit)
+            raise EquilibriumError(f"Lost the branch at {unknowns[-1] * self.unit:.6g}: give it shorter steps.")
+        return self.at(points[0], tangents[0], float(points[0, -1]) * self.unit)
 
-    def point(self, position: Array, moment: Array, parameter: float) -> BranchPoint:
-        """Equilibrium at a scaled `position` and `moment` (3,), its tangent towards growing values of `parameter`."""
-        unknowns = np.concatenate([position, moment, [parameter / self.unit]])
-        return self.at(unknowns, directions(self, unknowns[None], np.eye(7)[6:])[0], parameter)
+    def point(self, position: Array, turn: Array, parameter: float) -> BranchPoint:
+        """Equilibrium at a scaled `position` (3,), with a moment (3,) or quaternion (4,).
+
+        Its tangent is towards growing values of `parameter`.
+        """
+        unknowns = np.concatenate([position, turn, [parameter / self.unit]])
+        return self.at(unknowns, directions(self, unknowns[None], np.eye(len(unknowns))[-1:])[0], parameter)
+
+
+class LockedFamily(Family):
+    """The frequency-locked equilibria of a body that is not round, with six balances: a quaternion is the moment's."""
+
+    def onto(self, points: Array) -> Array:
+        points = points.copy()
+        points[:, 3:7] /= np.linalg.norm(points[:, 3:7], axis=1, keepdims=True)
+        return points
+
+    def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
+        """Balances and |q| = 1 (n, 7) at points (n, 8), and their derivatives (n, 7, 8), as of `BalanceCurve`."""
+        n, quaternion = len(points), points[:, 3:7]
+        around = np.concatenate([points[:, 7] + s * DIFFERENCE for s in (0, 1, -1)]) * self.unit
+        given = np.array([self.problem(parameter)[0] for parameter in around.tolist()])
+        found, by = self.rates.locked_balance(np.tile(points[:, :3], (3, 1)), np.tile(quaternion, (3, 1)), given)
+        turns = np.array([left_product([*e], [*quaternion.T]) for e in np.eye(3)])  # (3, 4, n) twice those by turns
+        values, slopes = np.zeros((n, 7)), np.zeros((n, 7, 8))
+        values[:, :6], slopes[:, 6, 3:7] = found[:n], quaternion
+        slopes[:, :6, :3], slopes[:, :6, 3:7] = by[:n, :, :3], 2 * np.einsum("nbk,kqn->nbq", by[:n, :, 3:], turns)
+        slopes[:, :6, 7] = (found[n : 2 * n] - found[2 * n :]) / (2 * DIFFERENCE)
+        return values, slopes
+
+    def solution(self, guess: Array, parameter: float) -> Array | None:
+        values, axes = self.problem(parameter)[0], matrices_of(guess[None, 3:])
+        position, turn = locked_poses(self.rates, values, guess[None, :3], axes)
+        if not len(position):
+            return None
+        return np.concatenate([position[0], turn[0] * np.sign(turn[0] @ guess[3:]), [parameter / self.unit]])
+
+    def at(self, unknowns: Array, tangent: Array, parameter: float) -> BranchPoint:
+        values = self.problem(parameter)[0]
+        length, time = values[[Parameter.LENGTH, Parameter.TIME]].tolist()
+        state, motion, _ = locked_modes(self.rates, values, unknowns[:3], unknowns[3:7])
+        spin = float(matrices_of(unknowns[3:7])[2] @ values[Parameter.POINTING_X : Parameter.POINTING_Z + 1])
+        return BranchPoint(parameter, spin, unknowns[:3] * length, state, tangent, motion, time)
 
 
 def follow_branch(
@@ -144,18 +190,18 @@ def follow_branch(
     Parameters
     ----------
     family : the problem
-    start : scaled state (12,) of the equilibrium at `parameter`, or a guess
+    start : scaled state (12 or 13,) of the equilibrium at `parameter`, or a guess
     parameter : where the branch begins
     end : the branch ends where the parameter reaches it, or comes back to `parameter` after folds
     steps : along the branch, `Steps()` if not given
     until : ends the branch after the first point of which it is true
     tolerated : growth that still counts as stable, 1/s
     """
-    if (first := family.solution(start[[0, 1, 2, 6, 7, 8]], parameter)) is None:
+    if (first := family.solution(np.concatenate([start[:3], start[6:-3]]), parameter)) is None:
         raise EquilibriumError(
             f"Input start must be near an equilibrium; instead Newton's method found none at {parameter:.6g}."
         )
-    unknowns, tangent = first, directions(family, first[None], np.sign(end - parameter) * np.eye(7)[6:])
+    unknowns, tangent = first, directions(family, first[None], np.sign(end - parameter) * np.eye(len(first))[-1:])
     points = [family.at(unknowns, tangent[0], parameter)]
 
     def beyond(value: float) -> float | None:
@@ -167,12 +213,12 @@ def follow_branch(
     def arrived(which: Indices, places: Array, tangents: Array, lengths: Array) -> int:
         nonlocal unknowns
         step = float(lengths[0]), tolerated
-        point = family.at(places[0], tangents[0], float(places[0, 6]) * family.unit)
+        point = family.at(places[0], tangents[0], float(places[0, -1]) * family.unit)
         marked = _marked(family, unknowns, points[-1], point, *step)
         if any(mark.kind == FOLD and beyond(mark.parameter) is not None for mark in marked):
             return SHORTER  # past the end and on round a fold: the point at the end would be missed
         if (border := beyond(point.parameter)) is not None:
-            if (landed := family.solution(places[0, :6], border)) is not None:
+            if (landed := family.solution(places[0, :-1], border)) is not None:
                 point = family.at(landed, directions(family, landed[None], tangents)[0], border)
             marked = _marked(family, unknowns, points[-1], point, *step)
         points.extend([*marked, point])
@@ -199,9 +245,9 @@ def _marked(
         return step, replace(at(step), kind=kind)
 
     found = []
-    folds = before.tangent[6] * after.tangent[6] < 0
+    folds = before.tangent[-1] * after.tangent[-1] < 0
     if folds:
-        found.append(located(lambda point: float(point.tangent[6]), FOLD))
+        found.append(located(lambda point: float(point.tangent[-1]), FOLD))
     excess = before.excess(tolerated), after.excess(tolerated)
     if excess[0] * excess[1] < 0:
         growing = before if excess[0] > 0 else after

@@ -28,7 +28,7 @@ from ..motion.floater_effects import too_slow
 from ..motion.plate import PlateMemory
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales
-from .branch import BranchPoint, Family, follow_branch, frequencies
+from .branch import BranchPoint, Family, LockedFamily, follow_branch, frequencies
 from .map import surveys
 
 UNIT = 50.0  # Hz over which the equilibrium moves by about a radius of the floater
@@ -65,8 +65,11 @@ class Branch:
 
 
 def by_frequency(scene: Scene, rates: Rates, spin: float = 0.0) -> Family:
-    """Equilibria of a `scene` with `rates` and a body `spin` against the frequency of the rotor."""
-    return Family(rates, frequencies(scene, spin), UNIT, scene.floater.spin_ratio)
+    """Equilibria of a `scene` with `rates` and a body `spin` against the frequency of the rotor.
+
+    Those that are frequency-locked, if the `rates` are of a body that is not round.
+    """
+    return (LockedFamily if rates.turning else Family)(rates, frequencies(scene, spin), UNIT, scene.floater.spin_ratio)
 
 
 def levitating_branch(scene: Scene, table: FieldTable, rates: Rates, highest: float) -> Branch:
@@ -266,7 +269,7 @@ def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0
     have `moved` so far, Hz.
     """
     expected = end.parameter + (0.0 if end.kind == BORDER else moved)
-    pose = np.concatenate([end.position / family.balance(expected).values[Parameter.LENGTH], end.state[6:9]])
+    pose = np.concatenate([end.position / family.problem(expected)[0][Parameter.LENGTH], end.state[6:-3]])
     if end.kind == BORDER:
         there = family.solution(pose, end.parameter)
         return None if there is None else replace(family.at(there, end.tangent, end.parameter), kind=BORDER)
@@ -275,9 +278,9 @@ def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0
     def measure(way: float) -> float:
         point = family.after(begun, end.tangent, way + TRACKED)
         if end.kind == FOLD:
-            return float(point.tangent[6])
+            return float(point.tangent[-1])
         if end.kind == CONTACT:
-            return rotor_gap(scene, point.position, point.state[6:9])
+            return rotor_gap(scene, point.position, point.orientation)
         return point.excess(MARGINAL)
 
     try:
@@ -297,7 +300,7 @@ def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0
 
 def is_over(scene: Scene, point: BranchPoint) -> bool:
     """Whether a branch ends at a point: in a fold, or as the floater touches the rotor."""
-    return point.kind == FOLD or rotor_gap(scene, point.position, point.state[6:9]) < 0
+    return point.kind == FOLD or rotor_gap(scene, point.position, point.orientation) < 0
 
 
 def levitates(point: BranchPoint) -> bool:
@@ -316,12 +319,12 @@ def one_way(
     for k, point in enumerate(points):
         if point.kind == FOLD:
             return points[: k + 1]
-        if k and rotor_gap(scene, point.position, point.state[6:9]) < 0:
+        if k and rotor_gap(scene, point.position, point.orientation) < 0:
             before = points[k - 1]
             walk = partial(follow_branch, family, before.state, before.parameter, steps=STEPS, tolerated=MARGINAL)
             ends = before.parameter + 1e-9 * (point.parameter - before.parameter), point.parameter
             touching = scipy.optimize.brentq(
-                lambda f, walk=walk: rotor_gap(scene, (p := walk(f)[-1]).position, p.state[6:9]), *ends, xtol=1e-6
+                lambda f, walk=walk: rotor_gap(scene, (p := walk(f)[-1]).position, p.orientation), *ends, xtol=1e-6
             )
             return [*points[:k], replace(walk(float(touching))[-1], kind=CONTACT)]
     return [*points[:-1], replace(points[-1], kind=points[-1].kind or BORDER)]

@@ -37,6 +37,7 @@ from .equilibrium import (
     EquilibriumError,
     ForceCurve,
     LeftOut,
+    Modes,
     Survey,
     eigenmodes,
     free_directions,
@@ -474,6 +475,16 @@ def locked_poses(rates: Rates, values: Array, points: Array, axes: Array) -> tup
     return position[found], quaternion[found]
 
 
+def locked_modes(rates: Rates, values: Array, position: Array, quaternion: Array) -> tuple[Array, Modes, Array]:
+    """Scaled state (13,) of a body at rest in the rotor's frame, its modes, and derivatives (13, 13) of its rates."""
+    rate = float(values[Parameter.RATE])
+    velocity = rate * np.array([-position[1], position[0], 0.0])
+    state = np.concatenate([position, velocity, quaternion, rate * matrices_of(quaternion)[2]])
+    jacobian = rates(state[None], values)[1][0]
+    tangents, projections = free_directions(state)
+    return state, eigenmodes(projections @ jacobian @ tangents, tangents), jacobian
+
+
 def locked_equilibrium(
     scales: Scales, rates: Rates, values: Array, position: Array, quaternion: Array, doubt: Array
 ) -> Equilibrium:
@@ -482,15 +493,10 @@ def locked_equilibrium(
     `scales`: of the scene; `rates`: of a body that is not round; `values`: (p,) of the parameters; `position`: (3,)
     scaled; `quaternion`: (4,); `doubt`: (2 + 12 c,) of the field there, T and T/m, see `field_doubts`.
     """
-    rate = float(values[Parameter.RATE])
     axes = matrices_of(quaternion)
     quaternion = quaternions_of(axes)  # of its two signs that of a packed state: the Jacobian's entries have it
-    velocity = rate * np.array([-position[1], position[0], 0.0])
-    state = np.concatenate([position, velocity, quaternion, rate * axes[2]])
     value, slope = (part[0] for part in rates.locked_balance(position[None], quaternion[None], values))
-    jacobian = rates(state[None], values)[1][0]
-    tangents, projections = free_directions(state)
-    found = eigenmodes(projections @ jacobian @ tangents, tangents)
+    state, found, jacobian = locked_modes(rates, values, position, quaternion)
     gravity = abs(float(values[Parameter.GRAVITY_Z]))
     unpacked = scales.unpack(state)
     return Equilibrium(

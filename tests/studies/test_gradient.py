@@ -18,7 +18,8 @@ import spinlev as sl
 from spinlev.dynamics.continuation.frequencies import stable_ranges
 from spinlev.dynamics.equilibria import derivatives
 from spinlev.dynamics.equilibria.balance import Balance, solve
-from spinlev.dynamics.equilibria.equilibrium import AVERAGED, LOCKED
+from spinlev.dynamics.equilibria.equilibrium import AVERAGED, LOCKED, EquilibriumError
+from spinlev.dynamics.equilibria.search import locked_poses
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.scene.contents import Drag
@@ -314,18 +315,54 @@ def test_a_rigid_cube_has_derivatives_of_its_mean():
     low, high = (end.ends[0].parameter for end in ends)
     assert float(found.lowest_frequency[0]) == pytest.approx((low - high) / 0.04, rel=1e-4)
     locked = next(e for e in here.levitation.equilibria if e.kind == LOCKED)
-    with pytest.raises(sl.InputError, match="not frequency-locked"):
+    with pytest.raises(EquilibriumError, match="not stable"):
         _ = Candidate(here.levitation, locked, ()).ends
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("plate", ["none", "slab"])
-def test_frequency_locked_equilibria_have_derivatives(plate):
-    """Of a cuboid of three unlike edges, alone and over a slab, where it is a periodic motion: against whole ones."""
+def test_a_frequency_locked_cuboid_has_a_margin():
+    """It ends where two of its six modes meet, above, and in a fold: against searches, or poses, beside those ends.
+
+    By the numbers of a scene against differences of the margins of others.
+    """
+    body = {"shape": "cuboid", "size_mm": [6.0, 10.0, 14.0], "remanence_T": 1.305, "density_kg_m3": 7500.0}
+    whole, keys = scene(130.0, sl.tilt(angle_deg=10.0, **CUBE), body), ("frequency_hz", "rotor.angle_deg")
+
+    def locked(there):
+        levitation = Levitation(there, sl.Models("cuboid", "none", interaction="rigid"))
+        return levitation, [e for e in levitation.equilibria if e.kind == LOCKED and e.stability != "unstable"]
+
+    def candidate(there):
+        levitation, (known, *_) = locked(there)
+        return Candidate(levitation, known, keys)
+
+    here = candidate(whole)
+    (low, high), margin = here.ends, here.values("margin")
+    assert (low.kind, high.kind) == ("fold", "oscillatory")
+    assert locked(changed(whole, {"frequency_hz": high.parameter - 0.2}))[1]
+    assert not locked(changed(whole, {"frequency_hz": high.parameter + 0.2}))[1]
+    for frequency, count in ((low.parameter + 0.2, 1), (low.parameter - 0.2, 0)):
+        there = changed(whole, {"frequency_hz": frequency})
+        pose = parameters(there, Scales.of(there)), low.state[None, :3], low.orientation[None]
+        assert len(locked_poses(here.levitation.rates, *pose)[0]) == count
+    for key, step, slope in zip(keys, (0.13, 0.01), here.slopes("margin").T, strict=True):
+        one, other = (candidate(changed(whole, {key: here.gradient.numbers[key] + s})) for s in (step, -step))
+        assert slope == pytest.approx((one.values("margin") - other.values("margin")) / (2 * step), rel=1e-4)
+    assert margin == pytest.approx([0.197, 0.294], abs=1e-3)
+    assert np.isnan(Gradient(here.levitation.elsewhere(frequency=low.parameter)).end_by(low, "floater.size_mm.0")).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("plate", "interaction"), [("none", "rigid"), ("slab", "rigid"), ("none", "mutual")])
+def test_frequency_locked_equilibria_have_derivatives(plate, interaction):
+    """Of a cuboid of three unlike edges, alone, over a slab, where it is a periodic motion, and with permeable magnets.
+
+    Against whole equilibria.
+    """
     body = {"shape": "cuboid", "size_mm": [9.0, 10.0, 11.0], "remanence_T": 1.305, "density_kg_m3": 7500.0}
     metal = {"size_mm": [100.0, 240.0, 30.0], "center_mm": [0.0, 0.0, -92.0], "conductivity_S_m": 3.5e7}
     whole = scene(130.0, sl.tilt(angle_deg=10.0, **CUBE), body, plate=metal)
-    models, names = sl.Models("cuboid", plate, interaction="rigid"), ["distance", "polar_angle", "mode_frequency"]
+    models, names = sl.Models("cuboid", plate, interaction=interaction), ["distance", "polar_angle", "mode_frequency"]
 
     def locked(there):
         return [e for e in Levitation(there, models).equilibria if e.kind == LOCKED]
