@@ -175,68 +175,56 @@ def _sorted(*indices: int) -> tuple[int, ...]:
     return tuple(sorted(indices))
 
 
-Signs = tuple[int, ...]
 NEXT_TO_ONE = 1 - 2**-53  # where round-off puts a point on an edge, its Λ stays finite
+NEXT, LAST = [1, 2, 0], [2, 0, 1]  # the two axes that follow each in turn
 
 
-def _seen(points: Array, half_edges: Array) -> tuple[list[dict[int, Array]], dict[Signs, Array], dict[Signs, Array]]:
-    """Offsets and distances (n,) of the eight corners from points (n, 3), and Λ = ∫ ds/r of the twelve edges.
+def _seen(points: Array, half_edges: Array) -> tuple[Array, list[Array], Array]:
+    """Offsets (3, 2, n) of a cuboid's corners from points (n, 3) along each axis, distances, Λ = ∫ ds/r of its edges.
 
-    Corners and edges are named by their signs along x, y and z, an edge's own axis by 0.
+    All are by their signs, - first: the distances (2, 2, 2, n), once for each axis, by its own sign
+    and those along its `NEXT` and `LAST`; the edges (3, 2, 2, n) along each axis by these two.
     """
-    offset = [{s: points[:, axis] + s * half_edges[axis] for s in SIGNS} for axis in range(3)]
-    square = [{s: values**2 for s, values in one.items()} for one in offset]
-    distance: dict[Signs, Array] = {}
-    for i, j, k in product(SIGNS, repeat=3):
-        distance[i, j, k] = np.sqrt(square[0][i] + square[1][j] + square[2][k])
-    edges: dict[Signs, Array] = {}
-    for axis, first, second in product(range(3), SIGNS, SIGNS):
-        ends = distance[_corner(axis, 1, first, second)] + distance[_corner(axis, -1, first, second)]
-        edges[_corner(axis, 0, first, second)] = 2 * np.arctanh(np.minimum(2 * half_edges[axis] / ends, NEXT_TO_ONE))
-    return offset, distance, edges
+    offset = points.T[:, None] + half_edges[:, None, None] * np.array(SIGNS)[:, None]
+    x, y, z = offset**2
+    distance = np.sqrt(x[:, None, None] + y[:, None] + z)
+    turned = [distance.transpose(axis, NEXT[axis], LAST[axis], 3) for axis in range(3)]
+    part = 2 * half_edges[:, None, None, None] / np.stack([up + down for down, up in turned])
+    return offset, turned, 2 * np.arctanh(np.minimum(part, NEXT_TO_ONE))
 
 
 def _face_integrals(points: Array, half_edges: Array) -> dict[tuple[int, int], Array]:
     """∫ dS/r (n,), m, over each face (axis, side) of a cuboid, seen from points (n, 3), m, along its axes."""
-    offset, distance, edges = _seen(points, half_edges)
+    offset, turned, edges = _seen(points, half_edges)
     found = {}
     for axis, side in product(range(3), SIGNS):
-        second, third = (axis + 1) % 3, (axis + 2) % 3
-        height = np.abs(offset[axis][-side])
+        second, third, other = NEXT[axis], LAST[axis], int(side < 0)
+        height = np.abs(offset[axis, other])
         total = np.zeros_like(height)
-        for s in SIGNS:
-            total += s * offset[second][s] * edges[_corner(axis, -side, s, 0)]
-            total += s * offset[third][s] * edges[_corner(axis, -side, 0, s)]
-            down, up = (distance[_corner(axis, -side, s, k)] for k in SIGNS)
+        for k, s in enumerate(SIGNS):
+            total += s * offset[second, k] * edges[third, other, k]
+            total += s * offset[third, k] * edges[second, k, other]
+            down, up = turned[axis][other, k]
             # Σ_k k atan2(v w_k, height r_k), as the angle of one product of complex numbers
-            v, w = offset[second][s], offset[third]
-            real = height**2 * up * down + v**2 * w[1] * w[-1]
-            total -= s * height * np.arctan2(v * height * (w[1] * down - w[-1] * up), real)
+            v, (low, high) = offset[second, k], offset[third]
+            real = height**2 * up * down + v**2 * high * low
+            total -= s * height * np.arctan2(v * height * (high * down - low * up), real)
         found[axis, side] = total
     return found
 
 
-def _corner(axis: int, along: int, second: int, third: int) -> Signs:
-    """Signs along x, y and z of those along an axis and the two that follow it in turn."""
-    found = [0, 0, 0]
-    found[axis], found[(axis + 1) % 3], found[(axis + 2) % 3] = along, second, third
-    return tuple(found)
-
-
 def cuboid_tensor(points: Array, half_edges: Array) -> Array:
     """T (n, 3, 3) with μ0 H = T J of a polarisation J at `points` (n, 3), m, along a cuboid's axes, off its edges."""
-    offset, distance, edges = _seen(points, half_edges)
-    tensor = np.zeros((len(points), 3, 3))
-    corners = np.array([[offset[axis][sign] for axis, sign in enumerate(signs)] for signs in distance])  # (8, 3, n)
-    crossed = corners[:, [1, 2, 0]] * corners[:, [2, 0, 1]]
+    (x, y, z), (distance, *_), edges = _seen(points, half_edges)
+    tensor, axes = np.empty((len(points), 3, 3)), range(3)
+    corners = np.empty((3, *distance.shape))
+    corners[0], corners[1], corners[2] = x[:, None, None], y[:, None], z
     with np.errstate(divide="ignore", invalid="ignore"):  # on a face: its side towards + of that axis; 0/0 is 0
-        angles = np.nan_to_num(np.arctan(crossed / (corners * np.array(list(distance.values()))[:, None])))
-    diagonal = np.einsum("c,can->na", -np.prod(list(distance), axis=1, dtype=float), angles)
-    for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
-        tensor[:, a, a] = diagonal[:, a]
-        tensor[:, a, b] = sum(i * j * edges[_corner(c, 0, i, j)] for i, j in product(SIGNS, repeat=2))
-        tensor[:, b, a] = tensor[:, a, b]
+        angles = np.arctan(corners[NEXT] * corners[LAST] / (corners * distance))
+    angles[np.isnan(angles)] = 0.0
+    both = np.multiply.outer(SIGNS, SIGNS)
+    tensor[:, axes, axes] = np.einsum("i,jk,aijkn->na", np.negative(SIGNS), both, angles)
+    tensor[:, NEXT, LAST] = tensor[:, LAST, NEXT] = np.einsum("jk,ajkn->na", both, edges)
     return tensor / FOUR_PI
 
 

@@ -47,9 +47,10 @@ def gauss(first: float, last: float, count: int) -> tuple[Array, Array]:
 
 def box_rule(box: Box, rules: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     """Points (n, 3) m and weights (n,) m³ in a box of `rules` (places, weights; m) along each of its axes."""
-    places, weights = zip(*rules, strict=True)
-    grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, 3)
-    return box.center + grid @ box.rotation.T, np.einsum("i,j,k->ijk", *weights).ravel()
+    (x, wide), (y, deep), (z, tall) = rules
+    grid = np.empty((len(x), len(y), len(z), 3))
+    grid[..., 0], grid[..., 1], grid[..., 2] = x[:, None, None], y[:, None], z
+    return box.center + grid.reshape(-1, 3) @ box.rotation.T, np.einsum("i,j,k->ijk", wide, deep, tall).ravel()
 
 
 def round_rule(
