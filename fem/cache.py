@@ -41,7 +41,7 @@ from ..geometry.files import MOST, closed, hdf5_fault, ours, regular_file, seal,
 # Number of each solver whose answers are kept, or of what writes the formulas that are compiled: another answer, or
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
-    "rotor": 12,
+    "rotor": 13,
     "mutual": 21,
     "map": 3,
     "plate": 3,

@@ -122,9 +122,10 @@ def far_rows(places: Array, normals: Array, sources: Array, areas: Array) -> Arr
     return found
 
 
-def _from_gauss(places: Array, count: int) -> Array:
-    """(n, count): Lagrange's polynomials at so many of Gauss's nodes, at places x (n,)."""
-    return np.asarray(np.polynomial.legendre.legvander(places, count - 1) @ _to_nodes(count))
+@cache
+def _from_gauss(nodes: int, count: int) -> Array:
+    """(nodes, count): Lagrange's polynomials at `count` of Gauss's nodes, at the places of `graded`."""
+    return np.asarray(np.polynomial.legendre.legvander(graded(nodes)[0], count - 1) @ _to_nodes(count))
 
 
 def _around(angles: Array, count: int) -> Array:
@@ -153,11 +154,16 @@ class Surface:
         """K (n, n) of the body alone."""
         raise NotImplementedError
 
+    def coarse(self, far: int) -> tuple[Array, Array, Array]:
+        """Places and normals (k, 3) that stand for all from `far` on, 1 or 2, and the nodes' values (n, k) by theirs."""
+        if far not in self._coarse:
+            self._coarse[far] = self._fewer(min(COARSE[far - 1], max(self.count // 3, 1) + 2 - far))
+        return self._coarse[far]
+
     @cached_property
-    def coarse(self) -> list[tuple[Array, Array, Array]]:
-        """Places and normals (k, 3) that stand for all from two distances, and the nodes' values by those (n, k)."""
-        few = max(self.count // 3, 1)
-        return [self._fewer(min(enough, few + more)) for enough, more in zip(COARSE, (1, 0), strict=True)]
+    def _coarse(self) -> dict[int, tuple[Array, Array, Array]]:
+        """See `coarse`, as far as they are asked for."""
+        return {}
 
     def _fewer(self, count: int) -> tuple[Array, Array, Array]:
         """One of `coarse`, with so many places along an edge."""
@@ -180,30 +186,34 @@ class _BoxSurface(Surface):
         self.counts = [round(count * np.sqrt(half / self.half.min())) for half in self.half]
         self.apart = APART if count > FEW else APART_OF_FEW
         self.reach = self.apart * float(np.max(2 * self.half / self.counts))
-        rules, places, normals, areas, self.numbers, total = [graded(n) for n in self.counts], [], [], [], {}, 0
+        self.places, self.normals, self.areas = self._faces([graded(n) for n in self.counts])
+        self.numbers, total = {}, 0  # of the nodes
         for axis, side in product(range(3), (-1, 1)):
-            (x, wide), (y, tall) = (rules[k] for k in self._order(axis)[:2])
-            places.append(self._grid(axis, side, x, y))
-            normals.append(np.broadcast_to(side * np.eye(3)[axis], places[-1].shape))
-            areas.append(self._area(axis) / 4 * np.outer(wide, tall).ravel())
-            self.numbers[axis, side] = total + np.arange(len(places[-1])).reshape(len(x), len(y))  # of the nodes
-            total += len(places[-1])
-        self.places, self.normals, self.areas = (np.concatenate(part) for part in (places, normals, areas))
+            first, second = (self.counts[k] for k in self._order(axis)[:2])
+            self.numbers[axis, side] = total + np.arange(first * second).reshape(first, second)
+            total += first * second
 
     @staticmethod
     def _order(axis: int) -> list[int]:
         """The axes along a face, and that across it."""
         return [(axis + 1) % 3, (axis + 2) % 3, axis]
 
-    def _area(self, axis: int) -> float:
-        return float(np.prod(2 * self.half[self._order(axis)[:2]]))
-
-    def _grid(self, axis: int, side: int, x: Array, y: Array) -> Array:
-        """Places (n m, 3) on a face at x (n,) and y (m,) in half edges."""
-        order, face = self._order(axis), np.empty((len(x), len(y), 3))
-        face[..., axis] = side * self.half[axis]
-        face[..., order[0]], face[..., order[1]] = self.half[order[0]] * x[:, None], self.half[order[1]] * y
-        return face.reshape(-1, 3)
+    def _faces(self, rules: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, Array]:
+        """Places and normals (n, 3) and areas (n,) on all faces, of `rules` along the axes in half edges."""
+        places, normals, areas = [], [], []
+        for axis in range(3):
+            first, second, _ = self._order(axis)
+            (x, wide), (y, tall) = rules[first], rules[second]
+            pair = np.empty((2, len(x), len(y), 3))
+            pair[0, ..., axis], pair[1, ..., axis] = -self.half[axis], self.half[axis]
+            pair[..., first], pair[..., second] = self.half[first] * x[:, None], self.half[second] * y
+            across = np.zeros_like(pair)
+            across[0, ..., axis], across[1, ..., axis] = -1.0, 1.0
+            area = (self.half[first] * self.half[second] * np.outer(wide, tall)).ravel()
+            places.append(pair.reshape(-1, 3))
+            normals.append(across.reshape(-1, 3))
+            areas += [area, area]
+        return np.concatenate(places), np.concatenate(normals), np.concatenate(areas)
 
     def _face(self, axis: int, side: int, places: Array) -> tuple[list[int], Array, Array, tuple[int, int]]:
         """A face's axes and normal as an order, places as it sees them, its half edges, and its counts of nodes."""
@@ -240,26 +250,23 @@ class _BoxSurface(Surface):
         return result
 
     def _fewer(self, count: int) -> tuple[Array, Array, Array]:
-        x, _ = gauss_legendre(count)
-        places, normals, shares = [], [], []
-        along = [_from_gauss(graded(nodes)[0], count) for nodes in self.counts]
-        for axis, side in self.numbers:
-            places.append(self._grid(axis, side, x, x))
-            normals.append(np.broadcast_to(side * np.eye(3)[axis], places[-1].shape))
+        places, normals, _ = self._faces([gauss_legendre(count)] * 3)
+        along = [_from_gauss(nodes, count) for nodes in self.counts]
+        shares = np.zeros((len(self.places), len(self.numbers), count**2))
+        for face, ((axis, _), numbers) in enumerate(self.numbers.items()):
             first, second, _ = self._order(axis)
             # a face's nodes by its places: the product of both edges' polynomials
-            shares.append(np.einsum("ia,jb->ijab", along[first], along[second]).reshape(-1, count**2))
-        return np.concatenate(places), np.concatenate(normals), np.asarray(scipy.linalg.block_diag(*shares))
+            shares[numbers.ravel(), face] = np.einsum("ia,jb->ijab", along[first], along[second]).reshape(-1, count**2)
+        return places, normals, shares.reshape(len(shares), -1)
 
     def refined(self, charges: Array) -> tuple[Array, Array]:
-        places, amounts = [], []
-        for (axis, side), numbers in self.numbers.items():
-            counts = [self.counts[k] for k in self._order(axis)[:2]]
-            (x, wide), (y, tall) = (graded(MORE * n) for n in counts)
-            places.append(self._grid(axis, side, x, y))
-            between = _lagrange(x, counts[0]) @ charges[numbers] @ _lagrange(y, counts[1]).T
-            amounts.append((self._area(axis) / 4 * np.outer(wide, tall) * between).ravel())
-        return np.concatenate(places), np.concatenate(amounts)
+        rules, amounts = [graded(MORE * n) for n in self.counts], []
+        between = [_lagrange(x, n) for (x, _), n in zip(rules, self.counts, strict=True)]
+        for (axis, _), numbers in self.numbers.items():
+            first, second, _ = self._order(axis)
+            amounts.append((between[first] @ charges[numbers] @ between[second].T).ravel())
+        places, _, areas = self._faces(rules)
+        return places, areas * np.concatenate(amounts)
 
     def rows_nearby(self, places: Array, normals: Array) -> Array:
         result = np.empty((len(places), len(self.places)))
@@ -307,7 +314,7 @@ class _RoundSurface(Surface):
 
     def _fewer(self, count: int) -> tuple[Array, Array, Array]:
         few = _RoundSurface(self.body, count, gauss_legendre(count))
-        along = scipy.linalg.block_diag(*[_from_gauss(graded(self.count)[0], count)] * len(self.lines))
+        along = scipy.linalg.block_diag(*[_from_gauss(self.count, count)] * len(self.lines))
         return few.places, few.normals, np.kron(along, _around(np.pi * np.arange(2 * self.count) / self.count, count))
 
     def rows_nearby(self, places: Array, normals: Array) -> Array:

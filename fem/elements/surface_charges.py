@@ -1,10 +1,10 @@
 """Charges on the surfaces of permeable magnets that respond to each other; see `surface` for one of them.
 
 What bodies of one shape are to each other depends on how they lie: pairs that lie alike, as most in a ring or a row do,
-have one matrix.
+have one matrix. A body and itself are such a pair, too.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -24,6 +24,9 @@ from .surface import FEW, INSET, SURFACES, far_rows
 DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and fields otherwise at once
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
 SOLVED_BY_FEW = 1e-4  # the same of few nodes, whose own errors of B are thirty times what it does
+# Nodes and χ up to which it is left out what charges induce in each other: χ of their field at most, which is less than
+# so few nodes' own error, a tenth to a third of it, or about that
+ROUGH, SLIGHT = 5, 0.12
 TURNS = 25  # of magnets' responses to each other; with χ up to 1/2 they settle to that in fewer
 PAIRS = 1 << 15  # of a charge and a place at once, so that they stay in the processor's cache
 # Distances of two bodies' centres, in the sum of their circumradii, from which on the few places of `Surface.coarse` on
@@ -91,14 +94,14 @@ class SurfaceCharges:
         """How the bodies see each other; pairs that lie alike are one way."""
         found, shapes = list[_View](), list(enumerate(map(np.array, self._shapes)))
         for far, (seer, first), (seen, second) in product(range(len(FAR) + 1), shapes, shapes):
-            there = (self._distance[np.ix_(first, second)] == far) & np.not_equal.outer(first, second)
-            if not there.any():
+            targets, sources = np.nonzero(self._distance[first[:, None], second] == far)
+            if not targets.size:
                 continue
-            ways, (targets, sources) = dict[bytes, list[int]](), np.nonzero(there)
             back = self._turns[second[sources]].swapaxes(1, 2)
             away = self._centers[first[targets]] - self._centers[second[sources]]
             away, turned = np.einsum("pij,pj->pi", back, away), back @ self._turns[first[targets]]
             poses = np.concatenate([away / self._bodies[seen].circumradius, turned.reshape(-1, 9)], axis=1)
+            ways = dict[bytes, list[int]]()
             for number, pose in enumerate(np.round(poses / ALIKE).astype(int)):
                 ways.setdefault(pose.tobytes(), []).append(number)
             pairs, one = [(targets[way], sources[way]) for way in ways.values()], [way[0] for way in ways.values()]
@@ -110,15 +113,16 @@ class SurfaceCharges:
     def _few(self, far: int, shape: int) -> tuple[Array, Array, Array | None]:
         """Places and normals of a shape that do at a distance, and the nodes' values by those; None: they are all."""
         surface = self._surfaces[shape]
-        return surface.coarse[far - 1] if far else (surface.places, surface.normals, None)
+        return surface.coarse(far) if far else (surface.places, surface.normals, None)
 
     @cached_property
-    def _rows(self) -> list[Array]:
-        """(ways, k, l) n·h (T) at each view's places, by the nodes' charges or, from afar, by charges times areas."""
+    def _rows(self) -> list[list[Array]]:
+        """(k, l) n·h (T) at each view's places, by way, by the nodes' charges or, from afar, by charges times areas."""
         found = []
         for view in self._views:
-            surface = self._surfaces[view.seen]
-            places, normals = (some.reshape(-1, 3) for some in (view.places, view.normals))
+            surface, count = self._surfaces[view.seen], view.places.shape[1]
+            other = [view.seer != view.seen or targets[0] != sources[0] for targets, sources in view.pairs]
+            places, normals = (some[other].reshape(-1, 3) for some in (view.places, view.normals))
             if view.far:
                 sources = self._few(view.far, view.seen)[0]
                 rows = far_rows(places, normals, sources, np.ones(len(sources)))
@@ -128,17 +132,18 @@ class SurfaceCharges:
                 rows[~close] = far_rows(places[~close], normals[~close], surface.places, surface.areas)
                 if close.any():
                     rows[close] = surface.rows_nearby(places[close], normals[close])
-            found.append(rows.reshape(*view.places.shape[:2], -1))
+            ways = iter(rows.reshape(-1, count, rows.shape[1]))
+            found.append([next(ways) if away else surface.kernel for away in other])
         return found
 
-    def _applied(self, matrices: Sequence[Array], given: Mapping[tuple[int, int], Array]) -> Array:
-        """(n, c) at all nodes: what `matrices` (ways, k, l) of the views make of what is `given` at what they see.
+    def _applied(self, matrices: Sequence[Iterable[Array]], given: Mapping[tuple[int, int], Array]) -> Array:
+        """(n, c) at all nodes: what `matrices` (k, l) of the views' ways make of what is `given` at what they see.
 
         That is (l, bodies, c), by distance and shape.
         """
         seen, found = dict[tuple[int, int], Array](), np.zeros((len(self.places), next(iter(given.values())).shape[2]))
         for view, ways in zip(self._views, matrices, strict=True):
-            shape = (ways.shape[1], len(self._shapes[view.seer]), found.shape[1])
+            shape = (view.places.shape[1], len(self._shapes[view.seer]), found.shape[1])
             there = seen.setdefault((view.far, view.seer), np.zeros(shape))
             for matrix, (targets, sources) in zip(ways, view.pairs, strict=True):
                 there[:, targets] += _times(matrix, given[view.far, view.seen][:, sources])
@@ -149,9 +154,8 @@ class SurfaceCharges:
 
     def numbers_at(self, count: int) -> float:
         """Of all matrices, with `count` nodes along an edge, about."""
-        own = sum(len(surface.places) ** 2 for surface in self._surfaces)
-        near = sum(rows.size for view, rows in zip(self._views, self._rows, strict=True) if not view.far)
-        return (count / self.count) ** 4 * float(own + near)
+        near = (ways for view, ways in zip(self._views, self._rows, strict=True) if not view.far)
+        return (count / self.count) ** 4 * float(sum(rows.size for ways in near for rows in ways))
 
     def normal_field(self, charges: Array) -> Array:
         """K σ (n, ...) T of charges (n, ...) T."""
@@ -159,11 +163,8 @@ class SurfaceCharges:
         given = {(0, shape): columns[of] for shape, of in enumerate(self._of)}
         for far, shape in {(view.far, view.seen) for view in self._views if view.far}:
             amounts = self._surfaces[shape].areas[:, None, None] * given[0, shape]
-            given[far, shape] = _times(self._surfaces[shape].coarse[far - 1][2].T, amounts)
-        found = self._applied(self._rows, given)
-        for shape, (of, surface) in enumerate(zip(self._of, self._surfaces, strict=True)):
-            found[of] += _times(surface.kernel, given[0, shape])
-        return found.reshape(charges.shape)
+            given[far, shape] = _times(self._surfaces[shape].coarse(far)[2].T, amounts)
+        return self._applied(self._rows, given).reshape(charges.shape)
 
     def refined(self, number: int, charges: Array) -> tuple[Array, Array]:
         """Places (k, 3) m on one of `magnets`, and amounts (k,) T m² there, with the moments of charges (n,) T."""
@@ -218,9 +219,6 @@ class SurfaceCharges:
     def _factors(self) -> tuple[Array, NDArray[np.int32]]:
         """Of (1 + χ/2) - χ K, for many right-hand sides, or where the iteration of `solved` does not converge."""
         whole = np.zeros((len(self.places),) * 2, order="F")  # which is factorised in its place
-        for surface, of in zip(self._surfaces, self._of, strict=True):
-            for mine in of.T:
-                whole[np.ix_(mine, mine)] = surface.kernel
         for view, ways in zip(self._views, self._rows, strict=True):
             left, right = (self._few(view.far, shape)[2] for shape in (view.seer, view.seen))
             for rows, pairs in zip(ways, view.pairs, strict=True):
@@ -239,7 +237,7 @@ class SurfaceCharges:
         return np.asarray((found + found.T) / 2)
 
     def beyond(self, carriers: Sequence[Magnet]) -> Array:
-        """σ (n,) T beyond n·J' of uniform `carriers`, one for each of all magnets."""
+        """σ (n,) T beyond n·J' of uniform `carriers`, one for each of all magnets; see `ROUGH`."""
         others = [one for one, magnet in zip(carriers, self.all, strict=True) if not magnet.contrast]
         kept = [one for one, magnet in zip(carriers, self.all, strict=True) if magnet.contrast]
         uniform = np.array([one.polarization for one in kept])
@@ -249,21 +247,15 @@ class SurfaceCharges:
         given, matrices = dict[tuple[int, int], Array](), []
         for view in self._views:
             places = view.places - INSET * self._bodies[view.seer].size.min() * view.normals
-            matrices.append(self._by_carrier(view.seen, places, view.normals))
+            tensors = demagnetizing_tensor(self._bodies[view.seen], places.reshape(-1, 3)).reshape(*places.shape, 3)
+            matrices.append(np.einsum("...a,...ab->...b", view.normals, tensors))
             given[view.far, view.seen] = uniform[self._shapes[view.seen]].T[..., None]
-        if given:
-            closed += self._applied(matrices, given)[:, 0]
-        right = self.contrast * closed
-        for shape, (numbers, of, surface) in enumerate(zip(self._shapes, self._of, self._surfaces, strict=True)):
-            places = surface.places - INSET * self._bodies[shape].size.min() * surface.normals
-            own = self._by_carrier(shape, places, surface.normals)
-            right[of] += self.contrast[of] * (own @ uniform[numbers].T) + surface.normals @ rest[numbers].T
+        right = self.contrast * (closed + self._applied(matrices, given)[:, 0])
+        for numbers, of, surface in zip(self._shapes, self._of, self._surfaces, strict=True):
+            right[of] += surface.normals @ rest[numbers].T
+        if self.count <= ROUGH and self.contrast.max() <= SLIGHT:
+            return np.asarray(right / (1 + self.contrast / 2))
         return self.solved(right, SOLVED if self.count > FEW else SOLVED_BY_FEW)
-
-    def _by_carrier(self, shape: int, places: Array, normals: Array) -> Array:
-        """(..., 3) n·h at `places` (..., 3) m, with `normals`, by the polarisation of a body; in its frame."""
-        tensors = demagnetizing_tensor(self._bodies[shape], places.reshape(-1, 3)).reshape(*places.shape, 3)
-        return np.asarray(np.einsum("...a,...ab->...b", normals, tensors))
 
 
 def _field(places: Array, amounts: Array, points: Array) -> Array:

@@ -11,7 +11,7 @@ from spinlev.fem.closed_forms.moments import carrier, carriers_of
 from spinlev.fem.closed_forms.uniform import UniformField, remanent_field
 from spinlev.fem.elements import surface_charges
 from spinlev.fem.elements.surface import smooth
-from spinlev.fem.elements.surface_charges import SurfaceCharges
+from spinlev.fem.elements.surface_charges import ROUGH, SurfaceCharges
 from spinlev.fem.rotor.charges import converging, surface_table
 from spinlev.fem.rotor.choice import resolve_model
 from spinlev.fem.rotor.models import (
@@ -125,7 +125,9 @@ def test_expansions_all_over_a_disc_are_its_charges():
     assert 1e-6 < np.max(stated / typical_field((magnet,), points)) < 3e-4
 
 
-@pytest.mark.parametrize("name", ["cube", pytest.param("two that touch", marks=pytest.mark.slow), "cylinder across"])
+@pytest.mark.parametrize(
+    "name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in ROTORS]
+)
 @pytest.mark.parametrize("rtol", [1e-2, 1e-3, 1e-4])
 def test_the_stated_error_is_not_exceeded(name, rtol):
     rotor = ROTORS[name]
@@ -240,7 +242,7 @@ def test_many_round_magnets_stay_small_from_afar():
     surfaces = SurfaceCharges([Magnet(Cylinder(0.5 * EDGE, EDGE, place), ALONG, 1.05) for place in where], 8)
     assert len(surfaces.places) == 30 * 8 * 3 * 16
     # the matrices are no part of what it answers
-    assert sum(rows.size for rows in surfaces._rows) < 1e7
+    assert sum(rows.size for ways in surfaces._rows for rows in ways) < 1e7
     assert surfaces.response((surfaces.normals @ ALONG)[:, None]).any()
 
 
@@ -339,6 +341,21 @@ def test_errors_by_nodes(name):
     else:
         assert errors[2] < 5e-4
         assert errors[-1] < 2e-6 + 2 * stated
+
+
+@pytest.mark.parametrize("name", BY_NODES)
+def test_what_few_nodes_leave_out_is_within_chi_of_the_charges_field(monkeypatch, name):
+    """That is what charges induce in each other; more nodes, or a larger χ, do not leave it out."""
+    rotor = BY_NODES[name]
+    points, scale = (some[::20] for some in error_points(rotor, Accuracy().clearance(rotor)))
+    counts, chi = range(3, ROUGH + 2), max(magnet.contrast for magnet in rotor)
+    rough = [beyond_carriers(rotor, count, points) for count in counts]
+    monkeypatch.setattr(surface_charges, "ROUGH", 0)
+    whole = [beyond_carriers(rotor, count, points) for count in counts]
+    left_out, field = (np.linalg.norm(b, axis=2) / scale for b in (np.subtract(rough, whole), np.array(whole)))
+    part = left_out.max(axis=1) / field.max(axis=1)
+    assert part[-1] == 0.0
+    assert np.all((part[:-1] > 0.05 * chi) & (part[:-1] < chi))
 
 
 @pytest.mark.parametrize("mu", [1.05, 1.5, 3.0])
