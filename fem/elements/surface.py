@@ -155,7 +155,7 @@ class Surface:
         raise NotImplementedError
 
     def coarse(self, far: int) -> tuple[Array, Array, Array]:
-        """Places and normals (k, 3) that stand for all from `far` on, 1 or 2, and the nodes' values (n, k) by theirs."""
+        """Places and normals (k, 3) that stand for all from `far` on, 1 or 2, and nodes' values (n, k) by theirs."""
         if far not in self._coarse:
             self._coarse[far] = self._fewer(min(COARSE[far - 1], max(self.count // 3, 1) + 2 - far))
         return self._coarse[far]
