@@ -32,6 +32,7 @@ PAIRS = 1 << 15  # of a charge and a place at once, so that they stay in the pro
 # Distances of two bodies' centres, in the sum of their circumradii, from which on the few places of `Surface.coarse` on
 # each stand for all. What is charged beyond the carriers has hardly a field there.
 FAR = (1.5, 6.0)
+STRAIGHT = 1e-15  # difference of a turn's entries from 0 or ±1 that is round-off
 ALIKE = 1e-11  # differences of turns, and of places in circumradii, below which two pairs lie alike
 
 
@@ -100,6 +101,8 @@ class SurfaceCharges:
             back = self._turns[second[sources]].swapaxes(1, 2)
             away = self._centers[first[targets]] - self._centers[second[sources]]
             away, turned = np.einsum("pij,pj->pi", back, away), back @ self._turns[first[targets]]
+            plain = np.round(turned)  # a body sees itself unturned to the last digit, which decides beside an edge
+            turned = np.where(np.abs(turned - plain) < STRAIGHT, plain, turned)
             poses = np.concatenate([away / self._bodies[seen].circumradius, turned.reshape(-1, 9)], axis=1)
             ways = dict[bytes, list[int]]()
             for number, pose in enumerate(np.round(poses / ALIKE).astype(int)):
