@@ -8,7 +8,7 @@ from ..dynamics.continuation.branch import OSCILLATORY, REAL
 from ..dynamics.continuation.frequencies import BORDER, CONTACT, nearest_range
 from ..dynamics.equilibria import equilibrium as why
 from ..dynamics.equilibria.equilibrium import MODE_NAMES, STABILITIES, Equilibrium, LeftOut, Survey
-from ..dynamics.flights.trajectory import DRIFTING, GROWING, STABLE, Trajectory, flight_kind
+from ..dynamics.flights.trajectory import DRIFTING, GROWING, LOST_AT_ONCE, STABLE, Trajectory, flight_kind
 from .cli.console import aligned, detail
 from .figures.style import NAMES
 from .levitation import Levitation
@@ -220,7 +220,8 @@ def flight_words(levitation: Levitation, flight: Trajectory) -> str:
         )
     if flight.ended_by in ("contact", "lost"):
         at = "" if flight.given is None else f" at {flight.lost_at_hz:.5g} Hz"
-        return f"Levitated for {time}, then {'contact' if flight.ended_by == 'contact' else 'lost'}{at} ({kind})."
+        how = "" if kind == LOST_AT_ONCE else f" ({kind})"
+        return f"Levitated for {time}, then {'contact' if flight.ended_by == 'contact' else 'lost'}{at}{how}."
     if flight.given is not None:
         return f"Simulated {time}: still levitating at {flight.rate[-1] / (2 * math.pi):.5g} Hz."
     how = {DRIFTING: ", drifting slowly", GROWING: ", with a growing oscillation"}.get(kind, "")

@@ -186,6 +186,7 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
         middle, low, middling, high = np.array(rows).T
         if len(parts) == PARTS:  # next to an end the mean would be of half a motion
             middling[:4] = middling[-4:] = np.nan
+        middling[(middling < low) | (middling > high)] = np.nan  # where all changes faster than it shows
         panel.fill_between(middle, low, high, color=PALETTE[5], alpha=0.6, lw=0, label="smallest to largest")
         panel.plot(middle, middling, color=PALETTE[0], lw=1.0, label="mean")
         panel.axvspan(time[near][0], time[near][-1], color=PALETTE[4], alpha=0.4, lw=0, label="shown in (b) and (d)")
