@@ -54,14 +54,15 @@ class Effort(NamedTuple):
     inner: int  # points along each axis at which magnets beside each other respond beyond their direct response
     corners: bool  # whether places before edges and corners are sampled, or before the faces' middles alone
     poses: int  # at which errors are found, for each gap and magnet beside that at its pole
+    safety: float  # by which the largest of these is multiplied, for the poses that are not looked at
     degrees: float  # part of the sphere's response that the degrees left out may hold, of samples and errors
     series: float  # where that of both bodies' responses ends, relative to its first term
 
 
 # With the weights fitted, few magnets' force and torque are met to 1e-3 of all that is added, many magnets' to 2e-2.
 # With 10 nodes the response of a cube with μr = 1.05 to a dipole errs by at most 7e-4 at any distance, with 14 by 6e-4.
-FEW_MAGNETS = Effort(7.2, 2, 2, (10, 14), 16, 2, True, 2, 3e-4, 1e-5)
-MANY_MAGNETS, MANY = Effort(5.5, 0, 0, (4, 6), 6, 1, False, 1, 1e-3, 1e-4), 4
+FEW_MAGNETS = Effort(7.2, 2, 2, (10, 14), 16, 2, True, 2, 4.0, 3e-4, 1e-5)
+MANY_MAGNETS, MANY = Effort(5.5, 0, 0, (4, 6), 6, 1, False, 2, 5.0, 1e-3, 1e-4), 4
 
 
 def effort(magnets: int) -> Effort:
