@@ -148,10 +148,12 @@ def response(
 ) -> tuple[str, ComplexArray, float, list[str]]:
     """Model, tensor G (3, 3), T/(A m²), laboratory frame, its estimated relative error, and tables from the cache.
 
-    For a dipole at a `place` (3,) m of the laboratory at a `frequency` (Hz), by a `model`: "slab", "fem", "reduced" or
-    "auto", which is the slab where its edges change no more than `rtol`. Raises InputError where the place is not over
-    one of the two largest faces of the `plate`, with the slab.
+    For a dipole at a `place` (3,) m of the laboratory at a `frequency` (Hz), by a `model`: "none", "slab", "fem",
+    "reduced" or "auto", which is the slab where its edges change no more than `rtol`. Raises InputError where the place
+    is not over one of the two largest faces of the `plate`, with the slab.
     """
+    if model == "none":
+        return model, np.zeros((3, 3), complex), 0.0, []
     body, size, turn = plate.box.to_body(place), plate.box.size, plate.box.rotation
     normal = int(np.argmin(size))
     height = abs(body[normal]) - size[normal] / 2

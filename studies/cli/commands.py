@@ -232,7 +232,7 @@ def plate(
     *,
     at: Place,
     frequency_hz: float,
-    model: Literal["slab", "fem", "reduced", "auto"] = "auto",
+    model: options.PlateModel = "auto",
     rtol: float = 1e-3,
     output: Output = Output(),
 ) -> Answer:
@@ -249,7 +249,7 @@ def plate(
     frequency_hz
         Frequency of the dipole, Hz.
     model
-        slab (infinite, exact), fem, reduced (a table around the place), or auto.
+        slab (infinite, exact), fem, reduced (a table around the place), none (no currents, G = 0), or auto.
     rtol
         Relative accuracy of the tensor.
     """
