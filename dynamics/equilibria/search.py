@@ -47,6 +47,8 @@ from .orbits import ForcedMotion, overlap
 
 BEYOND = 0.1  # Part of a floater's weight that multipoles on its axis may leave out; beyond, its whole body tells
 BALANCED = 1e-6  # left of the balance, where an equilibrium is met to round-off
+# Force left over, by the weight, that counts as almost balanced; and so many points of a curve have one that is tried
+ALMOST, EACH = 0.1, 3
 TURNS = 16  # about the moment from which each frequency-locked one is looked for
 STEPS = 60  # of Newton's method at most
 REACH = 0.2  # longest of its steps, in radii and rad
@@ -204,19 +206,27 @@ def _survey_of_any_body(scene: Scene, table: FieldTable, spin: float, rates: Rat
 
 
 def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, rates: Rates) -> list[Equilibrium]:
-    """Frequency-locked equilibria near those of the body's mean, `seeds`, gravity along the axis."""
+    """Frequency-locked equilibria near those of the body's mean, `seeds`, gravity along the axis.
+
+    And near where the mean is almost in balance, as its equilibria end in another fold than the body's.
+    """
     scales, floater = Scales.of(scene), scene.floater
-    if not len(seeds.points):
+    near, weight = [seeds.points], floater.mass * float(scene.gravity[2])
+    for curve in seeds.curves:
+        almost = np.flatnonzero(np.abs(curve.magnetic_force + weight) < ALMOST * -weight)[::EACH]
+        near.append(np.concatenate([curve.position[almost] / scales.length, curve.moment[almost]], axis=1))
+    starts = np.concatenate(near)
+    if not len(starts):
         return []
     values = parameters(scene, scales)
     turns = [rotation_matrix((0.0, 0.0, angle)) for angle in 360 / TURNS * np.arange(TURNS)]
     axes = list[Array]()
-    for moment in seeds.points[:, 3:]:
+    for moment in starts[:, 3:]:
         first, second = tangent_basis(moment[None])[0]
         plain = floater.axes(moment)
         across = np.stack([first, second, moment], axis=1)
         axes += [across @ turn @ across.T @ plain for turn in turns]
-    places = np.repeat(seeds.points[:, :3], TURNS, axis=0)
+    places = np.repeat(starts[:, :3], TURNS, axis=0)
     position, quaternion = locked_poses(rates, values, places, np.array(axes))
     inside = SearchRange(scene).holds(position)
     known, doubts = field_doubts(table, position[inside] * scales.length)

@@ -19,7 +19,6 @@ from spinlev.dynamics.continuation.frequencies import stable_ranges
 from spinlev.dynamics.equilibria import derivatives
 from spinlev.dynamics.equilibria.balance import Balance, solve
 from spinlev.dynamics.equilibria.equilibrium import AVERAGED, LOCKED, EquilibriumError
-from spinlev.dynamics.equilibria.search import locked_poses
 from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.state import Scales
 from spinlev.geometry.scene.contents import Drag
@@ -321,7 +320,7 @@ def test_a_rigid_cube_has_derivatives_of_its_mean():
 
 @pytest.mark.slow
 def test_a_frequency_locked_cuboid_has_a_margin():
-    """It ends where two of its six modes meet, above, and in a fold: against searches, or poses, beside those ends.
+    """It ends where two of its six modes meet, above, and in a fold: against searches beside those ends.
 
     By the numbers of a scene against differences of the margins of others.
     """
@@ -339,12 +338,9 @@ def test_a_frequency_locked_cuboid_has_a_margin():
     here = candidate(whole)
     (low, high), margin = here.ends, here.values("margin")
     assert (low.kind, high.kind) == ("fold", "oscillatory")
-    assert locked(changed(whole, {"frequency_hz": high.parameter - 0.2}))[1]
-    assert not locked(changed(whole, {"frequency_hz": high.parameter + 0.2}))[1]
-    for frequency, count in ((low.parameter + 0.2, 1), (low.parameter - 0.2, 0)):
-        there = changed(whole, {"frequency_hz": frequency})
-        pose = parameters(there, Scales.of(there)), low.state[None, :3], low.orientation[None]
-        assert len(locked_poses(here.levitation.rates, *pose)[0]) == count
+    for end, outwards in ((low, -1), (high, 1)):
+        assert locked(changed(whole, {"frequency_hz": end.parameter - outwards * 0.2}))[1]
+        assert not locked(changed(whole, {"frequency_hz": end.parameter + outwards * 0.2}))[1]
     for key, step, slope in zip(keys, (0.13, 0.01), here.slopes("margin").T, strict=True):
         one, other = (candidate(changed(whole, {key: here.gradient.numbers[key] + s})) for s in (step, -step))
         assert slope == pytest.approx((one.values("margin") - other.values("margin")) / (2 * step), rel=1e-4)
