@@ -183,7 +183,8 @@ def equilibrium_map(
     """All synchronous equilibria with z < 0 over a grid, with their stability; gravity along the axis, no plate.
 
     Raises EquilibriumError: a frequency is zero, or gravity has a part across the axis; InputError: at a frequency the
-    rotor turns too fast for its metal or the floater's, or the floater's moment is along none of its principal axes.
+    rotor turns too fast for its metal or the floater's, the floater's moment is along none of its principal axes, or
+    the tables' effects differ.
 
     Parameters
     ----------
@@ -240,24 +241,28 @@ def map_grid(scenes: Sequence[Scene], tables: Sequence[FieldFormula], frequencie
         mean = columns[-1].floater.mean
         whole = mean_over_turns(columns[-1], table)[2] if mean else with_effects(columns[-1], table)
         rates.append(rates[0].elsewhere(whole) if rates else Rates(whole, optimised=True))
-    scenes = columns
-    row, column = (part.ravel() for part in np.indices((len(frequencies), len(scenes))))
-    points = [replace(scene, frequency=float(f)) for f in frequencies for scene in scenes]
+    row, column = (part.ravel() for part in np.indices((len(frequencies), len(columns))))
+    points = [replace(scene, frequency=float(f)) for f in frequencies for scene in columns]
     values, together = _together(points, [rates[k] for k in column])
     return Grid(
         rates=together,
         values=values,
-        spin=spin * np.array([scenes[k].floater.spin_ratio for k in column]),
-        ranges=[SearchRange(scene, ball=scene.floater.mean) for scene in points[: len(scenes)]],
+        spin=spin * np.array([columns[k].floater.spin_ratio for k in column]),
+        ranges=[SearchRange(scene, ball=scene.floater.mean) for scene in points[: len(columns)]],
         region=column,
         places=np.column_stack([row, column]),
     )
 
 
 def _together(scenes: Sequence[Scene], rates: Sequence[Rates]) -> tuple[Array, Rates]:
-    """Runtime parameters (n, p) of scenes, with the drag along the moment left out, and the rates of all of them."""
+    """Runtime parameters (n, p) of scenes, with the drag along the moment left out, and the rates of all of them.
+
+    Raises InputError: the rates have not one code.
+    """
     values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
     different = list(dict.fromkeys(rates))
+    if any(one.code != different[0].code for one in different):
+        raise InputError("Input tables must all have the same effects, as mutual magnetisation; instead they differ.")
     values[:, Parameter.TABLE] = [different.index(one) for one in rates]
     return values, different[0].among(different) if len(different) > 1 else different[0]
 

@@ -164,6 +164,9 @@ def test_what_has_no_map_says_so():
     copper = replace(scenes[0], floater=replace(PERMEABLE, conductivity=5.8e7))
     with pytest.raises(InputError, match=r"floater.conductivity_S_m must leave its skin depth large"):
         equilibrium_map([copper], tables, [50.0, 400.0])
+    metal = replace(scenes[0], floater=replace(PERMEABLE, conductivity=6.7e5))
+    with pytest.raises(InputError, match="tables must all have the same effects"):
+        equilibrium_map([*scenes, metal], tables * 2, [100.0])
     conducting = replace(scenes[0], rotor=tuple(replace(m, conductivity=6e7) for m in scenes[0].rotor))
     with pytest.raises(InputError, match="must leave its skin depth large"):
         equilibrium_map([conducting], tables, [110.0])
