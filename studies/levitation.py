@@ -21,6 +21,7 @@ from ..dynamics.motion.plate import PlateMemory
 from ..dynamics.motion.rates import Rates, code_of
 from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..dynamics.motion.state import Scales
+from ..fem.cache import key_of
 from ..fem.mutual.making import cached_mutual_table, mutual_key
 from ..fem.mutual.table import MutualTable
 from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
@@ -206,7 +207,7 @@ class Levitation:
         """The equations of motion in the rotor's field, compiled."""
 
         def made() -> Rates:
-            first = self._tables.once(f"{code_of(self.interaction)}", lambda: Rates(self.interaction))
+            first = self._tables.once(f"code {code_of(self.interaction)}", lambda: Rates(self.interaction))
             return first.elsewhere(self.interaction)
 
         return self._tables.once(f"rates {self.equations_key}", made)
@@ -420,6 +421,12 @@ class Levitation:
             return quiet.equilibria
         return with_plate(quiet.still, quiet.interaction, quiet.without_plate, self.wider, quiet.rates).equilibria
 
+    def _decides_flight(self, duration: float, plate: PlateMemory | None) -> tuple[Any, ...]:
+        """All that decides a trajectory over a `plate`: tables by their inputs, as their last bits are of one run."""
+        tables = self.equations_key, key_of("equilibria", self.spin)
+        of_plate = (plate.model, plate.table.region, self.requested_plate and self.requested_plate.key) if plate else ()
+        return self.scene, duration, self.models, *tables, *of_plate
+
     def flight(self, duration: float, checkpoint: Checkpoint | None = None, cached: bool = False) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
 
@@ -450,8 +457,7 @@ class Levitation:
             with progress("Motion") as bar:
                 how: dict[str, Any] = {"progress": bar, "memory": plate, "checkpoint": checkpoint}
                 fly = partial(simulate, self.scene, table, duration, known, **how)
-                decisive = self.scene, table, duration, known, plate
-                simulated = FLIGHTS.cached(decisive, fly, note)[0] if cached else fly()
+                simulated = FLIGHTS.cached(self._decides_flight(duration, plate), fly, note)[0] if cached else fly()
             left = simulated.left_plate_table
             beyond = left and self.follow(simulated.lab.position[-1:], simulated.time[-1:])
             if not beyond and (left or not self._plate_matters(simulated)):

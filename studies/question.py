@@ -37,6 +37,7 @@ def _find_together(members: Sequence[tuple[Levitation, tuple[int, ...]]]) -> Non
     for one, place in members:
         with suppress(SpinlevError):
             check_coils(one.scene)
+            one.interaction  # noqa: B018  # equations are shared, the limits of what acts in each scene are not
             key = f"{startless_text(one.scene)} {one.spin!r}"
             chosen += [] if key in same else [(one, one.rates, place)]
             same.setdefault(key, []).append(one)

@@ -47,7 +47,8 @@ from .orbits import ForcedMotion, overlap
 
 BEYOND = 0.1  # Part of a floater's weight that multipoles on its axis may leave out; beyond, its whole body tells
 BALANCED = 1e-6  # left of the balance, where an equilibrium is met to round-off
-# Force left over, by the weight, that counts as almost balanced; and so many points of a curve have one that is tried
+# Force left over, by the weight, that counts as almost balanced, and so many points of a curve have one that is tried:
+# of a cuboid of 6 x 10 x 14 mm all locked equilibria from the fold on are found, with the least force alone not all
 ALMOST, EACH = 0.1, 3
 TURNS = 16  # about the moment from which each frequency-locked one is looked for
 STEPS = 60  # of Newton's method at most

@@ -103,6 +103,7 @@ class Trajectory:
         return (self.lab if self.pose is None else self.lab.brought_back(*self.pose)).to_rotor(self.angle)
 
 
+# All that are kept have so many bytes at most
 FLIGHTS = TableKind("flight", Trajectory, "Trajectory of a floater", most=2**27)
 
 

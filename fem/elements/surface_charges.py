@@ -24,8 +24,8 @@ from .surface import FEW, INSET, SURFACES, far_rows
 DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and fields otherwise at once
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
 SOLVED_BY_FEW = 1e-4  # the same of few nodes, whose own errors of B are thirty times what it does
-# Nodes and χ up to which it is left out what charges induce in each other: χ of their field at most, which is less than
-# so few nodes' own error, a tenth to a third of it, or about that
+# Nodes and χ up to which what charges induce in each other is left out: χ of their field at most, which is a tenth of
+# so few nodes' own error to about as much
 ROUGH, SLIGHT = 5, 0.12
 TURNS = 25  # of magnets' responses to each other; with χ up to 1/2 they settle to that in fewer
 PAIRS = 1 << 15  # of a charge and a place at once, so that they stay in the processor's cache

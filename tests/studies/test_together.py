@@ -50,9 +50,11 @@ def test_many_points_have_what_each_has_alone(varied):
 def test_a_point_too_fast_for_its_floaters_metal_is_refused_beside_its_neighbours():
     """Equations are shared, their limits are not."""
     copper = replace(SCENE, floater=replace(SCENE.floater, conductivity=5.8e7))
-    asked, points = question(frequency_hz=[100.0, 120.0, 200.0])
+    asked, points = question(frequency_hz=[100.0, 105.0, 110.0, 200.0])
+    *others, last = replace(asked, scene=copper).prepared(points)
+    assert [str(job()["found_by"].values[0]) for job in others] == ["search", "neighbours", "search"]
     with pytest.raises(sl.InputError, match=r"floater.conductivity_S_m must leave its skin depth large against it"):
-        [job() for job in replace(asked, scene=copper).prepared(points)][-1]
+        last()
 
 
 def test_points_that_cannot_be_prepared_are_computed_alone(caplog):
