@@ -54,9 +54,12 @@ PLATE_TOLERANCE = 1e-12
 # A step's error is relative to the largest of states and events: 250 and more by the event of loss, 3 in a ball.
 # Measured: in a ball J drifts by 3e-14 in 1100 turns at 3e-14, and by 2e-14 in the table's field at 1e-16.
 LOOSER = 300
-# Of a body that is not round, whose multipoles turn several times as fast as it: J drifts by 2e-14 in 26 turns, in 1.2
-# times less time.
-ROUGHER = 10
+# The same of a body that is not round. Taylor's order follows from it alone, 18: in 10 s of a cube J drifts by 3e-14 to
+# 3e-13; by up to 2e-12 at 17 and 16, as what is left out comes in odd and even orders, and the odd ones nearly cancel.
+LOOSER_BODY = 100
+# An event of this size that never happens, in a ball of such a body: steps' errors are relative to it, so that they are
+# a sixth longer than by the states' size, and take what those of order 16 took by that.
+SIZE = 50.0
 # Of the compiler. Measured: more takes twice as long to compile, and the code is not faster, but often slower.
 OPTIMISATION = 1
 # Of a body that is not round in a ball: a cube's step takes 8 % less, and compilation 0.4 instead of 0.3 s.
@@ -136,7 +139,8 @@ class Flight:
 
     def step_error(self, degree: int) -> float:
         """Relative error of a step in balls of a kind, or, 0, in the table's own field."""
-        return self._tolerance * (LOOSER if degree else 1) * (ROUGHER if self.whole.turning and degree else 1)
+        looser = LOOSER_BODY if self.whole.turning else LOOSER
+        return self._tolerance * (looser if degree else 1)
 
     def part(self, degree: int) -> Part:
         """The compiled motion in balls of a kind, or, 0, in the table's own field."""
@@ -178,6 +182,8 @@ class Flight:
         if degree:
             away = ball.offset([given[Parameter.LENGTH] * x for x in position])  # as the field has it
             events = [(1.0 - hy.sum([a * a for a in away]), LEFT)]
+            if whole.turning:
+                events.append((SIZE + equations.variables[6], LEFT))  # no number may be one; a part of a unit vector
         else:
             events = flight_events(self.scene, position, turn)
         return equations, events if self.memory is None else [*events, *range_events(self.memory, position, turn)]

@@ -34,11 +34,9 @@ from ..motion.state import Parameter, Scales, State, Vector, add, cross, dot, ro
 from .balls import DEGREE
 from .flight import (
     LEFT,
-    LOOSER,
     MOST_SAMPLES,
     OPTIMISATION,
     SHORT_TURNS,
-    TOLERANCE,
     Course,
     Flight,
     StartError,
@@ -219,7 +217,7 @@ class JointFlight:
                 hy.taylor_adaptive,
                 [*zip(variables, rates, strict=True), (hy.expression("work"), power)],
                 np.zeros(len(variables) + 1),
-                tol=TOLERANCE * (LOOSER if all(degrees) else 1),
+                tol=min(flight.step_error(degree) for flight, degree in zip(self.flights, degrees, strict=True)),
                 compact_mode=True,
                 opt_level=OPTIMISATION if self.scene.fastest * self.duration > SHORT_TURNS else 0,
                 t_events=[hy.t_event(each, direction=falling) for each, _ in events],
