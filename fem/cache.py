@@ -55,7 +55,7 @@ FORMATS = {
     "floating": 2,
     "floating-free": 1,
     "equilibria": 17,
-    "flight": 2,
+    "flight": 3,
     "experiment": 3,
     "code": 1,
 }
