@@ -50,7 +50,7 @@ def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
     At `points` (n, 3) m, as of `error_points`, their table is to hold with an `accuracy`.
     """
     permeable = [magnet for magnet in magnets if magnet.contrast]
-    if any(isinstance(magnet.body, Part) for magnet in permeable):
+    if any(isinstance(magnet.body, Part) for magnet in magnets):  # nor has it a closed form, where μr = 1
         return "one is a part from a STEP file"
     if not all(bears_charges(magnet) for magnet in permeable):
         return "one has two permeabilities"

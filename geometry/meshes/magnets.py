@@ -11,6 +11,7 @@ bodies need not be one of their polarisation. Any polarisation is the sum of par
 
 from __future__ import annotations
 
+import pickle
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -110,14 +111,41 @@ def mesh_magnets(
     files = sorted({body.file.name for body in bodies if isinstance(body, Part)})
     given = magnets, bodies, center, unit, settings, planes
     if not files:
-        mesh = _meshed(*given)
+        mesh = _finished(_meshed(*given), bodies, settings)
     else:  # on the shape of a part the mesher may crash
         sys.modules["ngsolve.comp"] = ng.comp  # where pickle looks for the class of a mesh: else for a file
         try:
-            mesh = call_apart(LONGEST, _meshed, *given)
+            mesh = call_apart(LONGEST, _meshed_apart, *given)
         except LostError as error:
             raise unmeshed(error, ", ".join(files)) from None
+        if _layered(bodies, settings):
+            mesh = _finished(mesh, bodies, settings)
     return MagnetMesh(mesh, frozen_array(center, (3,)), unit, magnets, settings.ball_radius, planes)
+
+
+def _meshed_apart(*given: Any) -> Any:
+    """The mesh of `_meshed`, finished; with layers as it was before, as pickle loses what elements they were cut from.
+
+    Then a copy is finished, to crash here if it does.
+    """
+    mesh, (_, bodies, _, _, settings, _) = _meshed(*given), given
+    if _layered(bodies, settings):
+        _finished(pickle.loads(pickle.dumps(mesh)), bodies, settings)
+        return mesh
+    return _finished(mesh, bodies, settings)
+
+
+def _layered(edges_of: Sequence[Solid], settings: MeshSettings) -> bool:
+    """Whether there are layers of elements, at the edges of all bodies that are no parts from files."""
+    return bool(settings.hp_layers) and not all(isinstance(body, Part) for body in edges_of)
+
+
+def _finished(mesh: Any, edges_of: Sequence[Solid], settings: MeshSettings) -> Any:
+    """A mesh of `_meshed` with its layers, and curved."""
+    if _layered(edges_of, settings):
+        mesh.RefineHP(settings.hp_layers, settings.hp_factor)
+    mesh.Curve(settings.curve_order)
+    return mesh
 
 
 def _meshed(
@@ -128,7 +156,7 @@ def _meshed(
     settings: MeshSettings,
     planes: tuple[int, ...],
 ) -> Any:
-    """The mesh of `mesh_magnets`, in `unit` from `center`; at the edges of `edges_of` elements are small."""
+    """The mesh of `mesh_magnets`, in `unit` from `center`, without layers; at edges of parts elements are small."""
     lower = [0.0 if axis in planes else -LARGE for axis in range(3)]
     kept = occ.Box(occ.Pnt(*lower), occ.Pnt(LARGE, LARGE, LARGE))
     air = occ.Sphere(occ.Pnt(0, 0, 0), settings.ball_radius)
@@ -150,8 +178,7 @@ def _meshed(
                 face.name = f"plane{axis}"
     bodies = [moved(body, body.center - center) for body in edges_of]
     parts = [body for body in bodies if isinstance(body, Part)]
-    layered = settings.hp_layers and len(parts) < len(bodies)
-    if layered:
+    if _layered(bodies, settings):
         _mark_singular(shape, bodies, unit)
     for edge, part in product(shape.edges, parts):
         # where faces of a part meet at an angle
@@ -167,9 +194,6 @@ def _meshed(
             raise
         files = ", ".join(sorted({part.file.name for part in parts}))
         raise MeshError(f"The mesher gives up {files}: {error}. {SIMPLER}") from None
-    if layered:
-        mesh.RefineHP(settings.hp_layers, settings.hp_factor)
-    mesh.Curve(settings.curve_order)
     return mesh
 
 

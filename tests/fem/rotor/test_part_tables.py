@@ -32,6 +32,8 @@ from spinlev.geometry.step_file import _refuse_open, _roots, read_part
 
 TURN = rotation_matrix((25.0, -40.0, 10.0))
 NEAREST = 6e-3
+# The cuboids of the L
+SIZES, MIDDLES = ((5e-3, 10e-3, 10e-3), (5e-3, 5e-3, 10e-3)), ((-2.5e-3, 0.0, 0.0), (2.5e-3, -2.5e-3, 0.0))
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +120,7 @@ def test_a_permeable_cube_from_a_file_is_the_cube_by_key(folder):
 def test_a_part_of_no_known_shape_is_the_sum_of_its_cuboids(folder):
     """μr = 1: an L of two cuboids has the field of both, within the stated error, 1e-6 from 6 mm off the cuboids on."""
     part = placed(folder / "ell.step", TURN)
-    sizes, middles = ((5e-3, 10e-3, 10e-3), (5e-3, 5e-3, 10e-3)), ((-2.5e-3, 0.0, 0.0), (2.5e-3, -2.5e-3, 0.0))
-    boxes = [Box(s, part.center + TURN @ np.array(m), TURN) for s, m in zip(sizes, middles, strict=True)]
+    boxes = [Box(s, part.center + TURN @ np.array(m), TURN) for s, m in zip(SIZES, MIDDLES, strict=True)]
     pair = tuple(Magnet(box, (1.2, 0.0, 0.5)) for box in boxes)
     assert known_shape(part) is None
     assert part.volume == pytest.approx(sum(box.volume for box in boxes), rel=1e-9)
@@ -129,6 +130,31 @@ def test_a_part_of_no_known_shape_is_the_sum_of_its_cuboids(folder):
     print(f"an L from a file against its two cuboids: {np.max(apart / scale):.1e}")
     assert np.all(apart < ell.absolute_error(points)[0] + 2e-11 * scale)  # round-off of 2400 moments
     assert np.max(apart / scale) < 1e-6
+
+
+@pytest.mark.parametrize("permeability", [1.0, pytest.param(1.05, marks=pytest.mark.slow)])
+def test_a_part_beside_a_permeable_magnet_has_its_field(folder, permeability):
+    """An L beside a cube against its two cuboids beside it, each to 1e-3; `auto` had left out a rigid L.
+
+    The cube has layers of elements at its edges, which the process that meshes parts had lost.
+    """
+    part = read_part(folder / "ell.step")
+    whole, *pair = (
+        Magnet(body, (1.2, 0.0, 0.5), permeability)
+        for body in (part, *(Box(s, part.center + m) for s, m in zip(SIZES, MIDDLES, strict=True)))
+    )
+    cube = Magnet(Box((4e-3,) * 3, part.center + np.array([0.0, 0.0, 8e-3])), (0.0, 0.0, 1.3), 1.05)
+    points, scale = error_points((*pair, cube), NEAREST)
+    one, other = (rotor_table((*rotor, cube), "auto", 1e-3, NEAREST) for rotor in ([whole], pair))
+    apart = np.linalg.norm(one.evaluate(points)[0] - other.evaluate(points)[0], axis=1)
+    assert one.model == "fem"
+    assert np.max(apart / scale) < 2e-3  # of two tables
+
+
+def test_charges_on_surfaces_describe_no_rigid_part(folder):
+    """It had no field at all."""
+    with pytest.raises(InputError, match=r"one is a part from a STEP file\. Choose --model fem"):
+        rotor_table((Magnet(read_part(folder / "ell.step"), (1.2, 0.0, 0.5)),), "surface", 1e-3)
 
 
 def test_distances_are_those_of_the_solid(folder):
