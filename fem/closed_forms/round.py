@@ -24,6 +24,7 @@ import numpy as np
 
 from ...geometry.common import Array
 from ...geometry.shapes import Cylinder, Sphere
+from ..compiled_code import compiled
 from ..harmonics.expressions import differentiated, whole_gradient
 from ..harmonics.solid import FOUR_PI, entries, gauss_legendre
 
@@ -169,7 +170,7 @@ def _half_kernel(slopes: bool) -> Any:
         u_slope, v_slope = cubes[1] - cubes[0], below * cubes[1] - above * cubes[0]
         outputs += [wc * (p + dx * dx * steep), wc * (p + dy * dy * steep)]
         outputs += [wc * dx * u_slope, ws * dy * u_slope, wc * v_slope]
-    return hy.cfunc(outputs, variables)
+    return compiled(hy.cfunc, outputs, variables)
 
 
 Expression = Any  # A heyoka expression
@@ -233,7 +234,7 @@ def _outside_kernel(order: int) -> Any:
     outputs = _straight_segment(variables[:3], segment)
     known = dict(zip(entries(2), outputs[3:], strict=True))
     outputs += differentiated(known, variables[:3], order)
-    return hy.cfunc(outputs[: order * (order + 2)], variables, fast_math=True)
+    return compiled(hy.cfunc, outputs[: order * (order + 2)], variables, fast_math=True)
 
 
 def _segments(body: Cylinder, polarization: Array) -> Array:

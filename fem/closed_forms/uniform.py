@@ -30,6 +30,7 @@ from ...geometry.common import MU_0, Array, InputError
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part, Solid, moved, of_one_shape
+from ..compiled_code import compiled
 from ..harmonics.expansion import MultipoleExpansion, turned_expressions, turned_field, uniform_moments
 from ..harmonics.expressions import FieldExpressions, differentiated
 from ..harmonics.solid import FOUR_PI, contracted, entries, tensors, turned_entries
@@ -152,7 +153,7 @@ def _box_kernel(order: int) -> Any:
     second, third = _box_tensors(_Corners(variables[:3], variables[3:]), range(3))
     known = {each: third[each] for each in entries(3)}
     outputs = [*(second[each] for each in ALL), *known.values(), *differentiated(known, variables[:3], order + 1)]
-    return hy.cfunc(outputs, variables, fast_math=True)
+    return compiled(hy.cfunc, outputs, variables, fast_math=True)
 
 
 def _from_kernel(polarization: Array, rotation: Array, order: int) -> Array:

@@ -1,5 +1,6 @@
 """Compiled code on disk: found again by what was compiled and for what, bounded, and never run when damaged."""
 
+import ast
 import os
 import pickle
 import struct
@@ -11,6 +12,7 @@ from pathlib import Path
 import heyoka as hy
 import numpy as np
 import pytest
+from places import modules
 
 from spinlev.fem import cache, compiled_code
 from spinlev.fem.cache import make_room
@@ -104,6 +106,18 @@ def test_heyokas_settings_stay_those_of_the_user_and_it_keeps_nothing_by_itself(
         compiled(refused, [1.25])
     assert settings() == before
     assert hy.llvm_state.get_memcache_size() == 0
+
+
+def test_nothing_is_compiled_but_by_the_module_that_keeps_code():
+    """heyoka would keep it by itself, in a database without checksums, and run what it finds there."""
+    kinds = {"cfunc", "taylor_adaptive", "taylor_adaptive_batch"}
+    calls = {
+        path.name
+        for path, tree in modules().items()
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute) and call.func.attr in kinds
+    }
+    assert calls == {"compiled_code.py"}
 
 
 def test_each_expression_has_its_place_in_the_name(folder):
