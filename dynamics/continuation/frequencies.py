@@ -33,7 +33,7 @@ from .map import surveys
 
 UNIT = 50.0  # Hz over which the equilibrium moves by about a radius of the floater
 SLOWEST = 10.0  # Branches are followed down to this frequency, Hz: all of the article's rotors have their fold above it
-REACH = (8e-3, 0.15)  # Distances on the axis between which the attraction is looked at, m
+REACH = (8 / 6.35, 150 / 6.35)  # Distances on the axis between which the attraction is looked at, floater's radii
 LOWEST, HIGHEST = 25.0, 400.0  # Frequencies between which is looked for ranges of stability, Hz
 # Ends of a range beside those that `follow_branch` marks: the floater touches the rotor; nobody looked beyond.
 CONTACT, BORDER = "contact", "border"
@@ -109,13 +109,13 @@ def hanging_distance(scene: Scene, table: FieldTable) -> float:
     def excess(distance: float) -> float:
         return scene.floater.moment * float(table.evaluate([[0.0, 0.0, -distance]])[1][0, 2, 2]) - weight
 
-    grid = np.geomspace(*REACH, 60)
+    grid = scene.floater.radius * np.geomspace(*REACH, 60)
     nearest = next((d for d in grid if table.in_range([[0.0, 0.0, -d]])[0]), grid[-1])
     grid = grid[grid >= nearest]
     above = [k for k, d in enumerate(grid) if excess(d) > 0]
     if not above or above[-1] == len(grid) - 1:
         raise EquilibriumError(
-            f"Nowhere from {1e3 * nearest:.3g} to {1e3 * REACH[1]:.3g} mm does the attraction carry the weight."
+            f"Nowhere from {1e3 * nearest:.3g} to {1e3 * grid[-1]:.3g} mm does the attraction carry the weight."
         )
     return float(scipy.optimize.brentq(excess, grid[above[-1]], grid[above[-1] + 1]))
 

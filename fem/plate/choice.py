@@ -25,6 +25,7 @@ RASTER = 0.001  # Bounds of regions are multiples of this, m, so that scenes tha
 # So are centres of those about an equilibrium of this, with odd halves: with `REACH` to each side all that are nearest
 # to one centre share a table.
 CENTERS = 0.004
+USUAL = 0.00635, 0.027  # The three lengths are for about this radius and distance of the floater, m: the article's
 # Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold.
 LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
 # How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
@@ -112,14 +113,15 @@ def plate_around(
     place : (3,) m, in the frame that turns with the rotor
     radius, frequency : of the floater, m, and of the rotor, Hz
     rtol : relative accuracy
-    region : in the frame of the plate, where the floater may be; left out, `REACH` about the place, all the way down
+    region : in the frame of the plate, where the floater may be; left out, near the place, all the way down
     """
     if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
         plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
     if region is None:
-        sideways = float(np.hypot(place[0], place[1])) + REACH
-        region = reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, REACH], radius)
-        region = _rastered(region, plate, radius, shared=True)
+        reach = REACH * _size(radius, place)
+        sideways = float(np.hypot(place[0], place[1])) + reach
+        region = reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, reach], radius)
+        region = _rastered(region, plate, radius, _size(radius, place))
     highest = HIGHEST * 2.0 ** max(0, math.ceil(math.log2(HARMONICS * max(frequency, 1.0) / HIGHEST) - 1e-9))
     return PlateAround(plate, table, region, (LOWEST, highest), rtol, model == "slab")
 
@@ -198,22 +200,35 @@ def rotor_nearby(
     table: RotorTable, rotor: tuple[Magnet, ...], place: tuple[float, ...], radius: float, rtol: float
 ) -> RotorTable:
     """The rotor's table with coefficients that count for `rtol`, `REACH` nearer than `place` (3,) m or `radius` on."""
-    gap = min(float(magnet.body.distance(place)) for magnet in rotor) - REACH
+    gap = min(float(magnet.body.distance(place)) for magnet in rotor) - REACH * _size(radius, place)
     return shortened_table(table, Accuracy(rtol, max(gap, radius)))
 
 
-def _rastered(region: Region, plate: Plate, radius: float, shared: bool = False) -> Region:
-    """The region on the raster, `SKIN` radii (m) off the face, made symmetric if nearly so; to be `shared` or not."""
-    lower, upper = np.floor(region.lower / RASTER + 1e-6), np.ceil(region.upper / RASTER - 1e-6)
+def _size(radius: float, place: ArrayLike) -> float:
+    """Of a scene, by its floater's radius and place, m: a power of two, so that neighbours share a table.
+
+    A small floater far from its rotor moves as far as another, and a far one no farther.
+    """
+    ratios = radius / USUAL[0], float(np.linalg.norm(place)) / USUAL[1], 1.0
+    return 2.0 ** round(math.log2(sorted(ratios)[1]))
+
+
+def _rastered(region: Region, plate: Plate, radius: float, shared: float | None = None) -> Region:
+    """The region on the raster, `SKIN` radii (m) off the face, made symmetric if nearly so.
+
+    It is `shared` by neighbours in a scene of this size.
+    """
+    raster = RASTER * (shared or 1.0)
+    lower, upper = np.floor(region.lower / raster + 1e-6), np.ceil(region.upper / raster - 1e-6)
     if shared:
         step = CENTERS / RASTER
-        middle = step * np.round(region.center / CENTERS)
+        middle = step * np.round(region.center / (step * raster))
         half = 2 * np.ceil((np.maximum(upper - middle, middle - lower) - 1) / 2) + 1
         lower, upper = middle - half, middle + half
     for axis in np.flatnonzero((lower < 0) & (upper > 0)):
         upper[axis] = max(-lower[axis], upper[axis])
         lower[axis] = -upper[axis]
-    lower, upper = lower * RASTER, upper * RASTER
+    lower, upper = lower * raster, upper * raster
     for center, size in plate.body.blocks:  # a thin one may be within the raster: the region itself says where it is
         facing = int(np.argmax(np.maximum(region.lower - center, center - region.upper) - size))
         above = bool(region.center[facing] > center[facing])

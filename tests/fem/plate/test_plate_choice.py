@@ -56,7 +56,21 @@ def test_the_region_over_a_thin_plate_is_at_the_floaters_side(side, gap):
     assert found.lower[2] < place[2] < found.upper[2]
     assert side * found.center[2] > 0
     nearest = (found.lower if side > 0 else -found.upper)[2]
-    assert 5e-4 <= nearest <= 5e-4 + radius  # but not in the plate
+    assert 5e-4 <= nearest <= 5e-4 + max(radius, gap)  # but not in the plate
+
+
+@pytest.mark.parametrize("ratio", [1 / 8, 1 / 2, 4.0])
+def test_the_region_has_the_size_of_the_scene(ratio):
+    """With 3 mm about a floater of a third of the article's, a plate's table took three times as long to make."""
+
+    def region(size):
+        plate = Plate(Box((0.1 * size, 0.24 * size, 0.03 * size), (0.0, 0.0, -0.052 * size)), 3.5e7)
+        return plate_around(
+            plate, "reduced", None, size * np.array([1e-3, 0.0, -0.026]), 6e-3 * size, 100.0, 1e-2
+        ).region
+
+    whole, scaled = region(1.0), region(ratio)
+    np.testing.assert_allclose([scaled.lower, scaled.upper], ratio * np.array([whole.lower, whole.upper]), rtol=1e-12)
 
 
 def test_as_asked_or_nothing_to_model():
