@@ -198,7 +198,10 @@ class OuterValues:
 
     def __init__(self, degree: int, points: Array) -> None:
         """Up to a `degree` at `points` (n, 3)."""
-        self._values = _outer_harmonics(degree, np.ascontiguousarray(points.T))
+        step = _block(degree)
+        parts = [points[start : start + step] for start in range(0, max(len(points), 1), step)]
+        values = [_outer_harmonics(degree, np.ascontiguousarray(some.T)) for some in parts]
+        self._values = np.concatenate(values, axis=1)
 
     def sums(self, coefficients: Coefficients) -> Array:
         """Σ c_lm Θ_lm (..., n), of [..., l, m] of any lower degree too."""

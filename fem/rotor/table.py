@@ -69,7 +69,7 @@ class DerivedField(Protocol):
 
 
 # Moments up to which a search takes them all, the highest degree of those that it begins with, and places of expansions
-FEW, LOW, MANY_PLACES = 1500, 6, 100
+FEW, LOW, MANY_PLACES = 300, 6, 100
 # Doubts that are what a model leaves out, with its sign, and no mere size of an error
 LEFT_OUT = ("shape", "permeability")
 
