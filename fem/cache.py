@@ -42,7 +42,7 @@ from ..geometry.files import MOST, closed, hdf5_fault, ours, regular_file, seal,
 # another shape of its file, has the next number, and nothing of the old one is read any more.
 FORMATS = {
     "rotor": 13,
-    "mutual": 22,
+    "mutual": 23,
     "map": 3,
     "plate": 3,
     "driven-plate": 7,

@@ -17,6 +17,7 @@ from ...geometry.shapes import Box, Cylinder
 from ...geometry.solids import Part, places_off
 from ..cache import TableKind
 from ..closed_forms.potentials import unit_dipole_fields
+from ..elements.surface import gap as gap_of
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
 from . import response
@@ -103,6 +104,8 @@ def _at_poles(magnets: Sequence[Magnet], distance: float) -> list[Array]:
     return places
 
 
+# Gap of magnets, in the smallest edge of both, from which on a point is enough for what each does as a whole
+APART = 0.5
 # Gap in floater radii from which on force and torque are to be met to 1e-3: 1 mm for the article's floater
 NEAREST = 0.16
 PART = "a part from a STEP file, whose remanence has no closed form. Choose --interaction rigid, or give it a shape."
@@ -125,12 +128,12 @@ def mutual_table(
     magnets: tuple[Magnet, ...],
     floater: Floater,
     watch: Watch = unwatched,
-    points: Sequence[tuple[int, int, int]] | None = None,
+    like: MutualTable | None = None,
 ) -> MutualTable:
     """Mutual magnetisation of a rotor and a spherical floater.
 
-    Of the `floater` radius, remanence and recoil permeability count. `watch` is called with the progress. `points` are
-    those along the edges of each of the `magnets`, at which it responds; left out, as many as the accuracy needs.
+    Of the `floater` radius, remanence and recoil permeability count. `watch` is called with the progress. The `magnets`
+    respond at as many points as those of a table they are `like`; left out, at as many as the accuracy needs.
     Raises InputError: a magnet's permeability has other axes than its body, or it is a part from a file.
     """
     started, magnets, grids = time.perf_counter(), united(magnets), list[ResponseGrid]()
@@ -141,7 +144,7 @@ def mutual_table(
                 f"instead one is {reason}"
             )
         box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
-        counts = points[k] if points else _counts(magnet, floater.radius, len(magnets))
+        counts = like.grids[k].counts if like else _counts(magnet, floater.radius, len(magnets))
         axis = magnet.polarization / size if size else np.zeros(3)
         # where the floater can be in a ring's hole, no point is: with them weights run wild again, errors of 21
         hole = magnet.body.inner_radius if isinstance(magnet.body, Cylinder) else 0.0
@@ -152,7 +155,9 @@ def mutual_table(
     taken = effort(len(magnets))
     coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, response.OWN)) for nodes in taken.nodes)
     images = image_weights(floater.recoil_permeability)
-    inner = [grid.inner(taken.inner if len(grids) > 1 else 1) for grid in grids]
+    pairs_of = combinations([magnet.body for magnet in magnets], 2)
+    beside = taken.inner if any(gap_of(*pair) < APART for pair in pairs_of) else 1
+    inner = [grid.inner(like.inner if like else beside) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
     pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.permeable:
@@ -309,9 +314,8 @@ def mutual_table_beside(
     table: MutualTable, magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None]
 ) -> MutualTable:
     """The table of other magnets and another floater with as many points as `table`, for differences of the two."""
-    points = [grid.counts for grid in table.grids]
-    inputs = *_inputs(alike(magnets), floater), points
-    make = partial(mutual_table, alike(magnets), floater, points=points)
+    inputs = *_inputs(alike(magnets), floater), table.inner, [grid.counts for grid in table.grids]
+    make = partial(mutual_table, alike(magnets), floater, like=table)
     return moved_mutual(MUTUAL.cached(inputs, make, report)[0], magnets)
 
 

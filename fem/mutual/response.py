@@ -274,8 +274,8 @@ class TwoBody:
 
     def differing(self, rotor: RotorResponse) -> Wrench:
         """By how much another rotor's response to the rigid dipole adds less: most of what its response differs by."""
-        answer = rotor.answer(self.permanent, self.ball, len(self.permanent) - 1)
-        return self.rotor_answer - _wrench(answer, self.permanent, self.ball)
+        dipole = self.permanent[:3, :3]  # on which a field of the second degree acts at most
+        return self.rotor_answer - _wrench(rotor.answer(dipole, self.ball, 2), dipole, self.ball)
 
 
 def two_body(

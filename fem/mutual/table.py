@@ -384,12 +384,16 @@ class MutualTable:
     errors: Array = field(default_factory=lambda: np.zeros((1, 2)))
     provenance: dict[str, str | float] = field(default_factory=dict)  # how the table was made; texts and numbers
 
+    @property
+    def inner(self) -> int:
+        """Points along each axis of a magnet for what it does as a whole."""
+        return round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
+
     @cached_property
     def _sums(self) -> list[EnergySum]:
         """Whose sum is the energy of the moment M."""
         taken, sums = effort(len(self.grids)), [grid.energy() for grid in self.grids]
-        number = round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
-        inner = [grid.inner(number) for grid in self.grids]
+        inner = [grid.inner(self.inner) for grid in self.grids]
         if self.coupling.any():
             sums.append(coupled_sum(np.concatenate(inner), self.coupling))
         mixed, pairs = list[EnergySum](), list[EnergySum]()
