@@ -104,8 +104,8 @@ def _at_poles(magnets: Sequence[Magnet], distance: float) -> list[Array]:
     return places
 
 
-# Gap of magnets, in the smallest edge of both, from which on a point is enough for what each does as a whole
-APART = 0.5
+# Gap of magnets, in the smallest edge of both, from which on a point of each is enough for what it does as a whole
+APART = 0.8
 # Gap in floater radii from which on force and torque are to be met to 1e-3: 1 mm for the article's floater
 NEAREST = 0.16
 PART = "a part from a STEP file, whose remanence has no closed form. Choose --interaction rigid, or give it a shape."
@@ -155,9 +155,8 @@ def mutual_table(
     taken = effort(len(magnets))
     coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, response.OWN)) for nodes in taken.nodes)
     images = image_weights(floater.recoil_permeability)
-    pairs_of = combinations([magnet.body for magnet in magnets], 2)
-    beside = taken.inner if any(gap_of(*pair) < APART for pair in pairs_of) else 1
-    inner = [grid.inner(like.inner if like else beside) for grid in grids]
+    number = like.inner if like else _inner(grids, magnets)
+    inner = [grid.inner(number) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
     pairs = mixed = np.zeros((len(grids), len(grids)))
     if rotor.permeable:
@@ -202,6 +201,12 @@ def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
     enough = point_counts(response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
     x, y, z = enough if number == 1 else np.minimum(enough, MOST).tolist()
     return x, y, z
+
+
+def _inner(grids: Sequence[ResponseGrid], magnets: Sequence[Magnet]) -> int:
+    """Points along each axis of a magnet for what it does as a whole: none is in a ring's hole."""
+    near = any(gap_of(*pair) < APART for pair in combinations([magnet.body for magnet in magnets], 2))
+    return max(effort(len(magnets)).inner if near else 1, 2 if len(grids) > 1 and any(g.hole for g in grids) else 1)
 
 
 def all_points(magnets: Sequence[Magnet], radius: float) -> int:

@@ -16,7 +16,7 @@ from ...geometry.common import MU_0, Array, ComputationError, Watch, watched
 from ...geometry.magnets import Magnet
 from ...geometry.overlap import TOUCHING, sphere_overlap
 from ...geometry.scene.floater import Floater
-from ...geometry.shapes import Box, Sphere
+from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import places_off
 from ..closed_forms.moments import carriers_of, volume_rule
 from ..closed_forms.potentials import unit_dipole_fields, unit_dipole_potentials
@@ -41,16 +41,16 @@ def singular_ratio(magnets: Sequence[Magnet], ball: Ball) -> float:
     """Radius over the distance of the centre from where the field of a magnet cannot be continued; at most 1.
 
     The field continues analytically across a face, so that edges alone bound the convergence of its expansion, and the
-    centre of a sphere or the axis of a cylinder.
+    centre of a sphere or the axis of a cylinder, but not of a ring from its hole.
     """
     nearest = np.inf
     for body in (magnet.body for magnet in magnets):
         local, distance = body.to_body(ball.center), float(body.edge_distance(ball.center[None])[0])
         if isinstance(body, Sphere):
             distance = float(np.linalg.norm(local))
-        elif not isinstance(body, Box):
+        elif isinstance(body, Cylinder) and (off := float(np.hypot(local[0], local[1]))) >= body.inner_radius:
             beyond = max(abs(float(local[2])) - float(body.half_edges[2]), 0.0)
-            distance = min(float(np.hypot(np.hypot(local[0], local[1]), beyond)), distance)
+            distance = min(float(np.hypot(off, beyond)), distance)
         nearest = min(nearest, distance)
     return min(ball.radius / nearest, 1.0)
 

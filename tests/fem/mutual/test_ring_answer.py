@@ -8,9 +8,10 @@ from second_opinions.magnet_elements import element_ladder
 from second_opinions.ring_segments import RingOfSegments
 from second_opinions.two_bodies import mesh_two_bodies
 
-from spinlev.fem.harmonics.interior import field_at_center, gradient_at_center
+from spinlev.fem.harmonics.interior import Ball, field_at_center, gradient_at_center, multipole_force
 from spinlev.fem.mutual.making import cached_mutual_table
-from spinlev.fem.mutual.response import Wrench, two_body
+from spinlev.fem.mutual.response import ChargeResponse, Wrench, enough_degree, places_facing, two_body
+from spinlev.fem.mutual.table import induced_sources
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.shapes import ring
 
@@ -49,6 +50,19 @@ def by_elements(places, order):
 
 def apart(one, other):
     return np.linalg.norm(one - other, axis=2) / np.linalg.norm(other, axis=2)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-5])
+def test_in_a_rings_hole_edges_bound_the_expansion(rtol):
+    """Not the axis, where samples are taken: a ring whose hole has room for the floater had no table."""
+    hollow = ChargeResponse((Magnet(ring(7e-3, 3e-3, 8e-3), np.array([0.5, 0.0, 1.2]), 1.05),), 10)
+    assert np.any(np.linalg.norm(places_facing(hollow.magnets, 2e-3, (0.5,)), axis=1) < 1e-9)
+    for place in ([0.0, 0.0, 1e-12], [0.0, 0.0, 1e-3], [6e-4, -3e-4, 3e-3], [2e-4, 4e-4, 6e-3]):
+        ball = Ball(np.array(place), 2e-3)
+        few, many = (hollow.own_field(ball, degree) for degree in (enough_degree(hollow.magnets, ball, rtol), 40))
+        forces = [multipole_force(own, induced_sources(own, 1.05), ball) for own in (few, many)]
+        scale = max(np.linalg.norm(forces[1]), 1e-3)  # N, elsewhere in the hole; at its centre there is none
+        assert np.linalg.norm(forces[0] - forces[1]) < rtol * scale
 
 
 @pytest.mark.parametrize(
