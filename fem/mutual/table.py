@@ -12,6 +12,7 @@ J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 4.4 and 5.11; 
 Electricity (3rd ed. 1968), section 5.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
@@ -387,7 +388,7 @@ class MutualTable:
     @property
     def inner(self) -> int:
         """Points along each axis of a magnet for what it does as a whole."""
-        return round((len(self.coupling) / (3 * max(len(self.grids), 1))) ** (1 / 3))
+        return round(math.cbrt(len(self.coupling) / (3 * max(len(self.grids), 1))))
 
     @cached_property
     def _sums(self) -> list[EnergySum]:
