@@ -206,10 +206,9 @@ def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, re
     if scene.carried_by_coils:
         return coils_job(scene, duration, requested.plate_rtol, out)
     request = {"scene": scene_digest(scene), "duration_s": duration, **vars(requested)}
-    checkpoint = Checkpoint(out / "checkpoint.npz", to_json({**request, "program": program_digest()}))
-    if not resume:
-        checkpoint.remove()
-    elif checkpoint.read() is None:
+    identity = to_json({**request, "program": program_digest()})
+    checkpoint = Checkpoint(out / "checkpoint.npz", identity, resumed=resume)
+    if resume and checkpoint.read() is None:
         note(f"No checkpoint in {out}: the trajectory begins at t = 0.")
     if scene.companions:
         return several_job(scene, requested, duration, out, checkpoint)

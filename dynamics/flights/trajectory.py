@@ -122,6 +122,7 @@ class Checkpoint:
     path: Path  #: where it is
     identity: str  #: everything that the trajectory depends on, as text; another trajectory's checkpoint is refused
     every: float = 5.0  #: seconds between two writings
+    resumed: bool = True  #: whether what an earlier process kept is read; else it stays until this one writes
 
     @property
     def _key(self) -> str:
@@ -136,9 +137,11 @@ class Checkpoint:
     def read(self) -> dict[str, Any] | None:
         """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
 
+        None, too, of one that is not `resumed`.
+
         Raises InputError: the file is damaged, or belongs to another trajectory.
         """
-        if not os.path.lexists(self.path):
+        if not self.resumed or not os.path.lexists(self.path):
             return None
         whole = unsealed(self.path, name="checkpoint")  # so that no library meets a damaged archive
         if whole is None:

@@ -596,8 +596,10 @@ def test_a_file_replaced_before_a_flight_goes_on(replaceable, monkeypatch):
     assert (status, answer) == (2, None)
     assert "must be a checkpoint of this trajectory; instead it was kept by another scene" in said
     Path("named").write_bytes(named)  # writing the same shape again gives it another date
+    assert run("simulate", *flight, "--ramp", "100:90:1")[0] == 2  # a ramp of 10 s, refused before anything begins
     assert Path("out/checkpoint.npz").read_bytes() == before
     assert run("simulate", *flight, "--resume")[0] == 0
+    assert not Path("out/checkpoint.npz").exists()
 
 
 def test_no_solve_is_begun_that_the_memory_does_not_hold(spinlev, monkeypatch):
