@@ -286,6 +286,7 @@ def _client(address: str) -> Iterator[Client]:
     from dask import config
     from dask.utils import parse_timedelta
     from distributed import Client
+    from distributed.comm.addressing import get_address_host_port
 
     patience = min(parse_timedelta(config.get("distributed.comm.timeouts.connect"), "s"), PATIENCE)
     of_dask = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
@@ -293,6 +294,7 @@ def _client(address: str) -> Iterator[Client]:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     note(f"Scheduler {address} ...")
     try:
+        get_address_host_port(address)  # a client that does not get so far raises once more where it is dropped
         client = Client(address, set_as_default=False, timeout=patience)
     except (OSError, ValueError, TimeoutError, TypeError, RuntimeError) as error:
         raise InputError(

@@ -123,7 +123,8 @@ def field(
         options.check_between("--steps", steps, options.STEPS, whole=True)
         from ..fields import field_map_job
 
-        return field_map_job(_loaded(scene), plane, extent, offset_mm * 1e-3, steps, output.folder)
+        offset = options.finite("--offset-mm", offset_mm) * 1e-3
+        return field_map_job(_loaded(scene), plane, extent, offset, steps, output.folder)
     assert points is not None
     loaded, places = _loaded(scene), options.read_points(points)
     from ..run import field_job

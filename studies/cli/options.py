@@ -122,7 +122,7 @@ def read_points(path: Path) -> Array:
             )
         where = [header.index(column) for column in COLUMNS]
         filled = (each for each in enumerate(rows, start=2) if any(cell.strip() for cell in each[1]))
-        found = [[_number(path, line, row, column) for column in where] for line, row in filled]
+        found = [[_number(path, line, row, header, column) for column in where] for line, row in filled]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: Input points must be a readable CSV text; instead: {error}.") from None
     if not found:
@@ -130,7 +130,12 @@ def read_points(path: Path) -> Array:
     return np.array(found) * 1e-3
 
 
-def _number(path: Path, line: int, row: list[str], column: int) -> float:
+def _number(path: Path, line: int, row: list[str], header: list[str], column: int) -> float:
+    if any(cell.strip() for cell in row[len(header) :]):  # as of decimal commas
+        raise InputError(
+            f"{path}: Input line {line} must have no more entries than the header, {len(header)}; instead it has "
+            f"{len(row)}."
+        )
     text = row[column].strip() if column < len(row) else ""
     numbers = _floats(text)
     value = numbers[0] if len(numbers) == 1 else math.nan

@@ -97,6 +97,7 @@ def test_an_extent_that_is_none_is_refused(text):
         (["--plane", "xq"], "xq"),
         (["--plane", "xz", "--steps", "1"], "--steps must be a whole number between 5 and 1001; instead received 1"),
         (["--plane", "xz", "--extent-mm", "0"], "--extent-mm must be one positive number"),
+        (["--plane", "xz", "--offset-mm", "nan"], "--offset-mm must be a finite number; instead received nan"),
     ],
 )
 def test_what_is_wrong_is_told_and_ends_with_2(written, more, said, capsys):

@@ -267,6 +267,14 @@ def test_a_wrong_engine(engine, message):
         engine.checked()
 
 
+@pytest.mark.parametrize("address", ["foo", "tcp://x", "tcp://x:y", "bar://x:1", ""])
+def test_what_is_no_address_makes_no_client(tmp_path, monkeypatch, address):
+    """One that never began waits for 20 s where it is dropped, and prints a traceback."""
+    monkeypatch.setattr("distributed.Client", lambda *_, **__: pytest.fail("a client was made"))
+    with pytest.raises(InputError, match="--scheduler must be the address of a dask scheduler that answers"):
+        swept(STUDY, points(1.0), Workers(scheduler=address), tmp_path)
+
+
 def test_a_scheduler_that_does_not_answer(tmp_path):
     quickly = dask.config.set({"distributed.comm.timeouts.connect": "1s"})
     with quickly, pytest.raises(InputError, match="--scheduler must be the address of a dask scheduler that answers"):

@@ -195,6 +195,7 @@ def test_wrong_command_lines_end_with_status_2(spinlev, tmp_path, points, argume
         ("x_mm,y_mm,z_mm\n0,0,deep\n", "line 2 must have three finite numbers; instead received 'deep'"),
         ("x_mm,y_mm,z_mm\n0,0,-20\n0,0,nan\n", "line 3"),
         ("x_mm,y_mm,z_mm\n0,0\n", "line 2"),
+        ("x_mm,y_mm,z_mm\n0,0,-20,5\n", "line 2 must have no more entries than the header, 3; instead it has 4"),
         ("x_mm,y_mm,z_mm\n7,5,0\n", "must not lie on an edge of a magnet"),
     ],
 )
