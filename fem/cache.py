@@ -54,8 +54,8 @@ FORMATS = {
     "floater-currents": 3,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 17,
-    "flight": 3,
+    "equilibria": 18,
+    "flight": 4,
     "experiment": 3,
     "code": 1,
 }
