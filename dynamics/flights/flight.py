@@ -64,9 +64,9 @@ SIZE = 50.0
 OPTIMISATION = 1
 # Of a body that is not round in a ball: a cube's step takes 8 % less, and compilation 0.4 instead of 0.3 s.
 THOROUGH = 3
-# Turns up to which code that is not optimised at all is done sooner. Measured for a dipole, for closed forms and in a
-# ball: loops are compiled in 0.05 to 0.1 s instead of 0.4 to 0.7 s, and a turn takes 0.3 to 0.5 ms longer.
-SHORT_TURNS = 1000.0
+# Turns up to which code that is not optimised is done sooner. Measured for a dipole, closed forms and in a ball (over a
+# plate): loops are compiled in 0.1 (0.2) instead of 0.4 to 0.7 (1.4) s, and a turn takes 0.3 to 0.5 (1 to 5) ms longer.
+SHORT_TURNS, SHORT_OVER_PLATE = 1000.0, 200.0
 # Turns from which on straight code saves more time (in a ball 21 of 47 µs a step) than its compilation takes.
 STRAIGHT_TURNS = 2e5
 LOOKED_AHEAD = 16.0  # Turns in the middle of whose way a ball is put: three periods of the axial mode
@@ -158,7 +158,7 @@ class Flight:
                 np.zeros(len(equations.variables) + 1),
                 tol=self.step_error(degree),
                 compact_mode=not self._straight or (self.balls is not None and degree not in small),
-                opt_level=thorough if self.memory or steps > SHORT_TURNS else 0,
+                opt_level=thorough if steps > (SHORT_OVER_PLATE if self.memory else SHORT_TURNS) else 0,
                 t_events=[hy.t_event(each, direction=falling) for each, _ in events],
             )
             terms, given = list(equations.jacobi), list(equations.variables)

@@ -8,7 +8,7 @@ from article import FLOATER, MAGNETS, NO_DRAG
 from scipy.integrate import solve_ivp
 
 from spinlev.dynamics.flights.batch import launched
-from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, Flight, initial_state, integrate
+from spinlev.dynamics.flights.flight import PLATE_TOLERANCE, SHORT_OVER_PLATE, Flight, initial_state, integrate
 from spinlev.dynamics.motion.plate import PlateMemory
 from spinlev.dynamics.motion.state import State, turned_about_z
 from spinlev.fem.plate.slab import Slab, reaction_tensor
@@ -36,6 +36,15 @@ def flown(scene, memory, duration, start=START):
     state, currents = initial_state(replace(scene, start=AbsoluteStart(*start.vectors)), TABLE, memory=memory)
     flight = Flight(scene, TABLE, duration, PLATE_TOLERANCE, memory=memory)
     return currents, integrate(flight, state, duration, currents=currents)
+
+
+def test_code_is_optimised_where_the_flight_is_long(memory, monkeypatch):
+    levels = []
+    known = "spinlev.dynamics.flights.flight.compiled"
+    monkeypatch.setattr(known, lambda *_, opt_level, **options: levels.append(opt_level))
+    for times in (0.9, 1.1):
+        Flight(SCENE, TABLE, times * SHORT_OVER_PLATE / SCENE.frequency, memory=memory).part(0)
+    assert levels == [0, 0, 1, 0]  # of motion, and of the terms of its energy
 
 
 @pytest.mark.slow
