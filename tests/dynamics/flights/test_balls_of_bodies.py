@@ -8,7 +8,6 @@ import pytest
 from article import NO_DRAG, SCENE
 from places import SCENES
 
-from spinlev.dynamics.equilibria.search import find_equilibria
 from spinlev.dynamics.flights import balls as balls_module
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
 from spinlev.dynamics.motion import floater_effects
@@ -37,7 +36,8 @@ PLACE = np.array([0.5e-3, 0.0, -18e-3])
 
 @pytest.fixture(scope="module")
 def start():
-    return initial_state(LEVITATING, TABLE, find_equilibria(LEVITATING, TABLE))[0]
+    known = Levitation(LEVITATING, Models("cuboid", "none", interaction="rigid")).equilibria
+    return initial_state(LEVITATING, TABLE, known)[0]
 
 
 def in_balls(scene, table, duration):
@@ -146,7 +146,7 @@ def test_numbers_in_the_code_are_the_parameters(start):
     found = []
     written = equations_of_motion(whole, first=flight.first, frame=flight.scales.frame)
     for equations in (flight.equations(number)[0], written):
-        function = hy.cfunc([*equations.rates, *equations.jacobi, equations.power], equations.variables)
+        function = hy.cfunc([*equations.rates, *equations.jacobi, equations.power], equations.variables, opt_level=0)
         found.append(function(course.state[:-1], pars=course.values[: function.nparams]))
     assert found[0] == pytest.approx(found[1], rel=1e-12, abs=1e-13)
 
@@ -158,7 +158,7 @@ def test_what_is_induced_alike_in_all_directions_turns_nothing(monkeypatch):
     for allowed in (floater_effects.EVEN, -1.0):
         monkeypatch.setattr(floater_effects, "EVEN", allowed)
         equations = equations_of_motion(Interaction(TABLE, (effect,), turning=True))
-        function = hy.cfunc([*equations.rates, equations.jacobi[-1]], equations.variables)
+        function = hy.cfunc([*equations.rates, equations.jacobi[-1]], equations.variables, opt_level=0)
         state = np.concatenate([PLACE / CUBE.radius, [0.1, -0.2, 0.3], [0.5, -0.5, 0.1, 0.7], [0.2, 0.3, -0.4]])
         state[6:10] /= np.linalg.norm(state[6:10])
         found.append(function(state, pars=values[: function.nparams]))
@@ -183,7 +183,9 @@ def test_what_the_floaters_dipole_misses_is_a_dipole_along_its_axes():
         state = initial_state(scene, TABLE)[0]
         course = flight.begin(state, 0.1)
         equations, scales = flight.equations(flight.degree(course.values))[0], flight.scales
-        function = hy.cfunc(list(equations.rates[: scales.size]), list(equations.variables), compact_mode=True)
+        function = hy.cfunc(
+            list(equations.rates[: scales.size]), list(equations.variables), compact_mode=True, opt_level=0
+        )
         rates = function(course.state[:-1], pars=course.values[: function.nparams])
         turned = scales.unpack(np.append(course.state[: scales.size - 3], rates[-3:])).spin * scales.time  # from rest
         found.append(np.concatenate([CUBE.mass * rates[3:6], CUBE.inertia / CUBE.radius * turned]))

@@ -9,7 +9,7 @@ from article import NO_DRAG, SCENE
 from scipy.special import ellipj, ellipk
 
 from spinlev.dynamics.equilibria.equilibrium import AVERAGED, LOCKED
-from spinlev.dynamics.equilibria.search import find_equilibria, survey, with_plate
+from spinlev.dynamics.equilibria.search import survey, with_plate
 from spinlev.dynamics.flights.flight import Flight, initial_state, integrate, simulate
 from spinlev.dynamics.motion.body_shape import BodyShape
 from spinlev.dynamics.motion.effect import Interaction
@@ -29,6 +29,8 @@ from spinlev.geometry.magnets import Magnet, tilt
 from spinlev.geometry.scene.contents import AbsoluteStart, Plate
 from spinlev.geometry.scene.floater import Floater, FloaterPart
 from spinlev.geometry.shapes import Box, Cylinder, rotation_matrix
+from spinlev.studies.cli.options import Models
+from spinlev.studies.levitation import Levitation
 
 CUBE = Floater(0.01 * 3**0.5 / 2, 1.3, 1.0, 7500.0, None, Box((0.01,) * 3))
 BRICK = Floater(float(np.linalg.norm([9e-3, 12e-3, 6e-3]) / 2), 1.3, 1.0, 7500.0, None, Box((9e-3, 12e-3, 6e-3)))
@@ -156,7 +158,7 @@ def test_multipoles_in_a_ball_do_what_the_body_feels():
     course = flight.begin(state, 0.1)
     equations = flight.equations(flight.degree(course.values))[0]
     scales, place = flight.scales, course.state[:3]
-    function = hy.cfunc(list(equations.rates[: scales.size]), list(equations.variables), compact_mode=True)
+    function = hy.cfunc(list(equations.rates[: scales.size]), list(equations.variables), compact_mode=True, opt_level=0)
     rates = function(course.state[:-1], pars=course.values[: function.nparams])
     turned = scales.unpack(np.append(course.state[: scales.size - 3], rates[-3:])).spin * scales.time  # from rest
     shape = next(effect for effect in flight.whole.effects if isinstance(effect, BodyShape))
@@ -179,7 +181,7 @@ def test_multipoles_in_a_ball_do_what_the_body_feels():
     assert place.any()
 
 
-@pytest.mark.parametrize("in_balls", [True, False])
+@pytest.mark.parametrize("in_balls", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_cube_moves_the_same_by_its_quaternion(in_balls):
     """Ten turns of a cube magnetised along its diagonal, with air, by two directions and by a quaternion: 1e-10."""
     magnet = Magnet(CUBE.body, np.full(3, 1.3 / 3**0.5))
@@ -267,9 +269,13 @@ def test_a_body_beside_a_magnet_has_a_finite_error():
     assert np.isfinite(body.missed(table, place[None], np.eye(3)[None])).all()
 
 
-def test_equilibria_are_told_apart_and_a_stable_one_stays():
+@pytest.fixture(scope="module")
+def found():
+    return Levitation(LEVITATING, Models("cuboid", "none", interaction="rigid")).equilibria
+
+
+def test_equilibria_are_told_apart_and_a_stable_one_stays(found):
     """The mean over the cube's own turn levitates; the cube itself stays there, turning."""
-    found = find_equilibria(LEVITATING, TABLE)
     assert {one.kind for one in found} == {AVERAGED, LOCKED}
     first = found[0]
     assert first.stable
@@ -282,26 +288,24 @@ def test_equilibria_are_told_apart_and_a_stable_one_stays():
     assert np.ptp(distance) < 0.6e-3
 
 
-def test_a_mean_is_searched_by_its_multipoles(monkeypatch):
+def test_a_mean_is_searched_by_its_multipoles(found, monkeypatch):
     """Of the cube's mean as a floater, as in comparisons: the same equilibria, with few looks at all its dipoles.
 
     It looked at 14 thousand poses when the search itself had them, and at 73 now.
     """
     looks, numbers = [], BodyShape.numbers
     monkeypatch.setattr(BodyShape, "numbers", lambda *args: [looks.append(len(args[2].position)), numbers(*args)][1])
-    found = survey(replace(LEVITATING, floater=CUBE.averaged), TABLE).equilibria
+    means = survey(replace(LEVITATING, floater=CUBE.averaged), TABLE).equilibria
     assert sum(looks) < 500
-    known = [one for one in find_equilibria(LEVITATING, TABLE) if one.kind == AVERAGED]
-    assert len(found) == len(known)
-    for one, other in zip(found, known, strict=True):
+    for one, other in zip(means, [one for one in found if one.kind == AVERAGED], strict=True):
         assert one.position == pytest.approx(other.position, abs=1e-12)
         assert one.growth_per_s == pytest.approx(other.growth_per_s, abs=1e-8)
         assert one.residual < 1e-9
 
 
 @pytest.mark.slow
-def test_a_locked_equilibrium_is_at_rest_in_the_rotors_frame():
-    locked = next(one for one in find_equilibria(LEVITATING, TABLE) if one.kind == LOCKED)
+def test_a_locked_equilibrium_is_at_rest_in_the_rotors_frame(found):
+    locked = next(one for one in found if one.kind == LOCKED)
     scales, whole = Scales.of(LEVITATING), with_effects(LEVITATING, TABLE)
     assert locked.state.spin == pytest.approx([0.0, 0.0, LEVITATING.angular_velocity])
     flight = Flight(LEVITATING, whole, 0.05)
@@ -315,9 +319,9 @@ def test_a_locked_equilibrium_is_at_rest_in_the_rotors_frame():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "kick", "foldings"), [(LOCKED, 1e-9, 10.0), (AVERAGED, 1e-6, 8.0)])
-def test_an_unstable_equilibrium_of_either_kind_grows_as_it_says(kind, kick, foldings):
+def test_an_unstable_equilibrium_of_either_kind_grows_as_it_says(found, kind, kick, foldings):
     """Of the cube's trajectories from above and below along the axis: the difference of their heights."""
-    known = next(one for one in find_equilibria(LEVITATING, TABLE) if one.kind == kind and one.growth_per_s > 5)
+    known = next(one for one in found if one.kind == kind and one.growth_per_s > 5)
     assert [mode.name for mode in known.modes if mode.growth_per_s == known.growth_per_s] == ["bounce"]
     seconds, state = foldings / known.growth_per_s, known.state
     axes = CUBE.axes(state.moment) if state.axes is None else state.axes
