@@ -97,7 +97,7 @@ def compare(
 
     Examples
     --------
-    >>> found = sl.compare(scene, [120.0, 130.0])
+    >>> found = sl.compare(scene, [120.0, 130.0], rtol=1e-3)
     >>> (1e3 * found.distance.sel(model=["dipole", "cuboid"])).round(2).values.tolist()
     [18.83, 19.1]
     """

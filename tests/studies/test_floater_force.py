@@ -12,6 +12,7 @@ from spinlev.studies.effects import listed_effects
 MATERIAL = {"remanence_T": 1.305, "recoil_permeability": 1.0, "density_kg_m3": 7500.0}
 BRICK = {"shape": "cuboid", "size_mm": [12.0, 10.0, 8.0], **MATERIAL}
 DISC = {"shape": "cylinder", "diameter_mm": 12.0, "height_mm": 8.0, **MATERIAL}
+CONDUCTING = {**DISC, "conductivity_S_m": 6.7e6}
 CUBE = {"angle_deg": 10.0, "edge_mm": 10.0, "remanence_T": 1.305, "recoil_permeability": 1.0}
 PLATE = {"size_mm": [100.0, 100.0, 10.0], "center_mm": [0.0, 0.0, -50.0], "conductivity_S_m": 3.5e7}
 HELD = {"position_mm": [0.0, 0.0, -25.0]}
@@ -67,7 +68,7 @@ def test_what_is_no_pose_is_told(pose, said):
 
 def test_the_error_shown_with_a_discs_currents_has_that_of_their_delays():
     """By the part that delays have: 2ω of the slowest one."""
-    scene = made({**DISC, "conductivity_S_m": 6.7e6}, start=HELD)
+    scene = made(CONDUCTING, plate=PLATE, start=HELD)
     listed = listed_effects(sl.Levitation(scene, sl.Models("dipole", "none")), ())
     shown = next(effect for effect in listed if effect.name == FLOATER_CURRENTS)
     shape = current_shape(scene.floater)
@@ -78,7 +79,7 @@ def test_the_error_shown_with_a_discs_currents_has_that_of_their_delays():
     assert part > 0.01
 
 
-@pytest.mark.parametrize("keys", [pytest.param(BRICK, marks=pytest.mark.slow), DISC], ids=["brick", "disc"])
+@pytest.mark.parametrize("keys", [pytest.param(BRICK, marks=pytest.mark.slow), CONDUCTING], ids=["brick", "disc"])
 def test_a_plates_currents_act_on_other_shapes(keys):
     """By their dipole: energy is balanced, the plate changes the motion, and the result says what is left out."""
     scene = made(keys, plate=PLATE, start=HELD)

@@ -177,8 +177,10 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     asked = points(*map(float, range(6)), log=str(log), pause=0.3)
     code = (
         "import json, sys; from pathlib import Path; sys.path[:0] = json.loads(sys.argv[1])\n"
-        "import test_sweep as t\n"
-        "t.swept(t.STUDY, json.loads(sys.argv[2]), t.Workers(workers=1), Path(sys.argv[3]))"
+        "from roots import root\n"
+        "from spinlev.studies.sweep import Study, Workers, swept\n"
+        "study = Study('roots', 'square roots', list, root, {}, list)\n"
+        "swept(study, json.loads(sys.argv[2]), Workers(workers=1), Path(sys.argv[3]))"
     )
     folder = tmp_path / "killed"
     ways = json.dumps([str(Path(__file__).parent), str(TESTS)])

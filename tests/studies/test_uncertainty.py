@@ -122,7 +122,8 @@ def test_what_is_not_known_over_a_plate_is_said(tmp_path):
             assert bar["drawn_error"] == pytest.approx(bar["error"], rel=0.2)  # of 20 draws
 
 
-def test_the_command_line_prints_error_bars(tmp_path):
+def test_the_command_line_prints_error_bars(tmp_path, monkeypatch):
+    monkeypatch.setattr("spinlev.studies.uncertainty.DRAWS", 40)
     scene = tmp_path / "scene.toml"
     scene.write_text(TEXT)
     command = ["equilibria", str(scene), "--model", "dipole", "--plate-model", "none", "--out", str(tmp_path)]

@@ -37,11 +37,15 @@ def begun(part, checkpoint):
     return stop.value.simulated
 
 
+@pytest.fixture(scope="module")
+def whole():
+    return simulate(SCENE, DIPOLE, 4.0, compact=True)
+
+
 @pytest.mark.parametrize("seconds", [0.0, 1e9])
-def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint, seconds):
+def test_a_stopped_flight_goes_on_to_the_last_bit(checkpoint, whole, seconds):
     """Also where no checkpoint was due before the stop: then that of the stop itself."""
     checkpoint = replace(checkpoint, every=seconds)
-    whole = simulate(SCENE, DIPOLE, 4.0, compact=True)
     first = begun(0.3, checkpoint)
     assert first.ended_by == "stopped"
     assert 0 < first.levitated_s < 2

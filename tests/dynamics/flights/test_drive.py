@@ -199,8 +199,8 @@ def test_begins_at_the_equilibrium_of_the_first_frequency():
 
 def test_an_interrupted_motion_goes_on_to_the_last_bit(tmp_path):
     """In the middle of a ramp: the checkpoint has the leg, and what the motor gave."""
-    scene = replace(STEADY, drive=(DriveStep(105.0, 4.0),), start=OffsetStart(np.zeros(3)))
-    whole, kept = simulate(scene, TABLE, 5.0), Checkpoint(tmp_path / "kept.npz", "this one", every=0.0)
+    scene = replace(STEADY, drive=(DriveStep(105.0, 1.6),), start=OffsetStart(np.zeros(3)))
+    whole, kept = simulate(scene, TABLE, 2.0), Checkpoint(tmp_path / "kept.npz", "this one", every=0.0)
     begun = list[float]()
 
     def stop(part):
@@ -209,8 +209,8 @@ def test_an_interrupted_motion_goes_on_to_the_last_bit(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(FlightStopped):
-        simulate(scene, TABLE, 5.0, progress=stop, checkpoint=kept)
+        simulate(scene, TABLE, 2.0, progress=stop, checkpoint=kept)
     assert 0.5 < begun[-1] < 0.8
-    resumed = simulate(scene, TABLE, 5.0, checkpoint=kept)
+    resumed = simulate(scene, TABLE, 2.0, checkpoint=kept)
     assert np.array_equal(resumed.lab.position[-1], whole.lab.position[-1])
     assert np.array_equal(resumed.given[-1], whole.given[-1])

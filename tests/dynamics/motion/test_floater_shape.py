@@ -56,11 +56,10 @@ def dipole_field(points):
 def test_curves_of_balance_inside_of_the_rotor_lead_to_no_equilibrium(body, monkeypatch):
     """With those that begin there, followed to any length, the search finds the same."""
     scene = Scene(130.0, (CUBE,), Floater(body.circumradius, 1.305, 1.0, 7500.0, None, body), Drag(0.0, 0.0))
-    table = rotor_table((CUBE,), "cuboid")
-    few = survey(scene, table)
+    few = survey(scene, TABLE)
     monkeypatch.setattr(curves, "DEEP", np.inf)
     monkeypatch.setattr(curves, "STEPS", replace(curves.STEPS, most=5000))
-    every = survey(scene, table)
+    every = survey(scene, TABLE)
     assert len(every.curves) > len(few.curves)
     found, wanted = ([e.position for e in one.equilibria] for one in (few, every))
     assert len(found) >= 3

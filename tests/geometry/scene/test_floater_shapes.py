@@ -162,13 +162,14 @@ def test_a_file_is_the_shape_that_it_holds_or_any_other(tmp_path):
     found = made({"shape": "file", "file": str(tmp_path / "cube.step"), **MATERIAL}).floater
     assert found.shape == "cuboid"
     assert found.principal_inertia == pytest.approx(7500.0 * 512e-9 * np.array([128e-6] * 3) / 12, rel=1e-7)
-    ell = made({"shape": "file", "file": str(tmp_path / "ell.step"), **MATERIAL}).floater
+    scene = made({"shape": "file", "file": str(tmp_path / "ell.step"), **MATERIAL})
+    ell = scene.floater
     parts = [{**MAGNET, "size_mm": size, "center_mm": center, "polarization_T": [0.0, 0.0, 1.3]}
              for size, center in (([8.0, 4.0, 8.0], [4.0, 2.0, 4.0]), ([4.0, 4.0, 8.0], [2.0, 6.0, 4.0]))]  # fmt: skip
     same = made({"magnets": parts}).floater
     assert ell.principal_inertia == pytest.approx(same.principal_inertia, rel=1e-6)
     assert ell.dipole == pytest.approx(same.dipole, rel=1e-6)
-    again = parse_scene(scene_text(made({"shape": "file", "file": str(tmp_path / "ell.step"), **MATERIAL})))
+    again = parse_scene(scene_text(scene))
     assert again.floater.principal_inertia == pytest.approx(ell.principal_inertia)
 
 

@@ -20,7 +20,7 @@ NO_PLATE = ("--plate-model", "none")
 GOOD = (SCENES / "horizontal.toml").read_text()
 
 
-def test_run_writes_everything_and_finds_its_tables_and_flight_again(spinlev, tmp_path, points, monkeypatch):
+def test_run_writes_everything_and_finds_its_tables_and_flight_again(spinlev, tmp_path, points, monkeypatch, request):
     status, written, err = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE)
     assert status == 0, err
     assert re.search(
@@ -37,6 +37,7 @@ def test_run_writes_everything_and_finds_its_tables_and_flight_again(spinlev, tm
     status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points, "--json")
     assert json.loads(out)["tables_from_cache"] == ["fem"]
     monkeypatch.setattr("spinlev.studies.levitation.simulate", pytest.fail)
+    request.getfixturevalue("undrawn")
     again = spinlev("run", SCENES / "horizontal.toml", "--duration-s", "0.1", *NO_PLATE, "--out", "again")
     assert again[:2] == (0, written.replace("out/", "again/"))
 

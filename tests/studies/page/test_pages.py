@@ -231,7 +231,7 @@ def test_a_scene_to_start_from(reader):
 
 def test_a_flight_is_played_kicked_stopped_and_forgotten(reader):
     """Piece by piece, as page.js asks for them."""
-    page = reader("plate_model=none")
+    page = reader("plate_model=none&model=dipole")
     page.answered()
 
     def flown():
