@@ -134,6 +134,7 @@ def test_the_delay_of_a_long_rod():
         assert ratio == pytest.approx(RADIUS**2 / 6, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_body_from_a_file_loses_as_its_section_resists_torsion(tmp_path):
     """A hexagonal prism: J = 1.0355 a⁴ of its side a (S. P. Timoshenko, Theory of Elasticity, section 104)."""
     side, height = 5.0, 6.0

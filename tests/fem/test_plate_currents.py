@@ -52,7 +52,7 @@ def solution(boxes):
     return solve_currents(PLATE, boxes, FREQUENCIES, RTOL, RULE)
 
 
-@pytest.mark.parametrize("frequency", [5.0, 40.0, 250.0])
+@pytest.mark.parametrize("frequency", [250.0, *(pytest.param(f, marks=pytest.mark.slow) for f in (5.0, 40.0))])
 def test_what_residuals_bound_is_no_larger(space, frequency):
     """Own tensors of unseen dipoles against the complex solution on the same elements, for two tolerances."""
     probes = REGION.lower + (REGION.upper - REGION.lower) * np.random.default_rng(1).random((3, 3))

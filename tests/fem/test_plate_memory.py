@@ -71,6 +71,7 @@ def spinning(omega, angle):
     )
 
 
+@pytest.mark.slow
 def test_energy_balance_closes_in_a_motion_that_spins_bounces_and_lowers(table):
     """Work on the dipole + stored + dissipated = 0 to 1e-10 of what is dissipated, in the frame of the plate."""
     omega, bounce = 2 * np.pi * 100, 2 * np.pi * 9

@@ -155,10 +155,7 @@ def of_parts(tmp_path_factory):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        name if name in ("half ring", "two thirds", "blind bore") else pytest.param(name, marks=pytest.mark.slow)
-        for name in PARTS
-    ],
+    [name if name in ("half ring", "blind bore") else pytest.param(name, marks=pytest.mark.slow) for name in PARTS],
 )
 def test_what_is_no_known_shape_is_a_part_from_a_file(of_parts, name):
     """Dipoles at the places of a rule over each part make magpylib's field; written again, it is the same file."""

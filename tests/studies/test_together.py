@@ -27,7 +27,10 @@ def question(**values):
     "varied",
     [
         {"frequency_hz": list(np.linspace(85.0, 175.0, 5)), "spin": [-0.2, 0.3]},
-        {"floater.diameter_mm": list(np.linspace(10.0, 15.0, 5)), "rotor.remanence_T": [1.1, 1.3]},
+        pytest.param(
+            {"floater.diameter_mm": list(np.linspace(10.0, 15.0, 5)), "rotor.remanence_T": [1.1, 1.3]},
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_many_points_have_what_each_has_alone(varied):

@@ -51,7 +51,7 @@ COMMANDS = {
     "export": ["out.vtu"],
 }
 FAST = {("field", name) for name in SCENES} | {
-    ("equilibria", "wide ring"), ("equilibria", "at rest"), ("simulate", "slow"), ("plate", "over a plate"),
+    ("equilibria", "at rest"), ("simulate", "slow"), ("plate", "over a plate"),
 }  # fmt: skip
 QUICK = {"field": ["--model", "cuboid"], "simulate": ["--model", "dipole"], "plate": ["--model", "slab"]}
 """Models of the fast ones; the slow ones take what accuracy needs."""

@@ -142,7 +142,7 @@ def test_all_rotors_of_the_article_have_three_mirror_planes(name):
     assert find_symmetry(rotors(1.05)[name]).planes == (0, 1, 2)
 
 
-@pytest.mark.parametrize("name", ["vertical", "tilt"])
+@pytest.mark.parametrize("name", [pytest.param("vertical", marks=pytest.mark.slow), "tilt"])
 def test_one_octant_gives_the_field_of_the_whole(name):
     """To the error of the elements, of which the meshes are unlike."""
     rotor = rotors(1.05)[name]

@@ -164,6 +164,7 @@ def rotors():
     return element_ladder(horizontal(0.002, 0.01, 1.305, 1.05), (2, 3))
 
 
+@pytest.mark.slow
 def test_rigid_dipole_is_the_table_of_the_rotor(rotors):
     """F = (m·∇)B and m × B with the rotor's table, made by other functionals of another solution."""
     table = rotor_table(rotors[0].magnets, "fem", 1e-6)

@@ -90,6 +90,7 @@ def test_points_outside_the_mesh_are_named(response):
         current_density(response, np.zeros((1, 3)), AMPLITUDES, [[9.0, 0, 0]])
 
 
+@pytest.mark.slow
 def test_sphere_in_a_uniform_field_on_curved_tetrahedra():
     """μ0 m² of the induced moment is the coupling of the field with itself; R/δ = 1.7."""
     radius, frequency = 0.01, 200.0

@@ -25,7 +25,7 @@ AXIAL = HomogeneousField(np.array([0.0, 0.0, 1.0]))
 FAR_AIR = MeshRule(skin_share=0.5, reach=60.0)  # its end takes (1/120)³ of the induced moment
 
 
-@pytest.mark.parametrize("frequency", [5.0, 50.0, 200.0])
+@pytest.mark.parametrize("frequency", [200.0, *(pytest.param(f, marks=pytest.mark.slow) for f in (5.0, 50.0))])
 def test_sphere_in_a_uniform_field(frequency):
     mesh = plate_mesh(Sphere(0.01), SIGMA, [[0.0, 0.0, 1.0]], 200.0, FAR_AIR)
     found = solve_eddy(mesh, 5, frequency, [AXIAL]).couplings[0, 0]

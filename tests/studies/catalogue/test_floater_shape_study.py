@@ -59,6 +59,7 @@ def test_beside_the_rotor_a_cylinder_levitates_where_its_mean_does():
     np.testing.assert_allclose(found[0], found[1], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_limits_of_a_cylinder_are_those_of_its_mean():
     """Its branch follows an equilibrium near the rotor, where seven dipoles on the axis would miss an end by 1 Hz."""
     found = limits({**ROTOR, "shape": "cylinder", "aspect": 1.0})
