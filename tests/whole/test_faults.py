@@ -583,7 +583,7 @@ def test_a_file_replaced_while_a_sweep_runs(replaceable, monkeypatch):
     assert not Path("out/question.nc").exists()
 
 
-@pytest.mark.parametrize("replaceable", ["known shape", "map"], indirect=True)
+@pytest.mark.parametrize("replaceable", ["known shape", pytest.param("map", marks=pytest.mark.slow)], indirect=True)
 def test_a_file_replaced_before_a_flight_goes_on(replaceable, monkeypatch):
     run, write = replaceable
     flight = ("--duration-s", "1", "--plate-model", "none", "--interaction", "rigid")

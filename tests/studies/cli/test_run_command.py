@@ -32,6 +32,7 @@ def test_run_writes_everything_and_finds_its_tables_and_flight_again(spinlev, tm
     drawn = set() if unavailable() else {"scene.png"}
     figures = {f"{name}.{kind}" for name in ("field", "force", "trajectory") for kind in ("png", "pdf")}
     assert made == {"result.nc", "summary.json", *figures, *drawn}
+    assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in drawn)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["comparison"]["difference_error_mm"] < 0.01 * abs(summary["comparison"]["difference_mm"])
     status, out, err = spinlev("field", SCENES / "horizontal.toml", "--points", points, "--json")

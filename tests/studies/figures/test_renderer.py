@@ -116,10 +116,3 @@ def test_the_field_that_is_drawn_is_the_tables(flight):
     known = np.isfinite(view.plane.field).all(axis=1)
     np.testing.assert_array_equal(known, table.in_range(points))
     np.testing.assert_array_equal(view.plane.field[known], table.evaluate(points[known])[0])
-
-
-@pytest.mark.usefixtures("needs_3d")
-def test_a_view_is_a_png(flight, tmp_path):
-    scene, table, flown = flight
-    render({tmp_path / "a.png": last_view(scene, table, flown.time, flown.rotor)})
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
