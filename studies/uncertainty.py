@@ -142,7 +142,7 @@ def uncertainty(
 
     Examples
     --------
-    >>> found = sl.uncertainty(scene, {"rotor.edge_mm": 0.05}, model="dipole").isel(equilibrium=0)
+    >>> found = sl.uncertainty(scene, {"rotor.edge_mm": 0.05}, draws=20, model="dipole").isel(equilibrium=0)
     >>> print(f"{1e3 * found.distance:.2f} ± {1e3 * found.distance_error:.2f} mm")
     18.84 ± 0.05 mm
     """

@@ -66,7 +66,7 @@ STUDIES = (
 RANDOM_SCENES = 240
 QUICK_SCENES = 6
 PLATES = 12
-FAST = ("field-points", f"scenes-0-{QUICK_SCENES}")
+FAST = (f"scenes-0-{QUICK_SCENES}",)
 """Some seconds together: they are run by `make test`, all by `make validate`."""
 
 

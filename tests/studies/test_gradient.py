@@ -72,7 +72,7 @@ CASES = {
     ),
 }
 # Cases, and the step through their keys
-QUICK = (("displaced", 8),)
+QUICK = (("displaced", 12),)
 WHOLE = (("displaced", 1), ("tilted, finite", 1))
 SLOW = ("real air and currents in the floater", "stacked", "sphere as rotor", "two magnets",
         "by charges", "elements", "mutual", "currents in the rotor", "cylinder as floater")  # fmt: skip

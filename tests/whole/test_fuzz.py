@@ -14,7 +14,7 @@ QUICK = ("points", "table", "result", "map", "command")
 
 
 @pytest.mark.parametrize(
-    ("tried", "number"), [(QUICK, 12), pytest.param(tuple(KINDS), 120, marks=pytest.mark.slow)], ids=["quick", "all"]
+    ("tried", "number"), [(QUICK, 8), pytest.param(tuple(KINDS), 120, marks=pytest.mark.slow)], ids=["quick", "all"]
 )
 def test_broken_inputs(tried, number):
     """In a process of its own: some are tried in its copies, which must not hold what other tests have loaded."""

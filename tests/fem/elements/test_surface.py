@@ -57,11 +57,11 @@ ROTORS = {
 }
 
 
-FAST = ("cube", "turned brick", "cylinder across")
+FAST = ("turned brick", "cube", "cylinder across")
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in ROTORS]
+    "name", [name if name in FAST[1:] else pytest.param(name, marks=pytest.mark.slow) for name in ROTORS]
 )
 def test_the_field_is_that_of_finite_elements(name):
     """Another method altogether: volumes instead of surfaces, weak instead of strong, meshed instead of graded."""

@@ -176,6 +176,7 @@ def test_rigid_dipole_is_the_table_of_the_rotor(rotors):
     np.testing.assert_allclose(rigid.torque, np.cross(dipole, b[0]), rtol=0, atol=3e-6 * np.linalg.norm(rigid.torque))
 
 
+@pytest.mark.slow
 def test_both_bodies_solved_at_once_agree(rotors):
     """What the answers add, against a mesh of both bodies: 5e-4 of it, the error of order 3 elements on that mesh."""
     both, error = two_body_ladder(rotors, PERMEABLE, PLACE, DIRECTION)

@@ -119,7 +119,9 @@ ROTORS = {
 }
 
 
-@pytest.mark.parametrize("name", ROTORS)
+@pytest.mark.parametrize(
+    "name", ["stacked", "displaced", pytest.param("four alike", marks=pytest.mark.slow), "eight alike"]
+)
 @pytest.mark.parametrize("tolerance", [1e-3, *(pytest.param(t, marks=pytest.mark.slow) for t in (1e-2, 1e-5))])
 def test_rotor_share_follows_the_turning_rotor(network, name, tolerance):
     """Series in angle and depth against the rotor itself, where neither was sampled: within the estimated error."""

@@ -150,8 +150,8 @@ def test_the_map_says_where_it_levitates():
     """At some places as a search for that scene does, beside the border too, which is finer than the grid."""
     fine = regions(STATE, ((100.0, 160.0), (6.0, 18.0)), "dipole", 9)
     ends = [place for piece in fine.border for place in piece]
-    beside = [(x, y + step) for x, y in ends[:: len(ends) // 3] for step in (-0.1, 0.1)]  # a fifteenth of the grid
-    for frequency, angle in [(101.0, 6.1), (159.0, 17.5), (131.0, 10.0), *beside]:
+    beside = [(x, y + step) for x, y in ends[:: len(ends) // 2] for step in (-0.1, 0.1)]  # a fifteenth of the grid
+    for frequency, angle in [(101.0, 6.1), (159.0, 17.5), *beside]:
         there = STATE.changed("frequency_hz", frequency).changed("rotor.angle_deg", angle)
         found = Levitation(there.scene, there.models).without_plate.equilibria
         assert inside([np.array(cell) for cell in fine.cells], (frequency, angle)) == any(
