@@ -175,7 +175,8 @@ class Sources(HTMLParser):
 
 @pytest.mark.usefixtures("needs_3d")
 def test_a_flight_is_shown_and_reported(spinlev, tmp_path, monkeypatch):
-    monkeypatch.setattr("spinlev.studies.figures.view.FRAMES", 1)
+    monkeypatch.setattr("spinlev.studies.figures.view.TURNS", 1)
+    monkeypatch.setattr("spinlev.studies.figures.view.FRAMES", 2)
     status, _, err = spinlev("simulate", SCENE, "--duration-s", "0.1", *FAST[:4])
     assert status == 0, err
     trajectory = tmp_path / "out" / "trajectory.nc"

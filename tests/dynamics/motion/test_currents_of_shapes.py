@@ -108,7 +108,13 @@ def test_power_is_that_of_the_fields_that_the_body_sees(name):
     assert -found == pytest.approx(loss_in_own_frame(body, state, drift, lag), rel=2e-4)
 
 
-@pytest.mark.parametrize("name", FLOATERS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in ("cylinder", "brick", "cube with brass") else pytest.param(name, marks=pytest.mark.slow)
+        for name in FLOATERS
+    ],
+)
 def test_force_and_torque_are_the_powers_derivatives(name):
     """The matrix of velocities is symmetric, and no direction gains."""
     body, units = FLOATERS[name], np.diag(np.repeat([1.0, 100.0], 3))

@@ -26,7 +26,7 @@ BODIES = [
 ]
 
 
-@pytest.fixture(params=[(1.305, 0, 0), (0.3, -0.7, 1.1)])
+@pytest.fixture(params=[pytest.param((1.305, 0, 0), marks=pytest.mark.slow), (0.3, -0.7, 1.1)])
 def polarization(request):
     return request.param
 

@@ -50,6 +50,7 @@ def cylinder_and_mean():
     return [article.levitation_of(replace(scene, frequency=143.5), "cuboid") for scene in scenes]
 
 
+@pytest.mark.slow
 def test_beside_the_rotor_a_cylinder_levitates_where_its_mean_does():
     """4 mm off it its first multipoles leave out more than a tenth of its weight: once it was found not to levitate."""
     cylinder, mean = cylinder_and_mean()
