@@ -118,10 +118,12 @@ def plate_around(
     if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
         plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
     if region is None:
-        reach = REACH * _size(radius, place)
+        gap = float(plate.body.distance(place))
+        size = _size(radius, place, gap if gap > radius else np.inf)  # else it is refused
+        reach = REACH * size
         sideways = float(np.hypot(place[0], place[1])) + reach
         region = reachable_region(plate, [0.0, 0.0, place[2]], [sideways, sideways, reach], radius)
-        region = _rastered(region, plate, radius, _size(radius, place))
+        region = _rastered(region, plate, radius, size)
     highest = HIGHEST * 2.0 ** max(0, math.ceil(math.log2(HARMONICS * max(frequency, 1.0) / HIGHEST) - 1e-9))
     return PlateAround(plate, table, region, (LOWEST, highest), rtol, model == "slab")
 
@@ -204,13 +206,14 @@ def rotor_nearby(
     return shortened_table(table, Accuracy(rtol, max(gap, radius)))
 
 
-def _size(radius: float, place: ArrayLike) -> float:
-    """Of a scene, by its floater's radius and place, m: a power of two, so that neighbours share a table.
+def _size(radius: float, place: ArrayLike, gap: float = np.inf) -> float:
+    """Of a scene, by its floater's radius, place and `gap` to the plate, m: a power of two, so that neighbours share.
 
-    A small floater far from its rotor moves as far as another, and a far one no farther.
+    A small floater far from its rotor moves as far as another, and a far one no farther; near a plate it is looked at
+    half way to it at most, as tables grow with their width over that distance.
     """
     ratios = radius / USUAL[0], float(np.linalg.norm(place)) / USUAL[1], 1.0
-    return 2.0 ** round(math.log2(sorted(ratios)[1]))
+    return float(2 ** min(np.round(np.log2(sorted(ratios)[1])), np.floor(np.log2(gap / 2 / REACH))))
 
 
 def _rastered(region: Region, plate: Plate, radius: float, shared: float | None = None) -> Region:
