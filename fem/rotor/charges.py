@@ -39,6 +39,7 @@ SOME = 5  # every so many places are looked at from step to step
 # points by coefficients of a fit, and others at which it is looked at; and what it may miss there of the tolerance
 SPACINGS, BESIDE_DEGREE, MOMENTS, MOST_FITTED = (1.0, 0.8, 0.65, 0.5, 0.4, 0.33), 2, 8, 4000
 DENSER, ROWS, OTHERS, MISSED = 12, 0.7, 1000, 0.15
+FALLS = 6.5  # power of the distance by which a fit's error falls, about
 SAFETY = 4.0  # for the places that are not looked at
 # Nodes beside each other whose normals are mixed; and how much nearer than the clearance that may lead
 BESIDE_EACH_OTHER, NEARER = 16, 0.9
@@ -111,12 +112,13 @@ def _fitted_beside(
     around, elsewhere = (_all_around(nodes, clearance, seed) for seed in (3, 4))
     elsewhere = elsewhere[:: 1 + len(elsewhere) // OTHERS]
     allowed, wanted = at(elsewhere)
-    tried = list[tuple[float, FittedExpansions, float]]()
-    for spacing in SPACINGS:
+    tried, left = list[tuple[float, FittedExpansions, float]](), list(SPACINGS)
+    while left:
+        spacing = left.pop(0)
         centers = _spread(nodes.places, spacing * clearance, len(nodes.places))
         count = len(centers) * MOMENTS
         if tried and count > MOST_FITTED:
-            break
+            continue
         points = _spread(around, 0.0, max(int(ROWS * count), models.NEAR))
         weights, field = at(points)
         fit = FittedExpansions(centers, np.full(len(centers), clearance / 3), BESIDE_DEGREE, points, weights)
@@ -125,6 +127,9 @@ def _fitted_beside(
         tried.append((missed, fit, SAFETY * missed / most if most else 0.0))
         if missed <= MISSED:
             break
+        # first those that will do, and where these are too many the finest of the others
+        finer, enough = [one for one in left if one < spacing], spacing * (MISSED / missed) ** (1 / FALLS)
+        left = [one for one in finer if one <= enough] + sorted(one for one in finer if one > enough)
     return min(tried, key=lambda one: one[0])[1:]
 
 
