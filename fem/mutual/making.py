@@ -204,9 +204,13 @@ def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
 
 
 def _inner(grids: Sequence[ResponseGrid], magnets: Sequence[Magnet]) -> int:
-    """Points along each axis of a magnet for what it does as a whole: none is in a ring's hole."""
+    """Points along each axis of a magnet for what it does as a whole.
+
+    Where the floater fits into a ring's hole, one would be there; two are outside of holes up to 0.65 of the diameter.
+    """
     near = any(gap_of(*pair) < APART for pair in combinations([magnet.body for magnet in magnets], 2))
-    return max(effort(len(magnets)).inner if near else 1, 2 if len(grids) > 1 and any(g.hole for g in grids) else 1)
+    number = effort(len(magnets)).inner if near else 1
+    return max(number, 2) if len(grids) > 1 and any(grid.hole for grid in grids) else number
 
 
 def all_points(magnets: Sequence[Magnet], radius: float) -> int:

@@ -201,7 +201,7 @@ def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Re
 def rotor_nearby(
     table: RotorTable, rotor: tuple[Magnet, ...], place: tuple[float, ...], radius: float, rtol: float
 ) -> RotorTable:
-    """The rotor's table with coefficients that count for `rtol`, `REACH` nearer than `place` (3,) m or `radius` on."""
+    """The rotor's table with coefficients that count for `rtol` about `place` (3,) m, `radius` off at least."""
     gap = min(float(magnet.body.distance(place)) for magnet in rotor) - REACH * _size(radius, place)
     return shortened_table(table, Accuracy(rtol, max(gap, radius)))
 
