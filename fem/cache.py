@@ -54,8 +54,8 @@ FORMATS = {
     "floater-currents": 3,
     "floating": 2,
     "floating-free": 1,
-    "equilibria": 18,
-    "flight": 4,
+    "equilibria": 19,
+    "flight": 5,
     "experiment": 3,
     "code": 1,
 }

@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from ...fem.harmonics import interior
 from ...fem.harmonics.expressions import regular_harmonics
 from ...fem.harmonics.interior import Ball, BallField
+from ...fem.harmonics.solid import tensors
 from ...fem.rotor.floater import (
     TURNS,
     FloaterSources,
@@ -101,8 +102,8 @@ class BodyShape:
         In the rotor's `field`, as of `wrench`; `position` (n, 3) m is the centre's, `axes` (n, 3, 3) are the body's.
         """
         own, finer = (slopes_of(each, field, position, axes)[0] for each in (self.sources, self.finer))
-        missed = np.linalg.norm((own - finer).reshape(-1, 2, 3)[:, ::-1], axis=2)
-        return np.asarray(missed / (self.floater.moment or 1.0))
+        missed = np.linalg.norm((own - finer).reshape(-1, 2, 3)[:, ::-1], axis=2) / (self.floater.moment or 1.0)
+        return np.asarray(missed + self.sources.missed(*tensors(field.derivatives(position, 2))))
 
     def placed(self, first: int) -> "BodyShape":
         return self._changed(first=first)

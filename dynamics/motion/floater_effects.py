@@ -249,7 +249,8 @@ class FloaterShape:
             pull = strength * np.einsum("nj,nji->ni", moment, gradient)
             force -= pull
             torque -= strength * np.cross(moment, field) + height * np.cross(moment, pull)
-        return np.asarray(np.linalg.norm([torque, force], axis=2).T / (self.floater.moment or 1.0))
+        missed = np.linalg.norm([torque, force], axis=2).T / (self.floater.moment or 1.0)
+        return np.asarray(missed + self.sources.missed(*table.evaluate(position)))
 
 
 EVEN = 1e-6  # By which entries of a polarizability may differ that is the same in all directions, as a cube's is

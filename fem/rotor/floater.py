@@ -8,6 +8,7 @@ A uniform part J is dipoles J dV/μ0 at the points of a rule; multipoles c_lm ar
 which have these multipoles because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s), and no others.
 """
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
@@ -15,10 +16,11 @@ from typing import Self
 import numpy as np
 import scipy
 
-from ...geometry.common import MU_0, Array, even_directions
+from ...geometry.common import MU_0, Array, even_directions, unwatched
 from ...geometry.magnets import Magnet
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import rotation_matrix
+from ...geometry.solids import Part
 from ..closed_forms.potentials import unit_dipole_fields
 from ..elements.surface import bears_charges
 from ..elements.surface_charges import SurfaceCharges
@@ -32,7 +34,9 @@ from .models import Accuracy
 from .table import DerivedField, FieldTable
 
 DEGREE = 20  # of polynomials over the body that the dipoles integrate exactly
-RTOL = 1e-5  # accuracy of the field of a permeable floater, from its circumradius off its faces on
+# Accuracy of the field of a permeable floater, from its circumradius off its faces on; and of a part from a STEP file,
+# whose elements have no mirror planes: of a bored cylinder 1e-5 took 440 s and 12 GB, 1e-4 42 s, 1e-3 20 s and 1 GB
+RTOL, RTOL_OF_PARTS = 1e-5, 1e-3
 DIRECTIONS = 24  # of a dipole beside a floater, by which the sizes of its multipoles' shares are measured
 TURNS = 8  # over which the mean of a body over turns about its moment is taken
 # Least thickness, in circumradii, and highest permeability with which moments of charges reach `RTOL`: of some hundred
@@ -51,6 +55,7 @@ class FloaterSources:
     # corners, charges: (k, 3) m and (k,) A m, of magnetic charges
     corners: Array
     charges: Array
+    error: float = 0.0  # of the field beside the floater, relative, where it is more than other errors
 
     @classmethod
     def dipole(cls, moment: Array) -> Self:
@@ -93,6 +98,12 @@ class FloaterSources:
         # the z derivative of r^l P_l is l r^(l-1) P_(l-1); what lies across z cancels in a round body
         return np.asarray(l[:, 0] * (below @ self.moments[:, 2]) + zonal @ self.charges)
 
+    def missed(self, field: Array, gradient: Array) -> Array:
+        """(n, 2) what its `error` does to torque, T, and force, T/m, by the moment; `field` (n, 3) T at the centre."""
+        b, slope = (np.linalg.norm(part.reshape(len(field), -1), axis=1) for part in (field, gradient))
+        reach = np.linalg.norm(np.concatenate([self.places, self.corners]), axis=1).max()
+        return self.error * np.transpose([b + reach * slope, slope])
+
     def unsure(self, table: FieldTable, position: Array, axes: Array) -> tuple[Array, Array]:
         """Errors of force (n,) N and torque (n,) N m by those that a `table` states.
 
@@ -101,14 +112,17 @@ class FloaterSources:
         strengths, arms = (np.linalg.norm(part, axis=1) for part in (self.moments, self.places))
         charges, ends = np.abs(self.charges), np.linalg.norm(self.corners, axis=1)
         forces, torques = np.zeros(len(position)), np.zeros(len(position))
+        if self.error:
+            own = np.linalg.norm(self.dipole_moment)
+            torques, forces = (own * self.missed(*table.evaluate(position))).T
         for k, (place, turn) in enumerate(zip(position, axes, strict=True)):
             points = place + np.concatenate([self.places, self.corners]) @ turn.T
             fields = [np.linalg.norm(part.reshape(len(points), -1), axis=1) for part in table.evaluate(points)]
             b, gradient = (e * size for e, size in zip(table.relative_error(points), fields, strict=True))
             inner, outer = b[: len(arms)], b[len(arms) :]
             pulls = strengths * gradient[: len(arms)]
-            forces[k] = pulls.sum() + charges @ outer
-            torques[k] = strengths @ inner + arms @ pulls + (charges * ends) @ outer
+            forces[k] += pulls.sum() + charges @ outer
+            torques[k] += strengths @ inner + arms @ pulls + (charges * ends) @ outer
         return forces, torques
 
 
@@ -139,9 +153,10 @@ def floater_sources(
     """Sources of a floater of any shape, in its frame.
 
     Exact for μr = 1 up to a `degree` of the rotor's field over the body; with a permeability to 1e-5 of the field
-    beside the floater, by charges on its surfaces or by finite elements, which are kept in the user's cache. A sphere
-    is one dipole. `report` is called with a message where the cache is damaged. `near` is a floater of nearly the same
-    numbers, whose table is taken: the sources are smooth functions of them.
+    beside the floater, to 1e-3 with a part from a STEP file, which is then its `error`. That is by charges on its
+    surfaces or by finite elements, which are kept in the user's cache. A sphere is one dipole. `report` is called with
+    a message where the cache is damaged. `near` is a floater of nearly the same numbers, whose table is taken: the
+    sources are smooth functions of them.
     """
     if floater.is_sphere:
         return FloaterSources.dipole(floater.dipole)
@@ -152,12 +167,19 @@ def floater_sources(
     charged = compact and known.recoil_permeability <= HARD
     # of a ring with a small hole elements take gigabytes
     model = "surface" if charged and bear_charges(known.magnets, Accuracy(RTOL, known.radius)) else "fem"
-    table, _ = cached_rotor_table(known.magnets, model, RTOL, report, known.radius)
+    rtol = RTOL_OF_PARTS if any(isinstance(magnet.body, Part) for magnet in known.magnets) else RTOL
+    watch = _said if model == "fem" else unwatched
+    table, _ = cached_rotor_table(known.magnets, model, rtol, report, known.radius, watch)
     if near is not None:
         table = changed_table(table, floater.magnets)
     # Charges farther in would be large and cancel
     least = max(floater.inner_radius, SHARE * floater.radius)
-    return _joined(table.uniform, [_charges(e, least) for e in table.expansions], degree)
+    found = _joined(table.uniform, [_charges(e, least) for e in table.expansions], degree)
+    return replace(found, error=rtol if rtol > RTOL else 0.0)
+
+
+def _said(stage: str, share: float) -> None:
+    logging.getLogger("spinlev").info(f"Field of the floater by itself, {stage}, {share:.0%} ...")
 
 
 def remanent_sources(floater: Floater, degree: int) -> FloaterSources:

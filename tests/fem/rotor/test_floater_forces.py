@@ -1,6 +1,7 @@
 """Force and torque on floaters that are no spheres: against magpylib's field on their charges, and its own forces."""
 
 import magpylib as magpy
+import netgen.occ as occ
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,8 +12,9 @@ from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor.floater import FloaterSources, _charges, floater_sources, force_and_torque
 from spinlev.geometry.common import MU_0
 from spinlev.geometry.magnets import Magnet
-from spinlev.geometry.scene.floater import Floater
+from spinlev.geometry.scene.floater import Floater, FloaterPart
 from spinlev.geometry.shapes import Box, Cylinder
+from spinlev.geometry.step_file import read_part
 
 CUBE = Magnet(Box((0.01,) * 3, (2e-3, 0.0, 0.0)), (1.3, 0.0, 0.0))
 SOURCE = magpy.magnet.Cuboid(dimension=(0.01,) * 3, position=(2e-3, 0, 0), polarization=(1.3, 0, 0))
@@ -79,6 +81,28 @@ def test_charges_on_a_permeable_floater_and_elements_in_it_are_pulled_alike(body
         force_and_torque(floater_sources(floater(body, 1.05)), table, PLACES, turns), charged, strict=True
     ):
         assert 0 < np.linalg.norm(one - other) < 1e-5 * np.linalg.norm(one)
+
+
+@pytest.mark.slow
+def test_a_part_of_a_step_file_is_pulled_as_the_cuboids_that_it_is_made_of(tmp_path):
+    """An L by elements to 1e-3 of its field, which is stated, against two cuboids by charges on their faces."""
+    corner, other = occ.Box(occ.Pnt(0, 0, -5), occ.Pnt(5, 5, 5)), Box((5e-3, 5e-3, 10e-3), (2.5e-3, -2.5e-3, 0.0))
+    (occ.Box(occ.Pnt(-5, -5, -5), occ.Pnt(5, 5, 5)) - corner).WriteStep(str(tmp_path / "ell.step"))
+    part = read_part(tmp_path / "ell.step")
+    along = np.array([0.0, 0.0, 1.3])
+    bodies = [part], [Box((5e-3, 10e-3, 10e-3), (-2.5e-3, 0.0, 0.0)), other]
+    table, turns, found = rotor_table((CUBE,), "cuboid"), turned(len(PLACES)), []
+    for group in bodies:
+        floater = Floater.composed([FloaterPart(Magnet(body, along, 1.05), 7500.0) for body in group])
+        sources = floater_sources(floater)
+        axes = turns @ floater.file_axes.T
+        found.append((sources, axes, force_and_torque(sources, table, PLACES, axes)))
+    (sources, axes, known), (_, _, exact) = found
+    for one, other, error in zip(known, exact, sources.unsure(table, PLACES, axes), strict=True):
+        missed = np.linalg.norm(one - other, axis=1)
+        print(missed / error)
+        assert (missed > 0).all()
+        assert (missed < error).all()
 
 
 @pytest.mark.parametrize(
