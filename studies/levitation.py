@@ -16,7 +16,6 @@ from ..dynamics.flights.live import LiveFlight
 from ..dynamics.flights.trajectory import FLIGHTS, Checkpoint, FlightStopped, Trajectory
 from ..dynamics.motion.effect import Interaction, interaction_of
 from ..dynamics.motion.effects import mutual_choice, with_effects
-from ..dynamics.motion.events import plate_depth
 from ..dynamics.motion.plate import PlateMemory
 from ..dynamics.motion.rates import Rates, code_of
 from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
@@ -314,7 +313,7 @@ class Levitation:
         for time, frequency in zip(times[1:], rates[1:] / (2 * np.pi), strict=True):
             there = on_branch(self.mean.still, self.mean.rates, self.branch, np.array([frequency]))[0]
             if there is not None:
-                down = self.scene.plate.body.center - plate_depth(self.scene.plate, np.array([time])) * np.eye(3)[2]
+                down = self.scene.plate.body.center - self.scene.plate.depth(time) * np.eye(3)[2]
                 plate = replace(self.scene.plate, body=moved(self.scene.plate.body, down))
                 plans.check_room(replace(self.scene, plate=plate), there.position, f" at {frequency:g} Hz")
 
@@ -483,7 +482,7 @@ class Levitation:
         """Make a table for floaters that left the last one at places (n, 3) m and times (n,) s; False: none can be."""
         memory = self.flight_plate
         assert memory is not None
-        down = plate_depth(memory.plate, times)[:, None] * np.eye(3)[2]
+        down = memory.plate.depth(times)[:, None] * np.eye(3)[2]
         region = memory.table.region
         try:
             for body in memory.plate.box.to_body(places + down):
@@ -523,7 +522,7 @@ class Levitation:
 
 def _seen(plate: Plate, simulated: Trajectory, most: int | None = None) -> Array:
     """Places (n, 3) m of a trajectory, `most` or some more, as the plate at its start would see them."""
-    height = plate_depth(plate, simulated.time)  # the plate may be lowered
+    height = plate.depth(simulated.time)  # the plate may be lowered
     places = simulated.lab.position + np.column_stack([np.zeros((len(height), 2)), height])
     return np.asarray(places[:: max(1, len(places) // most) if most else 1])
 

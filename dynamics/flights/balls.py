@@ -54,7 +54,6 @@ PART = 0.3
 # Largest spacing of their lattice in tenths of the distance from a body: the coarser, the fewer balls there are (half
 # of those at 0.4), but above 0.8 a floater would often be near the surface of the nearest one.
 COARSE = 0.78
-ORIGIN = np.zeros(3)
 NEIGHBOURS = np.indices((3, 3, 3)).reshape(3, -1).T - 1.0  # (27, 3) of a cell, and itself
 
 
@@ -86,12 +85,13 @@ class Balls:
 
     scene: Scene  # whose bodies the floater must not touch while it is in a ball
     whole: Interaction  # the rotor's table with its effects
+    largest: bool = False  # whether there is no kind but the largest
     _known: dict[tuple[float, ...], tuple[Array, float] | None] = field(default_factory=dict)
 
     @property
     def kinds(self) -> tuple[BallField, ...]:
         """From the smallest to the largest."""
-        return OF_BODIES if self.whole.turning else (SMALL, LARGE)
+        return (OF_BODIES if self.whole.turning else (SMALL, LARGE))[-1 if self.largest else 0 :]
 
     @property
     def usual(self) -> tuple[BallField, ...]:
@@ -112,7 +112,7 @@ class Balls:
         return FIRST + sum(effect.count for effect in _fitted(self.whole, LARGE))
 
     def enter(
-        self, formulas: Sequence[BallField], state: Array, values: Array, time: float = 0.0, offset: Array = ORIGIN
+        self, formulas: Sequence[BallField], state: Array, values: Array, time: float = 0.0, offset: Array | None = None
     ) -> float:
         """Set the runtime parameters `values` to the first ball of `formulas` that will do for a scaled state; error.
 
@@ -125,6 +125,7 @@ class Balls:
         lost = float(values[Parameter.LOST_DISTANCE]) * length
         drift = state[3:6] - rate * np.array([-y, x, 0.0])
         arm = rate * np.array([-drift[1], drift[0], 0.0])
+        offset = np.zeros(3) if offset is None else offset
         middle = (state[:3] - arm) * length - offset
         way = float(abs(drift[2]) if rate else np.linalg.norm(drift)) * length
         values[DEGREE : self.end] = 0.0

@@ -20,21 +20,11 @@ from ...fem.rotor.table import FieldTable
 from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import OffsetStart, Scene
 from ...geometry.scene.files import startless_text
+from ..motion import events
 from ..motion.equations import Equations
-from ..motion.events import (
-    BEYOND,
-    CONTACT,
-    LOST,
-    Events,
-    clearance,
-    flight_events,
-    motion_legs,
-    plate_depth,
-    range_events,
-)
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory
 from ..motion.state import DRIVEN, STEADY, Parameter, State, Vector
-from .flight import LEFT, MOST_SAMPLES, Course, Flight, in_plate_range, settled_currents
+from .flight import LEFT, MOST_SAMPLES, Course, Flight, settled_currents
 from .trajectory import DIVISIONS, DURATION, PARTS, IntegrationError, Recorder, Trajectory
 
 BATCH = 8  # Measured: a trajectory in a batch of 8 takes a quarter of the time of one alone, of 4 a half, of 16 a third
@@ -57,7 +47,7 @@ class _Passenger(Course):
         super().__init__(**vars(course))
         self.left = left  # Whether it was ever beyond the range of the plate's table
         scene = self.flight.scene if self.flight.memory else replace(self.flight.scene, plate=None)
-        self._legs = iter(motion_legs(scene, self.duration))
+        self._legs = iter(events.motion_legs(scene, self.duration))
         self.onward()
 
     def onward(self) -> bool:
@@ -79,12 +69,12 @@ class _Passenger(Course):
             if self.recorder:
                 self.record(now, self.state[None])
             return not last and self.onward()
-        if meaning == BEYOND:
-            self.ended_by, self.left, self.over = BEYOND, True, True
+        if meaning == events.BEYOND:
+            self.ended_by, self.left, self.over = events.BEYOND, True, True
             return False
         degree = self.flight.degree(self.values)
         self.change_ball()
-        return self.flight.degree(self.values) == degree
+        return bool(self.flight.degree(self.values) == degree)
 
     def alone(self) -> None:
         if self.recorder is None:
@@ -93,7 +83,7 @@ class _Passenger(Course):
             self.recorder = recorder.doubled(self.time[0])
         self.fly()
         self.time, self.state = (float(self.recorder.times[-1]), 0.0), self.recorder.states[-1]
-        self.left, self.over = self.ended_by == BEYOND, True
+        self.left, self.over = self.ended_by == events.BEYOND, True
 
 
 class _Launch(_Passenger):
@@ -104,7 +94,7 @@ class _Launch(_Passenger):
 
     def __init__(self, course: Course, left: bool) -> None:
         super().__init__(course, left)
-        self.ended_by = CONTACT
+        self.ended_by = events.CONTACT
         if not self.flight.scene.floater.is_sphere:
             self.recorder, self.watched = Recorder(np.zeros(0), self.flight.interval(self.duration), 1), True
 
@@ -113,7 +103,7 @@ class _Launch(_Passenger):
 
     def follow(self, meaning: str) -> bool:
         """Beyond the table it goes on; at the end of a leg the next one begins."""
-        if meaning == BEYOND:
+        if meaning == events.BEYOND:
             self.left = True
         elif meaning != DURATION or not self.onward():
             self.ended_by = meaning
@@ -124,16 +114,16 @@ class _Launch(_Passenger):
 class SimdBatch:
     """An integrator for many trajectories whose equations are the same but for runtime parameters.
 
-    `equations` and `events` are the motion's and what interrupts it, `tolerance` is the relative error of a step;
+    `equations` and `ends` are the motion's and what interrupts it, `tolerance` is the relative error of a step;
     `with_work`: the energy's work is integrated as the last state.
     """
 
-    def __init__(self, equations: Equations, events: Events, tolerance: float, with_work: bool) -> None:
+    def __init__(self, equations: Equations, ends: events.Events, tolerance: float, with_work: bool) -> None:
         system = list(zip(equations.variables, equations.rates, strict=True))
         self._count = len(system) + with_work
         if with_work:
             system.append((hy.expression("work"), equations.power))
-        self._meanings = [meaning for _, meaning in events]
+        self._meanings = [meaning for _, meaning in ends]
         self._integrator = compiled(
             hy.taylor_adaptive_batch,
             system,
@@ -141,7 +131,7 @@ class SimdBatch:
             tol=tolerance,
             compact_mode=True,
             opt_level=1,
-            t_events=[hy.t_event_batch(each, direction=hy.event_direction.negative) for each, _ in events],
+            t_events=[hy.t_event_batch(each, direction=hy.event_direction.negative) for each, _ in ends],
         )
 
     def fly(self, passengers: Sequence[_Passenger]) -> None:
@@ -164,7 +154,7 @@ class SimdBatch:
                 one.time, one.state = (time, 0.0), one.state.copy()
                 one.state[: self._count] = state
                 if slot in touched:
-                    meaning = CONTACT
+                    meaning = events.CONTACT
                 elif outcome in (hy.taylor_outcome.success, hy.taylor_outcome.step_limit):
                     continue
                 elif outcome == hy.taylor_outcome.err_nf_state:
@@ -335,7 +325,7 @@ def _ended(
 def _endings(passengers: Sequence[_Passenger]) -> Endings:
     flight = passengers[0].flight
     return Endings(
-        np.array([LOST if f.ended_by == BEYOND else f.ended_by for f in passengers], dtype="<U8"),
+        np.array([events.LOST if f.ended_by == events.BEYOND else f.ended_by for f in passengers], dtype="<U8"),
         np.minimum([f.seconds for f in passengers], passengers[0].duration),
         flight.scales.unpack(np.array([f.state[: flight.scales.size] for f in passengers])),
         np.array([f.changes.count for f in passengers]),
@@ -363,20 +353,20 @@ def simulate_together(
         passengers.append(_begun(known[key], start, duration, True, offset))
     _fly(passengers)
     speed = sum(f.seconds for f in passengers) / (perf_counter() - began)
-    return [f.trajectory(speed) if f.recorder else None for f in passengers]
+    return [f.trajectories(speed)[0] if f.recorder else None for f in passengers]
 
 
 def _begun(
     flight: Flight, start: State, duration: float, recorded: bool, offset: Array | None, currents: Array | None = None
 ) -> _Passenger:
     start = replace(start, moment=start.moment / np.linalg.norm(start.moment))
-    free = clearance(flight.scene, np.zeros(1), start.position[None], start.orientation[None])[0] >= 0
+    free = events.clearance(flight.scene, np.zeros(1), start.position[None], start.orientation[None])[0] >= 0
     course = flight.begin(start, duration, currents, flight.interval(duration) if recorded and free else None, offset)
     found = _Passenger(course)
     if not free:
-        found.ended_by, found.over = CONTACT, True
-    elif not in_plate_range(flight.memory, start):
-        found.follow(BEYOND)
+        found.ended_by, found.over = events.CONTACT, True
+    elif flight.memory and not flight.memory.in_range(start.position[None])[0]:
+        found.follow(events.BEYOND)
     return found
 
 
@@ -419,10 +409,10 @@ def launched(
     flight, count = Flight(scene, table, duration, memory=memory, in_balls=False), len(starts.position)
     equations, (scales, values) = flight.equations(0)[0], (flight.scales, flight.values)
     position, turn = equations.variables[:3], DRIVEN if scene.drive else STEADY
-    events = [
-        *flight_events(replace(scene, plate=None), position, turn),
-        *range_events(memory, position, turn),
-        *((obstacle, CONTACT) for obstacle in _obstacles(scene, memory, position)),
+    ends = [
+        *events.flight_events(replace(scene, plate=None), position, turn),
+        *events.range_events(memory, position, turn),
+        *((obstacle, events.CONTACT) for obstacle in _obstacles(scene, memory, position)),
     ]
     starts = _whole(scene, starts)
     if currents is None:  # what the floater's moment alone leaves in the plate; the rotor's part is not integrated
@@ -430,10 +420,10 @@ def launched(
         silent = np.where(np.isin(np.arange(12), (6, 7, 8)), 0.0, states)
         own = force(now, states).signals - force(now, silent).signals
         if scene.drive:  # there the rotor's part is integrated, but for its mean
-            depth = float(plate_depth(memory.plate, np.zeros(1))[0])
+            depth = float(memory.plate.depth(0.0))
             left, mean = (memory.left_by_rotor(rate).signals(0.0, depth) for rate in (scene.angular_velocity, ENDLESS))
             own = own + (left - mean) * values[Parameter.PLATE_SHARE]
-    outside = ~memory.in_range(starts.position, np.repeat(plate_depth(memory.plate, np.zeros(1)), count))
+    outside = ~memory.in_range(starts.position)
     passengers = []
     for k in range(count):
         course = flight.begin(starts[k], duration, None if currents is None else currents[k])
@@ -441,9 +431,9 @@ def launched(
             first = len(flight.own_states(starts[k]))
             course.state[first : first + own.shape[1]] = own[k]
         passengers.append(_Launch(course, bool(outside[k])))
-    free = clearance(scene, np.zeros(count), starts.position, starts.orientation) > 0
+    free = events.clearance(scene, np.zeros(count), starts.position, starts.orientation) > 0
     if free.any():
-        SimdBatch(equations, events, step_error, False).fly([passengers[k] for k in np.flatnonzero(free)])
+        SimdBatch(equations, ends, step_error, False).fly([passengers[k] for k in np.flatnonzero(free)])
     return _endings(passengers)
 
 

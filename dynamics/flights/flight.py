@@ -23,26 +23,24 @@ from ...geometry.scene.contents import AbsoluteStart, OffsetStart, Scene
 from ..continuation.frequencies import way_out
 from ..equilibria.equilibrium import AXIAL, Equilibrium, EquilibriumError
 from ..equilibria.search import find_equilibria
+from ..motion import events
 from ..motion.effect import Stateful
 from ..motion.effects import with_effects
 from ..motion.equations import Equations, equations_of_motion, parameters
-from ..motion.events import (
-    BEYOND,
-    CONTACT,
-    LOST,
-    Events,
-    Leg,
-    clearance,
-    first_contact,
-    flight_events,
-    motion_legs,
-    plate_depth,
-    range_events,
-)
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory, plate_numbers
 from ..motion.state import DRIVEN, SAME, STEADY, Given, Parameter, Scales, State
 from .balls import DEGREE, Balls, in_ball, is_long
-from .trajectory import DURATION, STOPPED, Checkpoint, FieldChanges, FlightStopped, Recorder, Trajectory, crossing
+from .trajectory import (
+    DURATION,
+    STOPPED,
+    Checkpoint,
+    FieldChanges,
+    FlightStopped,
+    Recorder,
+    Trajectory,
+    crossing,
+    propagated,
+)
 
 LEFT = "left"
 INSIDE = 1 - 1e-9  # Square of the distance from a ball's centre, in radii, from which on the floater has left it
@@ -121,7 +119,7 @@ class Flight:
         own = np.zeros(0) if memory is None else plate_numbers(memory, values, bool(scene.drive))
         self.values = np.concatenate([values, np.zeros(self.first - len(values)), own])
         """Runtime parameters, in no ball: those of the equations, of a ball, and of the plate."""
-        self.parts: dict[int, Part] = {}
+        self.parts: dict[Any, Part] = {}
         """By the `number` of the ball's kind, 0: in none."""
         self.compile_seconds, self._turns = 0.0, scene.fastest * duration
         self._tolerance = tolerance or (PLATE_TOLERANCE if memory else TOLERANCE)
@@ -133,24 +131,28 @@ class Flight:
         """(3,) m of the scene's start from an equilibrium, if it begins at one."""
         return self.scene.start.offset if isinstance(self.scene.start, OffsetStart) else None
 
-    def degree(self, values: Array) -> int:
+    @property
+    def each(self) -> "list[tuple[Flight, slice, slice]]":
+        """Of each floater its own flight, its runtime parameters and states: here this, all, all but the work."""
+        return [(self, slice(None), slice(-1))]
+
+    def degree(self, values: Array) -> Any:
         """The `number` of the ball's kind in runtime parameters; 0: none."""
         return int(values[DEGREE]) if self.balls else 0
 
-    def step_error(self, degree: int) -> float:
+    def step_error(self, degree: Any) -> float:
         """Relative error of a step in balls of a kind, or, 0, in the table's own field."""
         looser = LOOSER_BODY if self.whole.turning else LOOSER
         return self._tolerance * (looser if degree else 1)
 
-    def part(self, degree: int) -> Part:
+    def part(self, degree: Any) -> Part:
         """The compiled motion in balls of a kind, or, 0, in the table's own field."""
         if degree not in self.parts:
             # in small balls most of a long trajectory is spent: straight code is for them, or where there are none
             began = perf_counter()
-            equations, events = self.equations(degree)
+            equations, ends = self.equations(degree)
             thorough = THOROUGH if self.whole.turning and degree and not self.memory else OPTIMISATION
             steps = self._turns * (2 if self.whole.turning else 1)  # in those of a sphere's turns
-            falling = hy.event_direction.negative
             small = [kind.number for kind in self.balls.kinds[:-1]] if self.balls else []
             integrator = compiled(
                 hy.taylor_adaptive,
@@ -159,16 +161,16 @@ class Flight:
                 tol=self.step_error(degree),
                 compact_mode=not self._straight or (self.balls is not None and degree not in small),
                 opt_level=thorough if steps > (SHORT_OVER_PLATE if self.memory else SHORT_TURNS) else 0,
-                t_events=[hy.t_event(each, direction=falling) for each, _ in events],
+                t_events=[hy.t_event(each, direction=hy.event_direction.negative) for each, _ in ends],
             )
-            terms, given = list(equations.jacobi), list(equations.variables)
+            terms = list(equations.jacobi), list(equations.variables)
             # In balls expressions are so short that straight code is ready sooner and twice as fast at 20 000 samples.
-            jacobi = compiled(hy.cfunc, terms, given, compact_mode=not degree, opt_level=0)
-            self.parts[degree] = Part(integrator, [meaning for _, meaning in events], jacobi)
+            jacobi = compiled(hy.cfunc, *terms, compact_mode=not (self.balls and degree), opt_level=0)
+            self.parts[degree] = Part(integrator, [meaning for _, meaning in ends], jacobi)
             self.compile_seconds += perf_counter() - began
         return self.parts[degree]
 
-    def equations(self, degree: int) -> tuple[Equations, Events]:
+    def equations(self, degree: Any) -> tuple[Equations, events.Events]:
         """Equations of motion and terminal events; a ball is free of bodies and ends before the floater is lost."""
         ball = BallField(DEGREE + 1, abs(degree), degree < 0)
         whole = in_ball(self.whole, ball) if degree else self.whole
@@ -181,12 +183,12 @@ class Flight:
         position, turn = equations.variables[:3], DRIVEN if driven else STEADY
         if degree:
             away = ball.offset([given[Parameter.LENGTH] * x for x in position])  # as the field has it
-            events = [(1.0 - hy.sum([a * a for a in away]), LEFT)]
+            ends = [(1.0 - hy.sum([a * a for a in away]), LEFT)]
             if whole.turning:
-                events.append((SIZE + equations.variables[6], LEFT))  # no number may be one; a part of a unit vector
+                ends.append((SIZE + equations.variables[6], LEFT))  # no number may be one; a part of a unit vector
         else:
-            events = flight_events(self.scene, position, turn)
-        return equations, events if self.memory is None else [*events, *range_events(self.memory, position, turn)]
+            ends = events.flight_events(self.scene, position, turn)
+        return equations, ends if self.memory is None else [*ends, *events.range_events(self.memory, position, turn)]
 
     def jacobi(self, values: Array, times: Array, states: Array) -> Array:
         """Terms (k, n) of the Jacobi integral at scaled times (n,) and states (n, s), with the plate where it is then.
@@ -199,20 +201,27 @@ class Flight:
         for start in range(0, len(times), AT_ONCE):
             now, inputs = times[start : start + AT_ONCE], states[start : start + AT_ONCE, :-1].T
             if self.scene.plate is not None:
-                depth = plate_depth(self.scene.plate, now * self.scales.time)
+                depth = self.scene.plate.depth(now * self.scales.time)
                 pars[Parameter.PLATE_DEPTH, : len(now)] = depth / self.scales.length
             given = np.ascontiguousarray(pars[: function.nparams, : len(now)])
             found.append(function(np.ascontiguousarray(inputs), pars=given, time=now))
         return np.concatenate(found, axis=1)
 
     def balanced(self, values: Array, times: Array, states: Array) -> Array:
-        """The floater's own at scaled times (n,), and J - work, from states (n, s) under parameters `values`.
+        """The floaters' own at scaled times (n,), and J - work, from states (n, s) under parameters `values`.
 
-        With a drive what the motor has given, angular momentum and work, is between.
+        With a drive what the motor has given each, angular momentum and work, follows its own.
         """
         energy = self.jacobi(values, times, states).sum(axis=0) - states[:, -1]
-        given = states[:, -3:-1] if self.scene.drive else states[:, :0]
-        return np.concatenate([states[:, : self.scales.size], given, energy[:, None]], axis=1)
+        given = (-2, -1) if self.scene.drive else ()
+        kept = [states[:, own][:, [*range(one.scales.size), *given]] for one, _, own in self.each]
+        return np.concatenate([*kept, energy[:, None]], axis=1)
+
+    def touching(self, values: Array, times: Array, states: Array) -> tuple[int, tuple[int, ...]] | None:
+        """The first of times (n,) s at which something overlaps in states (n, s), and which of several floaters do."""
+        there = self.scales.unpack(states)
+        first = events.first_contact(self.scene, times, there.position, there.orientation)
+        return None if first is None else (first, ())
 
     def begin(
         self,
@@ -230,7 +239,7 @@ class Flight:
         farthest = max(0.1, 2 * float(np.linalg.norm(start.position)))  # of the rotor's origin; beyond, it is lost
         values[Parameter.LOST_DISTANCE] = farthest / self.scales.length
         if self.memory is not None:
-            depth = float(plate_depth(self.memory.plate, np.zeros(1))[0])
+            depth = float(self.memory.plate.depth(0.0))
             rate = ENDLESS if self.scene.drive else self.scene.angular_velocity
             left = self.memory.left_by_rotor(rate).signals(0.0, depth)
             own = ((0.0 if currents is None else currents) - left) * values[Parameter.PLATE_SHARE]
@@ -238,15 +247,11 @@ class Flight:
         course = Course(self, duration, values, np.concatenate([self.own_states(start), own, given]))
         course.enter_ball(offset)
         if interval is not None:
-            row, now = course.state[None], np.zeros(1)
-            terms = self.jacobi(course.values, now, row)
-            largest, whole = float(np.abs(terms).max()), abs(float(terms.sum()))
-            course.scale = whole if whole > 1e-3 * largest else largest  # they may nearly cancel
-            course.recorder = Recorder(self.balanced(course.values, now, row)[0], interval, MOST_SAMPLES)
+            course.sample(interval)
         return course
 
     def own_states(self, state: State) -> Array:
-        """Scaled states of the floater and of effects that have some, for a `state` along the rotor's axes."""
+        """Scaled states of floater and effects in a `state` along the rotor's axes."""
         more = [effect.states_at(state) for effect in self.whole.effects if isinstance(effect, Stateful)]
         return np.concatenate([self.scales.pack(state), *more])
 
@@ -258,7 +263,7 @@ class Flight:
 
 @dataclass(eq=False)
 class Course:
-    """How far a trajectory is."""
+    """How far a trajectory is, or those of several floaters."""
 
     flight: Flight  # the problem, and when it ends (s) if nothing ends it before
     duration: float
@@ -272,6 +277,7 @@ class Course:
     recorder: Recorder | None = None  # samples with J - work, and the size of J; none where only the end is asked for
     scale: float = 1.0
     sound: bool = True  # whether samples and state belong together: not where an interrupt comes between them
+    which: tuple[int, ...] = ()  # of several floaters those that have ended it
 
     @property
     def seconds(self) -> float:
@@ -282,107 +288,128 @@ class Course:
 
         A body that is not round, and begins at an `offset` (3,) m from an equilibrium, gets one about that.
         """
-        balls = self.flight.balls
-        if not balls:
+        if not (balls := self.flight.balls):
             return
-        if offset is None or not self.flight.whole.turning:
-            error = balls.enter(balls.usual, self.state, self.values, self.time[0])
-        else:
-            error = balls.enter(balls.kinds, self.state, self.values, self.time[0], offset)
-            error = self._centred() or error
+        about = self.flight.whole.turning and offset is not None
+        kinds, off = (balls.kinds, offset) if about else (balls.usual, None)
+        error = balls.enter(kinds, self.state, self.values, self.time[0], off)
+        # Such a body swings about another place than its mean, and what a ball misses of multipoles is the cube of the
+        # distance from its centre: a ball about the middle of the first turns' way, if there is one that holds that.
+        if about and (number := self.flight.degree(self.values)):
+            integrator = self.flight.part(number).integrator
+            times = self.time[0] + 2 * np.pi * np.arange(0.0, LOOKED_AHEAD, 0.125)
+            event, *_, states = propagated(integrator, self.values, self.time, self.state, times)
+            if event is None:
+                error = balls.centre(self.values, states[:, :3] * self.values[Parameter.LENGTH]) or error
         self.changes = FieldChanges(error=error)
 
-    def _centred(self) -> float | None:
-        """The error of a ball about the middle of the first turns' way, if there is one that holds that.
+    def sample(self, interval: float) -> None:
+        """Keep samples from now on at multiples of `interval`, scaled."""
+        row, now = self.state[None], np.array([self.time[0]])
+        terms = self.flight.jacobi(self.values, now, row)
+        largest, whole = float(np.abs(terms).max()), abs(float(terms.sum()))
+        self.scale = whole if whole > 1e-3 * largest else largest  # they may nearly cancel
+        self.recorder = Recorder(self.flight.balanced(self.values, now, row)[0], interval, MOST_SAMPLES)
 
-        A body that is not round swings about another place than its mean, and what a ball misses of multipoles is the
-        cube of the distance from its centre.
-        """
-        balls, number = self.flight.balls, self.flight.degree(self.values)
-        if not balls or not number:
-            return None
-        integrator = self.flight.part(number).integrator
-        integrator.pars[:], integrator.state[:] = self.values[: len(integrator.pars)], self.state
-        integrator.dtime = self.time
-        integrator.reset_cooldowns()
-        outcome, *_, states = integrator.propagate_grid(self.time[0] + 2 * np.pi * np.arange(0.0, LOOKED_AHEAD, 0.125))
-        if outcome != hy.taylor_outcome.time_limit:
-            return None
-        return balls.centre(self.values, states[:, :3] * self.values[Parameter.LENGTH])
+    def _gained(self, before: Array) -> float:
+        """Change of J by other runtime parameters than those before."""
+        flight, now, row = self.flight, np.array([self.time[0]]), self.state[None]
+        return float(flight.jacobi(self.values, now, row).sum() - flight.jacobi(before, now, row).sum())
 
     def change_ball(self) -> None:
-        """Go over to a larger ball about the place now; its difference in energy is added to the work."""
-        if self.flight.balls is None:
-            return
-        degree, *center, inverse = self.values[DEGREE : DEGREE + 5]
-        away = self.state[:3] * self.values[Parameter.LENGTH] - center
-        if degree and away @ away * inverse**2 < INSIDE:
-            return
-        after, now, row = self.values.copy(), np.array([self.time[0]]), self.state[None]
-        error = self.flight.balls.enter(self.flight.balls.after(int(degree)), self.state, after, self.time[0])
-        if np.array_equal(after, self.values):
-            return
-        jump = float(self.flight.jacobi(after, now, row).sum() - self.flight.jacobi(self.values, now, row).sum())
-        self.state, self.values = self.state.copy(), after
-        self.state[-1] += jump
-        known = self.changes
-        total, error = known.total + abs(jump), max(known.error, error)
-        self.changes = FieldChanges(known.count + 1, known.energy + jump, total, error)
+        """Go over to larger balls about places now; the difference in energy is added to the work."""
+        before, known, error = self.values, self.changes, self.changes.error
+        self.values = before.copy()
+        for one, where, own in self.flight.each:
+            if one.balls is None:
+                continue
+            values, state = self.values[where], self.state[own]
+            degree, *center, inverse = values[DEGREE : DEGREE + 5]
+            away = state[:3] * values[Parameter.LENGTH] - center
+            if not degree or away @ away * inverse**2 >= INSIDE:
+                error = max(error, one.balls.enter(one.balls.after(int(degree)), state, values, self.time[0]))
+        if not np.array_equal(self.values, before):
+            jump = self._gained(before)
+            self.state = np.append(self.state[:-1], self.state[-1] + jump)
+            self.changes = FieldChanges(known.count + 1, known.energy + jump, known.total + abs(jump), error)
+
+    def travel(self, progress: Callable[[float], None] | None, checkpoint: Checkpoint | None) -> float:
+        """Go on, from a checkpoint if there is something, until something ends it: simulated seconds per second.
+
+        Compilation is left out. A keyboard interrupt is an end, too.
+        """
+        flight, began = self.flight, perf_counter() - self.flight.compile_seconds
+        if (kept := checkpoint.read() if checkpoint else None) is not None:
+            self.restore(kept)
+        begun = self.seconds
+        assert self.recorder is not None
+        try:
+            self.fly(progress, checkpoint)
+        except KeyboardInterrupt:
+            self.ended_by, self.which = STOPPED, ()
+            if checkpoint and self.steps and self.sound:
+                checkpoint.write(self.content())
+        done = float(self.recorder.times[-1]) * flight.scales.time - begun
+        return done / (perf_counter() - flight.compile_seconds - began)
 
     def fly(self, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None) -> None:
         """Propagate in pieces until something ends the trajectory."""
-        flight, scales, kept = self.flight, self.flight.scales, perf_counter()
+        flight, unit, kept = self.flight, self.flight.scales.time, perf_counter()
         assert self.recorder is not None
-        for leg in motion_legs(flight.scene, self.duration):
-            if self.time[0] >= leg.end / scales.time:
+        for leg in events.motion_legs(flight.scene, self.duration):
+            if self.time[0] >= leg.end / unit:
                 continue
             end = self.set_leg(leg)
             while self.time[0] < end:
                 self.change_ball()
                 times, states = self._piece(end, self.recorder)
-                over = self.ended_by not in (DURATION, LEFT) or times[-1] * scales.time >= self.duration * (1 - 1e-12)
+                over = self.ended_by not in (DURATION, LEFT) or times[-1] * unit >= self.duration * (1 - 1e-12)
                 self.recorder.add(times[1:], states[1:], over)
                 self.sound = True
                 if progress is not None:
-                    progress(min(1.0, times[-1] * scales.time / self.duration))
+                    progress(min(1.0, times[-1] * unit / self.duration))
                 if over:
                     return
                 if checkpoint and perf_counter() - kept > checkpoint.every:
                     checkpoint.write(self.content())
                     kept = perf_counter()
 
-    def set_leg(self, leg: Leg) -> float:
+    def set_leg(self, leg: events.Leg) -> float:
         """Let plate and rotor move as on a leg; scaled time of its end."""
-        flight, before, now, row = self.flight, self.values.copy(), np.array([self.time[0]]), self.state[None]
-        leg.write(self.values, flight.scales, flight.scene)
+        before = self.values.copy()
+        for one, where, _ in self.flight.each:
+            leg.write(self.values[where], one.scales, one.scene)
         if leg.way and self.recorder:  # a rotor whose axis begins to turn has another J
-            jump = flight.jacobi(self.values, now, row).sum() - flight.jacobi(before, now, row).sum()
-            self.state = np.append(self.state[:-1], self.state[-1] + jump)
-        return leg.end / flight.scales.time
+            self.state = np.append(self.state[:-1], self.state[-1] + self._gained(before))
+        return leg.end / self.flight.scales.time
 
     def _piece(self, end: float, recorder: Recorder) -> tuple[Array, Array]:
         """Go on to the end of a piece or to an event: scaled times, and states with J - work."""
         flight, part = self.flight, self.flight.part(self.flight.degree(self.values))
         watched, often = LEFT not in part.meanings, recorder.interval  # there are no bodies in a ball
-        if watched and not flight.scene.floater.is_sphere:  # samples alone tell of contact with its surface
-            often = flight.interval(self.duration)
-        piece = recorder.piece(part.integrator, self.values, self.time, self.state, end, flight.scales.time, often)
+        if watched and not all(one.scene.floater.is_sphere for one, _, _ in flight.each):
+            often = flight.interval(self.duration)  # samples alone tell of contact with its surface
+        grid = recorder.grid(self.time[0], end, often)
+        event, steps, times, states = propagated(part.integrator, self.values, self.time, self.state, grid)
         self.sound = False
-        self.time, self.state, times, states = piece.time, piece.state, piece.times, piece.states
-        self.steps, self.ended_by = self.steps + piece.steps, DURATION
-        if piece.event is not None:
-            self.ended_by = part.meanings[piece.event]
+        self.time, self.state = part.integrator.dtime, part.integrator.state.copy()
+        self.steps, self.ended_by = self.steps + steps, DURATION
+        if event is not None:
+            self.ended_by, *which = part.meanings[event].split()
+            self.which = tuple(map(int, which))
         if watched and (first := self.touching(times, states)) is not None:
-            self.ended_by = CONTACT
+            self.ended_by = events.CONTACT
             times, states = times[: first + 1], states[: first + 1]
             if first:
-                times[-1], states[-1] = crossing(part.integrator, times[-2:], states[-2:], self.touching)
+                times[-1], states[-1] = crossing(part.integrator, self.values, times[-2:], states[-2:], self.touching)
         return times, flight.balanced(self.values, times, states)
 
     def touching(self, times: Array, states: Array) -> int | None:
         """The first of scaled times (n,) at which the floater overlaps something in its state (n, s)."""
-        there = self.flight.scales.unpack(states)
-        return first_contact(self.flight.scene, times * self.flight.scales.time, there.position, there.orientation)
+        if (found := self.flight.touching(self.values, times * self.flight.scales.time, states)) is None:
+            return None
+        first, self.which = found
+        return first
 
     def content(self) -> dict[str, Any]:
         """All that decides the rest, for a checkpoint, and the region (2, 3) m of the plate's table; zeros: none."""
@@ -402,39 +429,37 @@ class Course:
         self.recorder.times, self.recorder.states = content["times"], content["states"]
         self.recorder.interval = float(content["interval"])
 
-    def trajectory(self, speed: float) -> Trajectory:
-        """The samples, at so many simulated seconds per second."""
+    def trajectories(self, speed: float) -> list[Trajectory]:
+        """The samples of each floater, at so many simulated seconds per second."""
         assert self.recorder is not None
-        scales, scene, changes, given = self.flight.scales, self.flight.scene, self.changes, None
+        scales, scene, changes, memory = self.flight.scales, self.flight.scene, self.changes, self.flight.memory
         time, states = np.minimum(self.recorder.times * scales.time, self.duration), self.recorder.states
         if self.ended_by == DURATION:  # not a last digit less
             time[-1] = self.duration
-        angle, memory, beyond = scene.angle(time), self.flight.memory, 0.0
-        lab, pose = scales.unpack(states).to_lab(angle), None
-        if scene.moving:
-            lab = lab.moved(*(pose := scene.pose(time)))
-        if memory is not None:
-            beyond = float(1 - np.mean(memory.in_range(lab.position, plate_depth(memory.plate, time))))
-        if scene.drive:
-            unit = scene.floater.mass * scales.length**2 / scales.time  # of an angular momentum
-            given = states[:, scales.size : scales.size + 2] * [unit, unit / scales.time]
-        drift = np.abs(states[:, -1] - states[0, -1]).max() / self.scale
-        return Trajectory(
-            time=time,
-            lab=lab,
-            angle=angle,
-            rate=scene.rate(time),
-            ended_by=LOST if self.ended_by == BEYOND else self.ended_by,
-            energy_error=float(max(drift, scales.off_unit(states))),
-            realtime_factor=speed,
-            steps=self.steps,
-            compile_seconds=self.flight.compile_seconds,
-            beyond_plate_table=beyond,
-            left_plate_table=self.ended_by == BEYOND,
-            field_changes=replace(changes, energy=changes.energy / self.scale, total=changes.total / self.scale),
-            given=given,
-            pose=pose,
+        angle, pose, labs = scene.angle(time), scene.pose(time) if scene.moving else None, list[State]()
+        error = float(np.abs(states[:, -1] - states[0, -1]).max()) / self.scale
+        given = np.zeros((len(time), 2)) if scene.drive else None
+        for one, _, _ in self.flight.each:
+            own, states = np.split(states, [one.scales.size + (0 if given is None else 2)], axis=1)
+            error = max(error, one.scales.off_unit(own))
+            lab = one.scales.unpack(own).to_lab(angle)
+            labs.append(lab.moved(*pose) if pose else lab)
+            if given is not None:
+                unit = one.scene.floater.mass * scales.length**2 / scales.time  # of an angular momentum
+                given += own[:, -2:] * [unit, unit / scales.time]
+        known = memory is None or memory.in_range(labs[0].position, time)
+        beyond, left = float(1 - np.mean(known)), self.ended_by == events.BEYOND
+        said = (
+            events.LOST if left else self.ended_by,
+            error,
+            speed,
+            self.steps,
+            self.flight.compile_seconds,
+            beyond,
+            left,
         )
+        changes = replace(changes, energy=changes.energy / self.scale, total=changes.total / self.scale)
+        return [Trajectory(time, lab, angle, scene.rate(time), *said, changes, given, pose) for lab in labs]
 
 
 def integrate(
@@ -454,24 +479,11 @@ def integrate(
 
     Accuracy: energy and |m̂| drift by about 1e-14 in a thousand turns; over a plate see `PLATE_TOLERANCE`.
     """
-    began, known = perf_counter(), flight.compile_seconds
     course = flight.begin(start, duration, currents, flight.interval(duration), flight.offset)
-    kept = checkpoint.read() if checkpoint else None
-    if kept is not None:
-        course.restore(kept)
-    began_at = course.seconds
-    if kept is None and not in_plate_range(flight.memory, start):
-        course.ended_by = BEYOND  # no event reports a range in which it never was
-        return course.trajectory(0.0)
-    try:
-        course.fly(progress, checkpoint)
-    except KeyboardInterrupt:
-        course.ended_by = STOPPED
-        if checkpoint and course.steps and course.sound:
-            checkpoint.write(course.content())
-    assert course.recorder is not None
-    seconds = perf_counter() - began - (flight.compile_seconds - known)
-    found = course.trajectory((float(course.recorder.times[-1]) * flight.scales.time - began_at) / seconds)
+    if flight.memory and not flight.memory.in_range(start.position[None])[0]:
+        course.ended_by = events.BEYOND  # no event reports a range in which it never was
+        return course.trajectories(0.0)[0]
+    (found,) = course.trajectories(course.travel(progress, checkpoint))
     if course.ended_by == STOPPED:
         raise FlightStopped(found)
     return found
@@ -491,11 +503,9 @@ def simulate(
     """Simulate the trajectory of a scene's floater for `duration` (s), or until contact or loss.
 
     Raises EquilibriumError: the trajectory is to begin near a stable equilibrium and there is none; StartError: it
-    begins in contact, or `duration` is not positive; FlightStopped: by a keyboard interrupt; it has what is finished.
-    `equilibria` are those of the scene, if already known; `tolerance` and `compact` are as of `Flight`; `progress` is
-    called with the finished part, 0 to 1, a few times a second; `memory` is of the plate's currents (left out, the
-    plate is only an obstacle). At `checkpoint` the trajectory is kept while it lasts; it goes on from there if there is
-    something.
+    begins in contact, or `duration` is not positive; FlightStopped: as of `integrate`, whose are `progress` and
+    `checkpoint`. `equilibria` are those of the scene, if already known; `tolerance` and `compact` are as of `Flight`;
+    `memory` is of the plate's currents (left out, the plate is only an obstacle).
     """
     if not duration > 0:
         raise StartError(f"Input duration must be positive; instead received {duration} s.")
@@ -525,16 +535,14 @@ def initial_state(
     currents = np.zeros(0)
     if isinstance(scene.start, AbsoluteStart):
         start = scene.start
-        moment, axes = start.moment / np.linalg.norm(start.moment), None
-        if not scene.floater.round:
-            axes = scene.floater.axes(moment, start.body_x)
+        moment = start.moment / np.linalg.norm(start.moment)
+        axes = None if scene.floater.round else scene.floater.axes(moment, start.body_x)
         state = State(start.position, start.velocity, moment, start.spin, axes)
         if memory is not None:
             currents = settled_currents(scene, memory, state)
     else:
         known = find_equilibria(scene, table, memory=memory) if equilibria is None else equilibria
-        chosen = starting_point(known)
-        if chosen is None:
+        if (chosen := starting_point(known)) is None:
             raise EquilibriumError(way_out(scene, table, known, memory=memory))
         begun = chosen.start
         if not scene.floater.round and begun.axes is None:  # the mean over all turns about the moment
@@ -557,7 +565,7 @@ def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, orie
     `name` is what the message calls its place; see `clearance` for `orientation`.
     """
     turned = None if orientation is None else orientation[None]
-    gap = float(clearance(scene, np.array([time]), position[None], turned)[0])
+    gap = float(events.clearance(scene, np.array([time]), position[None], turned)[0])
     if gap < 0:
         where = ", ".join(f"{1e3 * c:.6g}" for c in position)
         raise StartError(
@@ -593,8 +601,3 @@ def displaced(start: State, offset: Array, angular_velocity: float) -> State:
     moment, spin = (np.broadcast_to(v, offset.shape) for v in (start.moment, start.spin))
     axes = None if start.axes is None else np.broadcast_to(start.axes, (*offset.shape, 3))
     return State(start.position + offset, start.velocity + turning, moment, spin, axes)
-
-
-def in_plate_range(memory: PlateMemory | None, lab: State, time: float = 0.0) -> bool:
-    """Whether the table of `memory`, if there is one, knows the field where `lab` (laboratory) is at `time`, s."""
-    return memory is None or bool(memory.in_range(lab.position, plate_depth(memory.plate, np.array([time])))[0])

@@ -11,7 +11,7 @@ from ...geometry.scene.contents import Scene
 from ..equilibria.equilibrium import Equilibrium
 from ..motion.plate import PlateMemory
 from ..motion.state import State, turned_about_z
-from .flight import Flight, StartError, check_free, in_plate_range, initial_state
+from .flight import Flight, StartError, check_free, initial_state
 from .trajectory import DURATION, Recorder
 
 FEWEST, MOST, A_SECOND = 8, 256, 400  # Samples of a piece at least and at most, and between that so many a second
@@ -107,7 +107,8 @@ class LiveFlight:
 
     def _check_range(self, place: Array) -> None:
         """Raises StartError where the plate's table does not know the field at a place (3,) m in the laboratory."""
-        if not in_plate_range(self._course.flight.memory, replace(self.now, position=place), self.time):
+        memory = self._course.flight.memory
+        if memory and not memory.in_range(place[None], self.time)[0]:
             where = ", ".join(f"{1e3 * c:.4g}" for c in place)
             raise StartError(
                 f"Input position must be where the field of the plate's currents was computed; instead received "

@@ -16,7 +16,7 @@ from ...geometry.common import Array, ComputationError, InputError, html_table, 
 from ...geometry.files import seal, unsealed, write_whole
 from ..equilibria.balance import Indices
 from ..motion.events import CONTACT, LOST
-from ..motion.state import State
+from ..motion.state import Parameter, State
 
 DURATION, STOPPED = "duration", "stopped"
 # The most turns and samples between two looks at the motion. A step ends where a piece does, so that pieces must not
@@ -234,18 +234,6 @@ def _drifts(means: Array) -> bool:
     return change > max(VISIBLE, 3 * float(np.std(means - line(steps))))
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A part of a motion between two looks at it, scaled."""
-
-    times: Array  # (m,) of the samples, the first where it began
-    states: Array  # (m, s)
-    time: tuple[float, float]  # where it ended, the sum of two numbers
-    state: Array  # (s,)
-    steps: int  # of Taylor's method
-    event: int | None  # number of the event that ended it
-
-
 class Recorder:
     """Samples at multiples of an interval, which doubles, dropping every other sample, when there are too many.
 
@@ -264,38 +252,6 @@ class Recorder:
         times = interval * np.arange(first, first + count)
         times = times[times < end - 1e-9 * interval]
         return np.concatenate([[now], times, [end] if len(times) < count else []])
-
-    def piece(
-        self,
-        integrator: Any,
-        values: Array,
-        time: tuple[float, float],
-        state: Array,
-        end: float,
-        unit: float,
-        often: float,
-    ) -> Piece:
-        """Motion from a `time` and `state` to an event, or to `end` or so far as samples are looked at once.
-
-        Raises IntegrationError: the state became infinite. `integrator` and runtime parameters `values` are the
-        motion's; `time`, the sum of two numbers, and `end` are scaled, with so many seconds (`unit`) a scaled time of
-        1; looks at the motion are so `often`, a scaled interval.
-        """
-        integrator.pars[:], integrator.state[:] = values[: len(integrator.pars)], state
-        integrator.dtime = time
-        integrator.reset_cooldowns()
-        times = self.grid(time[0], end, often)
-        outcome, _, _, steps, _, states = integrator.propagate_grid(times)
-        if outcome == hy.taylor_outcome.err_nf_state:
-            raise IntegrationError(
-                f"A floater's state became infinite at t = {integrator.time * unit:.6g} s. "
-                "Look whether the start lies inside a magnet or the table's range is too small."
-            )
-        times, event = times[: len(states)], None
-        if outcome != hy.taylor_outcome.time_limit:
-            times, states = np.append(times, integrator.time), np.vstack([states, integrator.state])
-            event = -outcome.value - 1
-        return Piece(times, states, integrator.dtime, integrator.state.copy(), steps, event)
 
     def doubled(self, now: float) -> "Recorder":
         """With the interval that so many samples as there would have been until `now` had led to."""
@@ -322,21 +278,40 @@ class Recorder:
             self.times, self.states = self.times[kept], self.states[kept]
 
 
+def propagated(
+    integrator: Any, values: Array, time: tuple[float, float], state: Array, times: Array
+) -> tuple[int | None, int, Array, Array]:
+    """Number of the event that ended a motion before the last of `times` (n,), steps, those up to it, and states there.
+
+    From a `time`, the sum of two numbers, and a `state` (s,) with runtime parameters `values` of the `integrator`; all
+    scaled. Raises IntegrationError: the state became infinite.
+    """
+    integrator.pars[:], integrator.state[:] = values[: len(integrator.pars)], state
+    integrator.dtime = time
+    integrator.reset_cooldowns()
+    outcome, _, _, steps, _, states = integrator.propagate_grid(times)
+    if outcome == hy.taylor_outcome.err_nf_state:
+        raise IntegrationError(
+            f"A floater's state became infinite at t = {integrator.time * values[Parameter.TIME]:.6g} s. "
+            "Look whether the start lies inside a magnet or the table's range is too small."
+        )
+    if outcome == hy.taylor_outcome.time_limit:
+        return None, steps, times, states
+    times, states = np.append(times[: len(states)], integrator.time), np.vstack([states, integrator.state])
+    return -outcome.value - 1, steps, times, states
+
+
 def crossing(
-    integrator: Any, times: Array, states: Array, first_over: Callable[[Array, Array], int | None]
+    integrator: Any, values: Array, times: Array, states: Array, first_over: Callable[[Array, Array], int | None]
 ) -> tuple[float, Array]:
     """Time and state (s,) at which a motion crosses a border between `times` (2,), its `states` (2, s) being there.
 
-    The `integrator` has the motion's runtime parameters; `first_over` gives the first of times (n,) at which a state
-    (n, s) is over the border; None: at none of them.
+    `integrator`, `values`: as of `propagated`; `first_over` gives the first of times (n,) at which a state (n, s) is
+    over the border; None: at none of them.
     """
     for _ in range(DIVISIONS):
-        integrator.time, integrator.state[:] = times[0], states[0]
-        integrator.reset_cooldowns()
-        times = np.linspace(times[0], times[1], PARTS + 1)
-        outcome, *_, states = integrator.propagate_grid(times)
-        if outcome != hy.taylor_outcome.time_limit:
-            times, states = np.append(times[: len(states)], integrator.time), np.vstack([states, integrator.state])
+        grid = np.linspace(times[0], times[1], PARTS + 1)
+        *_, times, states = propagated(integrator, values, (times[0], 0.0), states[0], grid)
         first = first_over(times, states) or len(times) - 1
         times, states = times[first - 1 : first + 1], states[first - 1 : first + 1]
     return float(times[-1]), states[-1]

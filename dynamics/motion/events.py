@@ -11,7 +11,7 @@ import numpy as np
 
 from ...geometry.common import Array
 from ...geometry.overlap import TOUCHING, body_overlap, parting
-from ...geometry.scene.contents import Plate, Scene, Stretch
+from ...geometry.scene.contents import Scene, Stretch
 from ...geometry.shapes import Box, Cylinder
 from ...geometry.solids import Solid
 from .plate import PlateMemory, raised, seen_by_plate
@@ -82,7 +82,7 @@ def clearance(scene: Scene, time: Array, position: Array, orientation: Array | N
     gaps = [body.distance(position) for body in scene.turning_bodies]
     if scene.standing_bodies:
         seen = turned_about_z(position, scene.angle(time))
-        seen[:, 2] += plate_depth(scene.plate, time)
+        seen[:, 2] += scene.plate.depth(time) if scene.plate else 0.0
         gaps += [body.distance(seen) for body in scene.standing_bodies]
     found = np.min(gaps, axis=0) - scene.floater.radius if gaps else np.full(len(position), np.inf)
     if not scene.floater.is_sphere and orientation is not None:
@@ -117,7 +117,8 @@ def _pairs(scene: Scene, time: float, position: Array, orientation: Array) -> li
     found = [(body, part) for body in scene.turning_bodies for part in parts]
     if scene.standing_bodies:
         turn = scene.angle(time)
-        seen = turned_about_z(position, turn) + plate_depth(scene.plate, np.array([time])) * [0.0, 0.0, 1.0]
+        seen = turned_about_z(position, turn)
+        seen[2] += scene.plate.depth(time) if scene.plate else 0.0
         axes = turned_about_z(scene.floater.axes(orientation).T, turn).T
         floater = scene.floater.placed(seen, axes)
         found += [(body, part) for body in scene.standing_bodies for part in floater]
@@ -133,11 +134,6 @@ def rotor_gap(scene: Scene, position: Array, orientation: Array | None = None) -
     pointing = None if orientation is None else orientation[None]
     alone = replace(scene, plate=None, coils=scene.axial_coils)
     return float(clearance(alone, np.zeros(1), position[None], pointing)[0])
-
-
-def plate_depth(plate: Plate | None, time: Array) -> Array:
-    """Distance (n,) m by which the plate, if there is one, is lowered at `time` (n,) s."""
-    return np.zeros(len(time)) if plate is None or plate.lowering is None else plate.lowering.depth(time)
 
 
 @dataclass(frozen=True)

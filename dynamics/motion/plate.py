@@ -32,7 +32,7 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...fem.plate.multipoles import cartesian, weighted
 from ...fem.plate.table import PlateTable, RotorShare
@@ -89,8 +89,9 @@ class PlateMemory:
         series[1::2], series[2::2] = amplitudes.real, -amplitudes.imag
         return replace(self.share, series=series)
 
-    def in_range(self, lab: Array, depth: Array) -> NDArray[np.bool_]:
-        """Which places (n, 3) m along the laboratory's axes the table knows, the plate at depths (n,) m."""
+    def in_range(self, lab: Array, time: ArrayLike = 0.0) -> NDArray[np.bool_]:
+        """Which places (n, 3) m along the laboratory's axes the table knows at a time or each of (n,), s."""
+        depth = np.broadcast_to(self.plate.depth(time), len(lab))
         return self.table.in_range(self.plate.box.to_body(lab + depth[:, None] * [0.0, 0.0, 1.0]))
 
     def __repr__(self) -> str:

@@ -63,6 +63,10 @@ class Plate:
     def box(self) -> Box:
         return self.body.box
 
+    def depth(self, time: ArrayLike) -> Array:
+        """Distance (n,) m by which it is lowered at each `time` (n,) s."""
+        return self.lowering.depth(time) if self.lowering else np.zeros(np.shape(time))
+
     @property
     def way(self) -> float:
         """Distance by which it is lowered, m; 0 if it is not."""

@@ -16,7 +16,6 @@ from ...dynamics.equilibria.equilibrium import MARGINAL, STABILITIES, Equilibriu
 from ...dynamics.equilibria.path import NEAR, NEWTON_STEPS, Ways
 from ...dynamics.equilibria.search import survey
 from ...dynamics.flights.live import LiveFlight, Piece
-from ...dynamics.motion.events import plate_depth
 from ...dynamics.motion.state import Parameter, polar_angle
 from ...fem.cache import NotKeptError, kept_only
 from ...fem.rotor.choice import PERMEABLE
@@ -369,7 +368,7 @@ def _frame(piece: Piece | None = None) -> Frame:
             "moment": moments[-1],
             "seen": 1e3 * seen[-1],
             "angle": float(np.fmod(piece.angle, 2 * np.pi)),
-            "plate": 1e3 * float(plate_depth(plate, piece.time[-1:])[0]) if (plate := flight.scene.plate) else 0.0,
+            "plate": 1e3 * float(plate.depth(piece.time[-1])) if (plate := flight.scene.plate) else 0.0,
         },
         "ended": f"After {flight.time:.3g} s {words}." if words else "",
         "message": "",
