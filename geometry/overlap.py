@@ -150,12 +150,6 @@ def deepest_overlap_in_a_turn(rotating: Solid, fixed: Solid) -> float:
     return -_least_in_a_turn(gap, lambda angles: [gap(angle) for angle in angles], 73)[1]
 
 
-def overlapping_magnets(magnets: Sequence[Magnet]) -> list[tuple[int, int, float]]:
-    """Pairs of magnets that overlap (touching is allowed) with their depth, m."""
-    pairs = [(i, j, body_overlap(magnets[i].body, magnets[j].body)) for j in range(len(magnets)) for i in range(j)]
-    return [(i, j, depth) for i, j, depth in pairs if depth > TOUCHING]
-
-
 def shifted_magnet(magnet: Magnet, shift: Array) -> Magnet:
     """The magnet moved by (3,) m."""
     return replace(magnet, body=moved(magnet.body, magnet.body.center + shift)) if shift.any() else magnet

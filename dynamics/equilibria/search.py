@@ -12,12 +12,12 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ...fem.cache import TableKind
 from ...fem.rotor.table import ROUND_OFF, DerivedField, FieldTable, RangeError, RotorTable
 from ...geometry.common import Array, Report, Watch, unwatched
 from ...geometry.scene.contents import AbsoluteStart, Scene
-from ...geometry.shapes import rotation_matrix
 from ..motion.body_shape import BodyShape
 from ..motion.coils import BesideCoils
 from ..motion.effect import Interaction
@@ -137,7 +137,10 @@ def survey(
     With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
     """
     check_turning(scene)
-    search = _Search(remembered, watch)
+
+    def search(scene: Scene, table: FieldTable, balance: Balance, kind: str) -> FixedPoints:
+        return remembered(lambda: _searched(scene, table, balance, watch), kind)
+
     if not scene.floater.round:
         return _survey_of_any_body(scene, table, spin, rates, search)
     if scene.floater.mean:
@@ -146,64 +149,46 @@ def survey(
     equations = rates or Rates(with_effects(scene, table))
     top = _own_spin(scene) * scales.time * scales.spin_ratio
     balance = Balance(equations, parameters(scene, scales, frozen_spin=True), spin * scales.spin_ratio, top)
-    known = search.found(scene, table, balance, "")
+    known = search(scene, table, balance, "")
     if np.any(scene.gravity[:2]) and any(of_whole_body(scene, equations, e) for e in upright(scene, balance, known)):
         balance = replace(balance, rates=Rates(mean_over_turns(scene, table)[1]))
     return survey_of(scene, balance, known)
 
 
-@dataclass(frozen=True)
-class _Search:
-    """What `survey` has of a search."""
-
-    remembered: Remembered
-    watch: Watch
-
-    def found(self, scene: Scene, table: FieldTable, balance: Balance, kind: str) -> FixedPoints:
-        return self.remembered(lambda: _searched(scene, table, balance, self.watch), kind)
+Search = Callable[[Scene, FieldTable, Balance, str], FixedPoints]
+Means = tuple[Scene, Interaction, Interaction]  # of `mean_over_turns`
 
 
-def _survey_of_mean(
-    scene: Scene,
-    means: tuple[Scene, Interaction, Interaction],
-    spin: float,
-    search: _Search,
-    quick: Rates | None = None,
-) -> Survey:
-    """`survey` of a body's mean over turns (`mean_over_turns`), from its multipoles, whose rates are `quick`."""
+def _survey_of_mean(scene: Scene, means: Means, spin: float, search: Search, quick: Rates | None = None) -> Survey:
+    """`survey` of a body's mean over turns, from its multipoles, whose rates are `quick`."""
     round_scene, exactly, roughly = means
     scales, ratio = Scales.of(round_scene), round_scene.floater.spin_ratio
     values, own = parameters(round_scene, scales, frozen_spin=True), _own_spin(scene) * scales.time * ratio
     about = Balance(quick or Rates(roughly), values, spin * ratio, own)
-    seeds = search.found(round_scene, exactly, about, AVERAGED)
+    seeds = search(round_scene, exactly, about, AVERAGED)
     exact, points, doubts = _by_whole_body(scene, exactly, about, seeds.points)
     return survey_of(round_scene, exact, FixedPoints.at(exact, points, doubts, seeds.curves))
 
 
-def _survey_of_any_body(scene: Scene, table: FieldTable, spin: float, rates: Rates | None, search: _Search) -> Survey:
+def _survey_of_any_body(scene: Scene, table: FieldTable, spin: float, rates: Rates | None, search: Search) -> Survey:
     """`survey` of a body that is not round about its moment: its mean over turns about that, and frequency-locked."""
-    means = mean_over_turns(scene, table)
+    means, found = mean_over_turns(scene, table), Survey((), ())
     quick = Rates(means[2])
-    found: list[Equilibrium] = []
-    curves: tuple[ForceCurve, ...] = ()
-    left_out: tuple[LeftOut, ...] = ()
     if scene.floater.turns_freely:
-        known = _survey_of_mean(scene, means, spin, search, quick)
-        found = [replace(one, kind=AVERAGED) for one in known.equilibria]
-        curves, left_out = known.curves, known.left_out
-    if scene.frequency:
-        round_scene, exactly, _ = means
-        values = parameters(round_scene, Scales.of(round_scene), frozen_spin=True)
-        still = Balance(quick, values, round_scene.floater.spin_ratio, still=True)
-        seeds = search.found(round_scene, exactly, still, LOCKED)
-        rates = rates or Rates(with_effects(scene, table))
-        locked = _survey(_locked(scene, with_effects(scene, table), seeds, rates), curves or seeds.curves)
-        if np.any(scene.gravity[:2]):
-            alone = replace(scene, plate=None)
-            locked = _forced(ForcedMotion(alone, rates, parameters(scene, Scales.of(scene)), None), locked)
-        left_out += locked.left_out
-        found, curves = [*found, *locked.equilibria], locked.curves
-    return _survey(found, curves, left_out)
+        found = _survey_of_mean(scene, means, spin, search, quick)
+        found = replace(found, equilibria=tuple(replace(one, kind=AVERAGED) for one in found.equilibria))
+    if not scene.frequency:
+        return found
+    round_scene, exactly, _ = means
+    values = parameters(round_scene, Scales.of(round_scene), frozen_spin=True)
+    still = Balance(quick, values, round_scene.floater.spin_ratio, still=True)
+    seeds, whole = search(round_scene, exactly, still, LOCKED), with_effects(scene, table)
+    rates = rates or Rates(whole)
+    locked = _survey(_locked(scene, whole, seeds, rates), found.curves or seeds.curves)
+    if np.any(scene.gravity[:2]):
+        alone = replace(scene, plate=None)
+        locked = _forced(ForcedMotion(alone, rates, parameters(scene, Scales.of(scene)), None), locked)
+    return _survey([*found.equilibria, *locked.equilibria], locked.curves, found.left_out + locked.left_out)
 
 
 def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, rates: Rates) -> list[Equilibrium]:
@@ -219,16 +204,9 @@ def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, rates: Rates) 
     starts = np.concatenate(near)
     if not len(starts):
         return []
-    values = parameters(scene, scales)
-    turns = [rotation_matrix((0.0, 0.0, angle)) for angle in 360 / TURNS * np.arange(TURNS)]
-    axes = list[Array]()
-    for moment in starts[:, 3:]:
-        first, second = tangent_basis(moment[None])[0]
-        plain = floater.axes(moment)
-        across = np.stack([first, second, moment], axis=1)
-        axes += [across @ turn @ across.T @ plain for turn in turns]
-    places = np.repeat(starts[:, :3], TURNS, axis=0)
-    position, quaternion = locked_poses(rates, values, places, np.array(axes))
+    values, angles = parameters(scene, scales), 2 * np.pi / TURNS * np.arange(TURNS)[:, None]
+    axes = [Rotation.from_rotvec(angles * m).as_matrix() @ floater.axes(m) for m in starts[:, 3:]]
+    position, quaternion = locked_poses(rates, values, np.repeat(starts[:, :3], TURNS, axis=0), np.concatenate(axes))
     inside = SearchRange(scene).holds(position)
     known, doubts = field_doubts(table, position[inside] * scales.length)
     chosen = np.flatnonzero(inside)[known]
@@ -246,10 +224,9 @@ def _searched(scene: Scene, table: FieldTable, balance: Balance, watch: Watch) -
     if not (scene.floater.is_sphere or scene.floater.mean):
         free, errors = _of_shape(scene, table, known, doubts, where)
         if free is None:
-            balance, where, doubts = _by_whole_body(scene, table, balance, where)
-            known = np.ones(len(where), bool)
-        else:
-            known, doubts = free, errors
+            balance, where, errors = _by_whole_body(scene, table, balance, where)
+            free = np.ones(len(where), bool)
+        known, doubts = free, errors
     weight = scene.floater.mass * float(scene.gravity[2])
     unit = scene.floater.mass * scales.length / scales.time**2
     forces = [ForceCurve(c.points[:, :3] * scales.length, c.points[:, 3:], c.force * unit - weight) for c in curves]
@@ -524,16 +501,14 @@ def locked_equilibrium(
 
 def without_twins(found: list[Equilibrium]) -> list[Equilibrium]:
     """Of those in one place with one moment and the same modes the first: a symmetry of the body makes the others."""
-    kept: list[Equilibrium] = []
-    for one in found:
-        unlike = [
-            np.linalg.norm(one.position - other.position) > 1e-6 * np.linalg.norm(one.position)
-            or np.linalg.norm(one.state.moment - other.state.moment) > 1e-5
-            or len(one.frequencies_hz) != len(other.frequencies_hz)
-            or not np.allclose(one.frequencies_hz, other.frequencies_hz, rtol=1e-4, atol=1e-4)
-            or one.stable != other.stable
-            for other in kept
-        ]
-        if all(unlike):
-            kept.append(one)
-    return kept
+
+    def alike(one: Equilibrium, other: Equilibrium) -> bool:
+        return bool(
+            np.linalg.norm(one.position - other.position) <= 1e-6 * np.linalg.norm(one.position)
+            and np.linalg.norm(one.state.moment - other.state.moment) <= 1e-5
+            and len(one.frequencies_hz) == len(other.frequencies_hz)
+            and np.allclose(one.frequencies_hz, other.frequencies_hz, rtol=1e-4, atol=1e-4)
+            and one.stable == other.stable
+        )
+
+    return [one for k, one in enumerate(found) if not any(alike(one, other) for other in found[:k])]

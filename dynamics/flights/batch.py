@@ -233,20 +233,17 @@ class Endings:
 
     @classmethod
     def joined(cls, parts: "Sequence[Endings]") -> "Endings":
-        vectors = zip(*(part.last.vectors for part in parts), strict=True)
         axes = [part.last.axes for part in parts if part.last.axes is not None]
-        names = ("ended_by", "levitated_s", "changes", "left_plate_table")
-        whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-        last = State(*map(np.concatenate, vectors))
-        return cls(last=replace(last, axes=np.concatenate(axes) if axes else None), **whole)
+        last = State(*map(np.concatenate, zip(*(part.last.vectors for part in parts), strict=True)))
+        last = replace(last, axes=np.concatenate(axes) if axes else None)
+        names = vars(parts[0]).keys() - {"last"}
+        return cls(last=last, **{name: np.concatenate([vars(part)[name] for part in parts]) for name in names})
 
     def replaced(self, some: NDArray[np.intp], others: "Endings") -> "Endings":
         """These with `some` (k,) of them as they are in `others`."""
         order = np.arange(len(self.ended_by))
         order[some] = len(order) + np.arange(len(some))
-        both = Endings.joined([self, others])
-        names = ("ended_by", "levitated_s", "last", "changes", "left_plate_table")
-        return Endings(**{name: getattr(both, name)[order] for name in names})
+        return Endings(**{name: part[order] for name, part in vars(Endings.joined([self, others])).items()})
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{np.sum(self.ended_by == end)} by {end}" for end in np.unique(self.ended_by))
@@ -312,12 +309,12 @@ def _whole(scene: Scene, starts: State) -> State:
 def _ended(
     scene: Scene, table: FieldTable, duration: float, memory: PlateMemory | None, currents: Array | None, given: Begun
 ) -> Endings:
-    starts, offset = given
+    starts, offsets = given
     flight = Flight(scene, table, duration, tolerance=None, compact=True, memory=memory, in_balls=True)
     passengers = list[_Passenger]()
-    for k in range(len(starts.position)):
+    for k, offset in enumerate([None] * len(starts.position) if offsets is None else offsets):
         left = settled_currents(scene, memory, starts[k]) if memory and currents is None else currents
-        passengers.append(_begun(flight, starts[k], duration, False, None if offset is None else offset[k], left))
+        passengers.append(_begun(flight, starts[k], duration, False, offset, left))
     _fly(passengers)
     return _endings(passengers)
 
@@ -338,9 +335,8 @@ def simulate_together(
 ) -> list[Trajectory | None]:
     """Trajectories of `duration` (s) of `scenes` in the field of one `table`, from one of `starts` each.
 
-    Their equations are the same but for runtime parameters.
-
-    Each is what `simulate` gives without a plate's currents, but for round-off; None where the start is in contact.
+    Their equations are the same but for runtime parameters. Each is what `simulate` gives without a plate's currents,
+    but for round-off; None where the start is in contact.
     Raises IntegrationError: a state became infinite.
     """
     began, known = perf_counter(), dict[str, Flight]()
@@ -349,9 +345,10 @@ def simulate_together(
         if key not in known:
             several = len(set(keys)) > 1
             known[key] = Flight(scene, table, duration, compact=True, in_balls=True, shared=several)
-        offset = scene.start.offset if isinstance(scene.start, OffsetStart) else None
+        offset = scene.start.offset if isinstance(scene.start, OffsetStart) else None  # each has its own
         passengers.append(_begun(known[key], start, duration, True, offset))
     _fly(passengers)
+
     speed = sum(f.seconds for f in passengers) / (perf_counter() - began)
     return [f.trajectories(speed)[0] if f.recorder else None for f in passengers]
 

@@ -16,10 +16,11 @@ these, and the same fluxes, whose rate is that of the coils' field at the moving
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import pairwise
 from time import process_time
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -56,11 +57,9 @@ class Supply:
     @property
     def shares(self) -> list[list[float]]:
         """For 1 A of each source the current of each coil."""
-        found = np.zeros((len(self.groups), len(self.coils)))
-        for row, group in zip(found, self.groups, strict=True):
-            sizes = [1.0 if isinstance(c.current, np.ndarray) else c.current for c in (self.coils[k] for k in group)]
-            row[list(group)] = np.array(sizes) / (sizes[0] or 1.0)
-        return found.tolist()
+        sizes = np.array([1.0 if isinstance(coil.current, np.ndarray) else coil.current for coil in self.coils])
+        members = np.array([np.isin(np.arange(len(sizes)), group) for group in self.groups])
+        return (members * sizes / [[sizes[group[0]] or 1.0] for group in self.groups]).tolist()  # type: ignore[no-any-return]
 
     @property
     def leaders(self) -> list[Coil]:
@@ -71,33 +70,23 @@ class Supply:
         """Times (n,) s at which a current has a corner."""
         return np.unique([0.0, *(time for coil in self.coils for time in coil.corners)])
 
-    @property
-    def first(self) -> Array:
-        """(sources,) A at the start."""
-        return np.array([f(0.0)[0] for f in self.functions(0.0)])
+    def at(self, time: ArrayLike) -> Array:
+        """(..., sources) A at times (...,) s."""
+        return np.stack([coil.amperes(time) for coil in self.leaders], axis=-1)
 
     def kept(self, rates: Array) -> NDArray[np.bool_]:
         """Which modes of `rates` (states,) 1/s are states; the others follow at once."""
         return rates < FAST * 2 * np.pi * max(LOWEST, *(coil.frequency for coil in self.leaders))
 
-    def functions(self, start: float) -> list[Callable[[float], tuple[float, float]]]:
-        """Current (A) and its rate (A/s) of each source at a time (s) in the stretch that begins at one."""
 
-        def wave(coil: Coil) -> Callable[[float], tuple[float, float]]:
-            rate, size = 2 * np.pi * coil.frequency, float(coil.current)
-            if not rate:
-                return lambda t: (size, 0.0)
-            return lambda t: (size * np.sin(rate * t + coil.phase), size * rate * np.cos(rate * t + coil.phase))
-
-        def line(coil: Coil) -> Callable[[float], tuple[float, float]]:
-            times, values = coil.current.T  # type: ignore[union-attr]
-            k = int(np.searchsorted(times, start, "right")) - 1
-            inside = 0 <= k < len(times) - 1
-            slope = (values[k + 1] - values[k]) / (times[k + 1] - times[k]) if inside else 0.0
-            base, at = (values[max(k, 0)], times[max(k, 0)])
-            return lambda t: (base + slope * (t - at), slope)
-
-        return [line(coil) if isinstance(coil.current, np.ndarray) else wave(coil) for coil in self.leaders]
+def _current(coil: Coil, start: float, end: float) -> Callable[[float], tuple[float, float]]:
+    """Current (A) and its rate (A/s) at a time (s) in a stretch in which it has no corner."""
+    if rate := 2 * np.pi * coil.frequency:
+        size = float(coil.current)
+        return lambda t: (size * np.sin(rate * t + coil.phase), size * rate * np.cos(rate * t + coil.phase))
+    first, last = coil.amperes([start, end]).tolist()
+    slope = (last - first) / (end - start)
+    return lambda t: (first + slope * (t - start), slope)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,10 +161,9 @@ def levitation_height(scene: Scene, modes: FloatingModes) -> float:
     def left(height: float) -> float:
         return modes.mean_force(height, phasors, frequencies) - weight
 
-    every = np.linspace(*modes.heights, 200)[1:-1]
-    forces = np.array([left(z) for z in every])
-    falls = np.flatnonzero((forces[:-1] > 0) & (forces[1:] <= 0))
-    return float(brentq(left, every[falls[0]], every[falls[0] + 1], xtol=1e-12)) if len(falls) else float("nan")
+    every = np.linspace(*modes.heights, 200)[1:-1].tolist()
+    fall = next((pair for pair in pairwise(every) if left(pair[0]) > 0 >= left(pair[1])), None)
+    return float(brentq(left, *fall, xtol=1e-12)) if fall else float("nan")
 
 
 def conductor_motion(scene: Scene, modes: FloatingModes, duration: float) -> ConductorMotion:
@@ -190,7 +178,7 @@ def conductor_motion(scene: Scene, modes: FloatingModes, duration: float) -> Con
     mass, gravity, brake, rates = floater.mass, -float(scene.gravity[2]), scene.drag.linear, modes.rates
     low, high = modes.heights
     kept = supply.kept(rates)
-    first = (modes.flux(start.position[2])[0] @ supply.first)[kept]
+    first = (modes.flux(start.position[2])[0] @ supply.at(0.0))[kept]
     state = np.concatenate([[start.position[2], start.velocity[2]], first, [0.0] * 2])
     gap = start.position[2] - low
     energy = mass * abs(gravity) * gap
@@ -212,9 +200,8 @@ def conductor_motion(scene: Scene, modes: FloatingModes, duration: float) -> Con
 
     inside: Ends = [("contact", lambda u: u[0] - low), ("lost", lambda u: high - u[0])]
     time, path, ended = _integrated(supply, state, slope, inside, allowed, duration)
-    amperes = np.stack([coil.amperes(time) for coil in supply.leaders], axis=1)
     fluxes = np.array([modes.flux(z)[0][kept] for z in np.clip(path[:, 0], low, high)])
-    own = path[:, 2:-2] - np.einsum("nms,ns->nm", fluxes, amperes)
+    own = path[:, 2:-2] - np.einsum("nms,ns->nm", fluxes, supply.at(time))
     parts = [mass * path[:, 1] ** 2 / 2, mass * gravity * path[:, 0], np.sum(np.square(own), axis=1) / 2, path[:, -1]]
     error = float(np.ptp(np.sum(parts, axis=0))) / max(energy, float(np.ptp(path[:, -2])))
     place, speed, still = np.tile(start.position, (len(time), 1)), np.zeros((len(time), 3)), np.zeros((len(time), 3))
@@ -235,9 +222,8 @@ def _integrated(
     events = [lambda time, u, *more, f=f: float(f(u)) for _, f in inside]
     for event in events:
         event.terminal = True  # type: ignore[attr-defined]
-    ends = [*(t for t in supply.knots if 0 < t < duration), duration]
-    for begin, end in zip([0.0, *ends[:-1]], ends, strict=True):
-        functions = supply.functions(begin)
+    for begin, end in pairwise([0.0, *(t for t in supply.knots if 0 < t < duration), duration]):
+        functions = [_current(coil, begin, end) for coil in supply.leaders]
 
         def at(time: float, u: Array, functions: list[Callable[[float], tuple[float, float]]] = functions) -> Array:
             return slope(u, *np.array([f(time) for f in functions]).T)
@@ -328,15 +314,14 @@ def free_motion(scene: Scene, modes: FreeModes, duration: float) -> ConductorMot
     axes = floater.axes(start.moment, start.body_x)
     turning = np.array(quaternions_of(axes))
     state = np.concatenate([start.position, start.velocity, turning, axes.T @ start.spin, np.zeros(kept.sum() + 2)])
-    state[13:-2] = (fluxes(state)[-1] @ supply.first)[kept]
+    state[13:-2] = (fluxes(state)[-1] @ supply.at(0.0))[kept]
     gap, pull = (box[1][2] - box[0][2]) / (FARTHEST - LEAST), float(np.linalg.norm(scene.gravity)) or 9.81
     energy = mass * pull * gap
     sizes = [SMALL * gap] * 3, [SMALL * np.sqrt(pull * gap)] * 3, [SMALL] * 4, [SMALL * np.sqrt(pull / gap)] * 3
     allowed = np.concatenate([*sizes, np.full(kept.sum(), np.sqrt(energy)), [energy] * 2])
     inside: Ends = [("contact", above), ("lost", within)]
     time, path, ended = _integrated(supply, state, slope, inside, allowed, duration)
-    amperes = np.stack([coil.amperes(time) for coil in supply.leaders], axis=1)
-    own = path[:, 13:-2] - [(fluxes(u)[-1] @ now)[kept] for u, now in zip(path, amperes, strict=True)]
+    own = path[:, 13:-2] - [(fluxes(u)[-1] @ now)[kept] for u, now in zip(path, supply.at(time), strict=True)]
     parts = [mass * np.sum(path[:, 3:6] ** 2, axis=1) / 2, -mass * path[:, :3] @ scene.gravity,
              path[:, 10:13] ** 2 @ inertia / 2, np.sum(np.square(own), axis=1) / 2, path[:, -1]]  # fmt: skip
     error = float(np.ptp(np.sum(parts, axis=0))) / max(energy, float(np.ptp(path[:, -2])))

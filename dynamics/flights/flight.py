@@ -117,10 +117,9 @@ class Flight:
         self.first = self.balls.end if self.balls else len(Parameter)
         values = parameters(scene, self.scales)
         own = np.zeros(0) if memory is None else plate_numbers(memory, values, bool(scene.drive))
+        # runtime parameters, in no ball: those of the equations, of a ball, and of the plate
         self.values = np.concatenate([values, np.zeros(self.first - len(values)), own])
-        """Runtime parameters, in no ball: those of the equations, of a ball, and of the plate."""
-        self.parts: dict[Any, Part] = {}
-        """By the `number` of the ball's kind, 0: in none."""
+        self.parts: dict[Any, Part] = {}  # by the `number` of the ball's kind, 0: in none
         self.compile_seconds, self._turns = 0.0, scene.fastest * duration
         self._tolerance = tolerance or (PLATE_TOLERANCE if memory else TOLERANCE)
         long = memory is None and self._turns > STRAIGHT_TURNS  # straight code of a plate takes minutes to compile
@@ -174,8 +173,7 @@ class Flight:
         """Equations of motion and terminal events; a ball is free of bodies and ends before the floater is lost."""
         ball = BallField(DEGREE + 1, abs(degree), degree < 0)
         whole = in_ball(self.whole, ball) if degree else self.whole
-        driven = bool(self.scene.drive)
-        moving = self.scene.moving
+        driven, moving = bool(self.scene.drive), self.scene.moving
         given = Given(self.values if whole.turning and not self._shared else None)
         equations = equations_of_motion(
             whole, self.tilted, self.memory, self.first, driven, moving, given, self.scales.frame
@@ -579,10 +577,8 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 
     The floater's own eddy currents do so slowly, in minutes.
     """
-    stable = [e for e in equilibria if e.stable]
-    without = [e for e in equilibria if e.without and e.without.stable]
-    slowly = [e for e in equilibria if e.growth_per_s < SLOWLY]
-    return next(iter([*stable, *without, *slowly]), None)
+    stable = [e for e in equilibria if e.stable] or [e for e in equilibria if e.without and e.without.stable]
+    return next(iter(stable or (e for e in equilibria if e.growth_per_s < SLOWLY)), None)
 
 
 def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:

@@ -53,18 +53,13 @@ class LiveFlight:
         return self._course.seconds
 
     @property
-    def state(self) -> Array:
-        """Scaled, rotor's frame, with the plate's and the work."""
-        return self._course.state
-
-    @property
     def ended_by(self) -> str:
         return self._course.ended_by
 
     @property
     def now(self) -> State:
         """Motion along the laboratory's axes, SI units."""
-        return self._course.flight.scales.unpack(self.state).to_lab(self.scene.angle(self.time))
+        return self._course.flight.scales.unpack(self._course.state).to_lab(self.scene.angle(self.time))
 
     def onward(self, seconds: float) -> Piece:
         """Integrate on so long (s), or to contact or loss, after which nothing is left to integrate.

@@ -66,19 +66,15 @@ class Trajectory:
 
     def __repr__(self) -> str:
         place = ", ".join(f"{1e3 * value:.4f}" for value in self.lab.position[-1])
-        speed = f"{self.steps} steps, {self.realtime_factor:.3g} times real time"
         return (
-            f"Trajectory of {self.levitated_s:.4g} s ({len(self.time)} samples), "
-            f"ended by {self.ended_by} at ({place}) mm\n  energy balance to {self.energy_error:.1e}; {speed}"
+            f"Trajectory of {self.levitated_s:.4g} s ({len(self.time)} samples), ended by {self.ended_by} at ({place}) "
+            f"mm\n  energy balance to {self.energy_error:.1e}; {self.steps} steps, {self.realtime_factor:.3g} times "
+            "real time"
         )
 
     def _repr_html_(self) -> str:
-        rows = {
-            "ended by": self.ended_by,
-            "at": millimetres(self.lab.position[-1]),
-            "samples": str(len(self.time)),
-            "energy balance": f"{self.energy_error:.1e}",
-        }
+        rows = {"ended by": self.ended_by, "at": millimetres(self.lab.position[-1])}
+        rows |= {"samples": str(len(self.time)), "energy balance": f"{self.energy_error:.1e}"}
         return html_table(f"Trajectory of {self.levitated_s:.4g} s", rows)
 
     @property
@@ -135,9 +131,7 @@ class Checkpoint:
         write_whole(self.path, seal(stream.getvalue()))
 
     def read(self) -> dict[str, Any] | None:
-        """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none), or None without a file.
-
-        None, too, of one that is not `resumed`.
+        """Arrays by name, with the `region` (2, 3) m of the plate's table (zeros: none); None: no file, not `resumed`.
 
         Raises InputError: the file is damaged, or belongs to another trajectory.
         """
@@ -184,10 +178,9 @@ def flight_kind(flight: Trajectory) -> str:
     if flight.left_plate_table:
         return NOT_FOLLOWED
     lasted = flight.ended_by in (DURATION, STOPPED)
-    distance = np.linalg.norm(flight.rotor.position, axis=1)
-    if len(distance) < FEWEST * WINDOWS or flight.levitated_s <= SHORTEST:
+    whole = np.arange(len(flight.time))
+    if len(whole) < FEWEST * WINDOWS or flight.levitated_s <= SHORTEST:
         return STABLE if lasted else LOST_AT_ONCE
-    whole = np.arange(len(distance))
     if not lasted:
         end = np.array_split(whole, WINDOWS)[-1]
         return OSCILLATING_LOSS if _swings(flight, whole) or _swings(flight, end) else LINEAR_FALL
@@ -195,13 +188,16 @@ def flight_kind(flight: Trajectory) -> str:
     late = sizes[-WINDOWS // 4 :].mean()
     if late > VISIBLE and late > 2 * sizes[: WINDOWS // 4].mean():
         return GROWING
-    return DRIFTING if _drifts(means[WINDOWS // 2 :]) else STABLE
+    means, steps = means[WINDOWS // 2 :], np.arange(WINDOWS - WINDOWS // 2)
+    line = np.polynomial.Polynomial.fit(steps, means, 1)
+    visible = max(VISIBLE, 3 * float(np.std(means - line(steps))))
+    return DRIFTING if abs(line(steps[-1]) - line(0)) > visible else STABLE
 
 
 def _swings(flight: Trajectory, samples: Indices) -> bool:
-    """Whether the oscillation grew more than the mean distance changed until it was largest, among samples (n,).
+    """Whether the oscillation grew more than the mean distance changed until it was largest, but for the last samples.
 
-    The last of them do not count. Where there are too few it is not known, and said not to.
+    Where there are too few it is not known, and said not to.
     """
     if len(samples) < FEWEST * WINDOWS:
         return False
@@ -211,27 +207,15 @@ def _swings(flight: Trajectory, samples: Indices) -> bool:
 
 
 def _trends(flight: Trajectory, samples: Indices) -> tuple[Array, Array]:
-    """Mean distance, and size of the oscillation in the rotor's frame, in parts of samples (n,), m."""
-    places = flight.rotor.position
-    distance = np.linalg.norm(places, axis=1)
-    parts = np.array_split(samples, WINDOWS)
-    sizes = [_oscillation(flight.time[part], places[part]) for part in parts]
-    return np.array([distance[part].mean() for part in parts]), np.array(sizes)
-
-
-def _oscillation(time: Array, places: Array) -> float:
-    """Amplitude of places (n, 3) about a smooth trend, m."""
-    terms = np.vander((time - time[0]) / np.ptp(time), 3)
-    rest = places - terms @ np.linalg.lstsq(terms, places)[0]
-    return float(np.sqrt(2 * np.mean(rest**2, axis=0).sum()))
-
-
-def _drifts(means: Array) -> bool:
-    """Whether means (n,) in turn change along a straight line, and visibly."""
-    steps = np.arange(len(means))
-    line = np.polynomial.Polynomial.fit(steps, means, 1)
-    change = abs(float(line(steps[-1]) - line(0)))
-    return change > max(VISIBLE, 3 * float(np.std(means - line(steps))))
+    """Mean distance, and size of the oscillation about a smooth trend in the rotor's frame, in parts of samples, m."""
+    means, sizes, every = [], [], flight.rotor.position
+    for part in np.array_split(samples, WINDOWS):
+        time, places = flight.time[part], every[part]
+        terms = np.vander((time - time[0]) / np.ptp(time), 3)
+        rest = places - terms @ np.linalg.lstsq(terms, places)[0]
+        means.append(np.linalg.norm(places, axis=1).mean())
+        sizes.append(np.sqrt(2 * np.mean(rest**2, axis=0).sum()))
+    return np.array(means), np.array(sizes)
 
 
 class Recorder:

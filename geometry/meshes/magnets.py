@@ -25,7 +25,7 @@ import numpy as np
 from ..common import Array, MeshError, frozen_array
 from ..files import LostError, call_apart
 from ..magnets import Magnet
-from ..overlap import overlapping_magnets
+from ..overlap import TOUCHING, body_overlap
 from ..shapes import Box, Cylinder, Sphere
 from ..solids import Part, Solid, moved, with_frame
 from .solids import LONGEST, SIMPLER, SMALLEST, SolidMesh, occ_solid, unmeshed
@@ -101,8 +101,11 @@ def mesh_magnets(
     settings = settings or MeshSettings()
     if not (magnets := tuple(magnets)):
         raise ValueError("Input magnets must hold at least one magnet; instead received none.")
-    for i, j, depth in overlapping_magnets(magnets):
-        raise ValueError(f"Input magnets must not overlap; instead magnets {i} and {j} do, {depth * 1e3:.3g} mm deep.")
+    for i, j in combinations(range(len(magnets)), 2):
+        if (depth := body_overlap(magnets[i].body, magnets[j].body)) > TOUCHING:
+            raise ValueError(
+                f"Input magnets must not overlap; instead magnets {i} and {j} do, {depth * 1e3:.3g} mm deep."
+            )
     reach = np.array([magnet.body.reach(np.eye(3)) for magnet in magnets])
     places = np.array([magnet.body.center for magnet in magnets])
     center = ((places - reach).min(axis=0) + (places + reach).max(axis=0)) / 2

@@ -347,12 +347,10 @@ class Scene:
 
     @property
     def axial_coils(self) -> tuple[Coil, ...]:
-        """Coils whose field stands still in the rotor's frame."""
         return tuple(coil for coil in self.coils if coil.axial)
 
     @property
     def other_coils(self) -> tuple[Coil, ...]:
-        """Coils off the rotor's axis, or with a current that changes."""
         return tuple(coil for coil in self.coils if not coil.axial)
 
     @property
@@ -380,12 +378,10 @@ class Scene:
         rows["floater"] = repr(self.floater).removeprefix("Floater ")
         rows |= {"plate": repr(self.plate).removeprefix("Plate ")} if self.plate else {}
         rows |= {f"coil {k}": repr(coil).removeprefix("Coil ") for k, coil in enumerate(self.coils, 1)}
-        rows["gravity"] = f"({listed(self.gravity)}) m/s²"
-        return html_table(f"Scene at {self._frequencies}", rows)
+        return html_table(f"Scene at {self._frequencies}", rows | {"gravity": f"({listed(self.gravity)}) m/s²"})
 
     @property
     def _frequencies(self) -> str:
-        """Those of a drive's steps, in words."""
         said = [f"{self.frequency:g} Hz"]
         for step in self.drive:
             way = "held for" if step.frequency is None else f"to {step.frequency:g} Hz in"

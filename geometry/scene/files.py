@@ -19,7 +19,7 @@ from ..magnets import Magnet
 from ..shapes import rotation_angles
 from ..solids import Part, Solid
 from . import schema
-from .contents import Drag, OffsetStart, Scene
+from .contents import Coil, Drag, DriveStep, OffsetStart, Scene
 from .making import WITH_TOLERANCE, assemble, content_digest
 from .messages import SceneError, unusual
 
@@ -57,12 +57,9 @@ def load_scene(path: str | Path) -> Scene:
     """
     source = str(path) if isinstance(path, str | Path) else "scene"
     try:
-        text = file_content(path, MOST, "scene", "a TOML file").decode("utf-8-sig")
-        scene = parse_scene(text.replace("\r\n", "\n").replace("\r", "\n"), source)
+        scene = parse_scene(_text(path, "scene").replace("\r\n", "\n").replace("\r", "\n"), source)
         if scene.field_map:
             regular_file(scene.field_map, MOST_OF_MAP, "rotor.field_map", "a map of the field").close()
-    except UnicodeDecodeError as error:
-        raise SceneError(source, [f"Input scene must be a text in UTF-8; instead: {error}."]) from None
     except SceneError:
         raise
     except InputError as error:
@@ -79,11 +76,14 @@ def load_scene(path: str | Path) -> Scene:
 
 def toml_tables(path: str | Path, name: str) -> dict[str, Any]:
     """The tables of a TOML file that messages call `name`. Raises InputError where there is none."""
+    return _keys(_text(path, name), str(path))
+
+
+def _text(path: str | Path, name: str) -> str:
     try:
-        text = file_content(path, MOST, name, "a TOML file").decode("utf-8-sig")
+        return file_content(path, MOST, name, "a TOML file").decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: Input {name} must be a text in UTF-8; instead: {error}.") from None
-    return _keys(text, str(path))
+        raise SceneError(str(path), [f"Input {name} must be a text in UTF-8; instead: {error}."]) from None
 
 
 def parse_scene(
@@ -174,9 +174,8 @@ def check_files(scene: Scene, source: str = "scene") -> None:
 
 
 def _check_same(scene: Scene, files: Iterable[tuple[str, str]], source: str) -> None:
-    before = dict(scene.files)
     for path, digest in files:
-        if before.get(path, digest) != digest:
+        if dict(scene.files).get(path, digest) != digest:
             instead = "its content is another one" if digest else "it cannot be read any more"
             way_out = "Begin again, and what needs the file is computed anew."
             raise SceneError(
@@ -290,11 +289,14 @@ def scene_text(scene: Scene) -> str:
 
 def _with_tolerances(keys: Any, tolerances: Mapping[str, float], place: str = "") -> Any:
     """Keys with their numbers as `without_tolerances` reads them, where there is a tolerance."""
+    found = {k: _with_tolerances(value, tolerances, f"{place}.{k}".removeprefix(".")) for k, value in _parts(keys)}
     if isinstance(keys, Mapping | list):
-        pairs = keys.items() if isinstance(keys, Mapping) else enumerate(keys)
-        found = {k: _with_tolerances(value, tolerances, f"{place}.{k}".removeprefix(".")) for k, value in pairs}
         return found if isinstance(keys, Mapping) else list(found.values())
     return {"value": keys, "tolerance": tolerances[place]} if place in tolerances else keys
+
+
+def _parts(keys: Any) -> Iterable[tuple[Any, Any]]:
+    return keys.items() if isinstance(keys, Mapping) else enumerate(keys if isinstance(keys, list) else ())
 
 
 def startless_text(scene: Scene) -> str:
@@ -332,10 +334,9 @@ def scene_numbers(scene: Scene) -> tuple[Scene, dict[str, float]]:
 
 
 def _flattened(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
-    if isinstance(value, Mapping | list):
-        for name, part in value.items() if isinstance(value, Mapping) else enumerate(value):
-            yield from _flattened(part, f"{key}.{name}".removeprefix("."))
-    elif isinstance(value, int | float) and not isinstance(value, bool):
+    for name, part in _parts(value):
+        yield from _flattened(part, f"{key}.{name}".removeprefix("."))
+    if isinstance(value, int | float) and not isinstance(value, bool):
         yield key, float(value)
 
 
@@ -436,23 +437,17 @@ def _drag(scene: Scene) -> dict[str, Any] | None:
     return {"model": "air"} if scene.drag == replace(stokes, air=True) else _said(schema.DragTable, scene.drag)
 
 
-def _drive(scene: Scene) -> list[dict[str, Any]] | None:
-    found = list[dict[str, Any]]()
-    for step in scene.drive:
-        way = {"center_mm": _all_rounded(1e3 * np.array(step.center))} if step.center else {}
-        way |= {"axis": list(step.axis)} if step.axis else {}
-        kind = {} if step.frequency is None else {"to_hz": step.frequency}
-        found.append(kind | way | {"in_s" if kind | way else "hold_s": step.seconds})
-    return found or None
+def _step(step: DriveStep) -> dict[str, Any]:
+    keys = {} if step.frequency is None else {"to_hz": step.frequency}
+    keys |= {"center_mm": _all_rounded(1e3 * np.array(step.center))} if step.center else {}
+    keys |= {"axis": list(step.axis)} if step.axis else {}
+    return keys | {"in_s" if keys else "hold_s": step.seconds}
 
 
-def _coils(scene: Scene) -> list[dict[str, Any]] | None:
-    found = list[dict[str, Any]]()
-    for coil in scene.coils:
-        keys = _said(schema.CoilTable, coil) | {"phase_deg": _rounded(np.degrees(coil.phase))}
-        current = coil.current.tolist() if isinstance(coil.current, np.ndarray) else float(coil.current)
-        found.append(keys | {"current_A": current, "frequency_hz": float(coil.frequency)})
-    return found or None
+def _coil(coil: Coil) -> dict[str, Any]:
+    keys = _said(schema.CoilTable, coil) | {"phase_deg": _rounded(np.degrees(coil.phase))}
+    current = coil.current.tolist() if isinstance(coil.current, np.ndarray) else float(coil.current)
+    return keys | {"current_A": current, "frequency_hz": float(coil.frequency)}
 
 
 def _start(scene: Scene) -> dict[str, Any] | None:
@@ -497,8 +492,8 @@ FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
     "plate": (("plate",), _plate),
     "drag": (("drag", "floater"), _drag),
     "start": (("start", "companions"), _of_each(_start)),
-    "coils": (("coils",), _coils),
-    "drive": (("drive",), _drive),
+    "coils": (("coils",), lambda scene: [_coil(coil) for coil in scene.coils] or None),
+    "drive": (("drive",), lambda scene: [_step(step) for step in scene.drive] or None),
 }
 
 

@@ -152,13 +152,13 @@ def _with_paths(keys: Any, folder: Path, known: Scene | None, found: dict[str, l
 Table = Mapping[str, Any]  # A table of the scene file
 
 
-def _cube(remanence_T: float, edge_mm: float | None) -> Table:
-    return {"remanence_T": remanence_T} | ({} if edge_mm is None else {"edge_mm": edge_mm})
+def _rotor(configuration: str, edge_mm: float | None, **keys: Any) -> Table:
+    return {"configuration": configuration, **keys} | ({} if edge_mm is None else {"edge_mm": edge_mm})
 
 
 @spelled
 def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """One cube magnetised along +x and displaced along it from the axis.
+    """The table `[rotor]` of a scene file: one cube magnetised along +x and displaced along it from the axis.
 
     Parameters
     ----------
@@ -168,18 +168,13 @@ def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | N
         Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
         Further keys, as for `magnets`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
-    return {"configuration": "horizontal", "displacement_mm": displacement_mm, **_cube(remanence_T, edge_mm), **more}
+    return _rotor("horizontal", edge_mm, displacement_mm=displacement_mm, remanence_T=remanence_T, **more)
 
 
 @spelled
 def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """A cube magnetised along +x and one above it along +z.
+    """The table `[rotor]` of a scene file: a cube magnetised along +x and one above it along +z.
 
     Parameters
     ----------
@@ -187,18 +182,13 @@ def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | Non
         From centre to centre, mm.
     remanence_T, edge_mm, **more : float or list
         As for `horizontal`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
-    return {"configuration": "vertical", "displacement_mm": displacement_mm, **_cube(remanence_T, edge_mm), **more}
+    return _rotor("vertical", edge_mm, displacement_mm=displacement_mm, remanence_T=remanence_T, **more)
 
 
 @spelled
 def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """One cube, turned with its magnetisation about y.
+    """The table `[rotor]` of a scene file: one cube, turned with its magnetisation about y.
 
     Parameters
     ----------
@@ -206,17 +196,12 @@ def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, 
         The magnetisation is along (cos angle, 0, sin angle), degrees.
     remanence_T, edge_mm, **more : float or list
         As for `horizontal`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
-    return {"configuration": "tilt", "angle_deg": angle_deg, **_cube(remanence_T, edge_mm), **more}
+    return _rotor("tilt", edge_mm, angle_deg=angle_deg, remanence_T=remanence_T, **more)
 
 
 def magnets(*bodies: Table, **more: Any) -> Table:
-    """Any set of magnets.
+    """The table `[rotor]` of a scene file: any set of magnets.
 
     Parameters
     ----------
@@ -230,18 +215,13 @@ def magnets(*bodies: Table, **more: Any) -> Table:
         currents, else left out), coercivity_kA_m (the knee of their demagnetisation curves), field_map, and
         conductors, a list of tables with shape ("cuboid" or "cylinder"), size_mm or diameter_mm and height_mm,
         center_mm, rotation_deg and conductivity_S_m: metal that turns with the rotor.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
     return {"magnets": list(bodies), **more}
 
 
 @spelled
 def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **more: Any) -> Table:
-    """The floating sphere.
+    """The table `[floater]` of a scene file: the floating sphere.
 
     Parameters
     ----------
@@ -249,11 +229,6 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
         Diameter, mm, remanence, T, and density, kg/m³.
     **more : float
         Further keys: recoil_permeability (1.05), conductivity_S_m (its eddy currents, else left out).
-
-    Returns
-    -------
-    dict
-        The table `[floater]` of a scene file.
     """
     return {"diameter_mm": diameter_mm, "remanence_T": remanence_T, "density_kg_m3": density_kg_m3, **more}
 
@@ -262,7 +237,7 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
 def plate(
     *, center_mm: Sequence[float], conductivity_S_m: float, size_mm: Sequence[float] | None = None, **more: Any
 ) -> Table:
-    """A conducting plate.
+    """The table `[plate]` of a scene file: a conducting plate.
 
     Parameters
     ----------
@@ -276,11 +251,6 @@ def plate(
         Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}; in place of
         size_mm shape "disc" with diameter_mm and height_mm, "ring" with inner_diameter_mm beside, "sphere" with
         diameter_mm, or "file" with the name of a STEP file as file.
-
-    Returns
-    -------
-    dict
-        The table `[plate]` of a scene file.
     """
     size = {} if size_mm is None else {"size_mm": size_mm}
     return {**size, "center_mm": center_mm, "conductivity_S_m": conductivity_S_m, **more}
