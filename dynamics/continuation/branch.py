@@ -182,20 +182,13 @@ def follow_branch(
     until: Callable[[BranchPoint], bool] | None = None,
     tolerated: float = 0.0,
 ) -> list[BranchPoint]:
-    """The branch through an equilibrium, towards `end` of the parameter and on through every fold.
+    """The branch of a `family` through an equilibrium, towards `end` of the parameter and on through every fold.
 
     Points are in order and good to round-off.  Folds and changes of stability are points of their own, by `kind`.
-    Raises EquilibriumError: there is no equilibrium near `start`.
-
-    Parameters
-    ----------
-    family : the problem
-    start : scaled state (12 or 13,) of the equilibrium at `parameter`, or a guess
-    parameter : where the branch begins
-    end : the branch ends where the parameter reaches it, or comes back to `parameter` after folds
-    steps : along the branch, `Steps()` if not given
-    until : ends the branch after the first point of which it is true
-    tolerated : growth that still counts as stable, 1/s
+    Raises EquilibriumError: there is no equilibrium near `start`, a scaled state (12 or 13,) at `parameter`, or a guess
+    of it. The branch ends where the parameter reaches `end`, comes back to where it began after folds, or after the
+    first point of which `until` is true. It goes in `steps`, `Steps()` if not given; growth up to `tolerated` (1/s)
+    counts as stable.
     """
     if (first := family.solution(np.concatenate([start[:3], start[6:-3]]), parameter)) is None:
         raise EquilibriumError(
@@ -233,7 +226,6 @@ def _marked(
     family: Family, unknowns: Array, before: BranchPoint, after: BranchPoint, length: float, tolerated: float
 ) -> list[BranchPoint]:
     """Folds and changes of stability, in order, on a step from unknowns (7,) of the point before to a point after."""
-
     at = partial(family.after, unknowns, before.tangent)
 
     def located(measure: Callable[[BranchPoint], float], kind: str) -> tuple[float, BranchPoint]:

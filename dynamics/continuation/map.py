@@ -184,16 +184,10 @@ def equilibrium_map(
 
     Raises EquilibriumError: a frequency is zero, or gravity has a part across the axis; InputError: at a frequency the
     rotor turns too fast for its metal or the floater's, the floater's moment is along none of its principal axes, or
-    the tables' effects differ.
-
-    Parameters
-    ----------
-    scenes : of the columns, from neighbour to neighbour, as of a rotor that is moved; each at all frequencies. A
-        floater that is not round about its moment is its mean over turns about that, by its multipoles
-    tables : (n,) the rotors' fields, with their effects if they are `Interaction`s; all have the same ones
-    frequencies : of the rows, Hz
-    spin : body spin s
-    spacing : steps of the grid between two searches; a sheet between them is missed if it meets no other in a fold
+    the tables' effects differ. The columns are `scenes`, from neighbour to neighbour, as of a rotor that is moved, in
+    fields `tables` (n,), which have the same effects if they are `Interaction`s; the rows are `frequencies`, Hz. A
+    floater that is not round about its moment is its mean over turns about that, by its multipoles; body `spin` is s.
+    Between two searches there are `spacing` steps: a sheet between them is missed if it meets no other in a fold.
     """
     frequencies = np.atleast_1d(np.asarray(frequencies, float))
     if not frequencies.all() or any(np.any(scene.gravity[:2]) for scene in scenes):
@@ -255,10 +249,7 @@ def map_grid(scenes: Sequence[Scene], tables: Sequence[FieldFormula], frequencie
 
 
 def _together(scenes: Sequence[Scene], rates: Sequence[Rates]) -> tuple[Array, Rates]:
-    """Runtime parameters (n, p) of scenes, with the drag along the moment left out, and the rates of all of them.
-
-    Raises InputError: the rates have not one code.
-    """
+    """Runtime parameters (n, p) of scenes, with the drag along the moment left out, and the rates of all of them."""
     values = np.array([parameters(scene, Scales.of(scene), frozen_spin=True) for scene in scenes])
     different = list(dict.fromkeys(rates))
     if any(one.code != different[0].code for one in different):
@@ -277,15 +268,9 @@ def surveys(
     """Survey of each scene as by `equilibria.survey`, without curves; neighbours help each other as in a map.
 
     Returns (n,) the surveys, and whether the scene's own point was searched. Raises EquilibriumError for a rotor at
-    rest.
-
-    Parameters
-    ----------
-    scenes : n scenes; their plates are left out
-    tables : (n,) the rotors' fields, for their errors
-    spin : (n,) body spin s
-    places : (n, axes) whole-numbered coordinates by which scenes are neighbours
-    rates : (n,) of one code; scenes with one table share them
+    rest. The n `scenes`, whose plates are left out, have rotors' fields `tables`, for their errors, body `spin` (n,),
+    whole-numbered coordinates `places` (n, axes) by which they are neighbours, and `rates` (n,) of one code, which
+    scenes with one table share.
     """
     for scene in scenes:
         check_turning(scene)

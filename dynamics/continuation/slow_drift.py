@@ -35,6 +35,7 @@ SAMPLES = 400
 ESCAPE = 3.40922  # Where the solution of y'' = t + y² that comes from y = -√(-t) becomes infinite; found numerically
 # Frequencies along the branch at which trajectories are tried first: what lasts only between two of them is missed.
 POINTS = 16
+RESOLUTION = 0.5  # Of the ends of a range in which they last, Hz
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,20 +165,13 @@ def drift(
     stokes: bool = False,
     e_folds: float = E_FOLDS,
 ) -> Drift:
-    """Follow the stable equilibrium of a scene while its body spin drifts.
+    """Follow the stable equilibrium of a `scene` in the field of `table` while its body spin drifts from `spin`.
 
-    Raises EquilibriumError: no equilibrium at the start.
-
-    Parameters
-    ----------
-    scene : its drag and the floater's conductivity are the slow torques; its plate is left out
-    table : the rotor's field
-    spin : body spin at the start
-    duration : at most, s; may be infinite where there is a slow torque
-    rates : `Rates` of the same table, to compile them once for many scenes
-    start : the equilibrium at `spin`, if it is known; else the one whose modes grow the slowest
-    stokes : drag proportional to spin unless the scene's drag is that of real air, as in `simulate`
-    e_folds : growth of a mode after which it has ended the trajectory
+    Raises EquilibriumError: no equilibrium at the start. Drag and the floater's conductivity are the slow torques; the
+    plate is left out. `duration` is in s, infinite at most where there is a slow torque; `rates` are of the same table,
+    to compile them once for many scenes; `start` is the equilibrium at `spin`, if it is known, else the one whose modes
+    grow the slowest. Drag is proportional to spin with `stokes`, unless the scene's is that of real air, as in
+    `simulate`; a mode has ended the trajectory after growth by `e_folds`.
     """
     rates = rates or Rates(with_effects(scene, table))
     torque = SlowTorque.of(scene, rates, stokes)
@@ -225,21 +219,13 @@ def lasting_frequencies(
     frequency: float,
     duration: float = 250.0,
     e_folds: float = E_FOLDS,
-    resolution: float = 0.5,
 ) -> Lasting:
     """Where a floater let go with body spin 0 remains levitated, by its averaged motion along a branch of equilibria.
 
-    A trajectory is over where a mode has grown by `e_folds`: seven are 3 µm, what is left of a launch over a plate,
-    to 3 mm.  Growth is added up along the drift of the body spin.
-
-    Parameters
-    ----------
-    scene : its drag and the floater's conductivity; its frequency is left open
-    table, rates : of all effects that shall take part
-    start : scaled state (12,) of an equilibrium of the branch at `frequency` (Hz)
-    duration : s
-    e_folds : see `drift`
-    resolution : of the two ends, Hz
+    A trajectory of `duration` (s) is over where a mode has grown by `e_folds`: seven are 3 µm, what is left of a launch
+    over a plate, to 3 mm.  Growth is added up along the drift of the body spin. Drag and conductivity are those of the
+    `scene`, whose frequency is left open; `table` and `rates` have all effects that shall take part; `start` is a
+    scaled state (12,) of an equilibrium of the branch at `frequency` (Hz).
     """
     family, over, sides = by_frequency(scene, rates), partial(is_over, scene), []
     for border in (LOWEST, HIGHEST):
@@ -258,7 +244,7 @@ def lasting_frequencies(
 
     def edge(kept: float, gone: float) -> tuple[float, float]:
         """Two frequencies, at which the trajectory lasts and does not, nearer to each other."""
-        while abs(gone - kept) > resolution:
+        while abs(gone - kept) > RESOLUTION:
             middle = (kept + gone) / 2
             kept, gone = (kept, middle) if ended(middle)[0] else (middle, gone)
         return kept, gone

@@ -68,14 +68,9 @@ def place_error(
 ) -> float:
     """Estimated error of the place where balances of three forces and k torques vanish, scaled.
 
-    Parameters
-    ----------
-    inverse : (3 + k, 3 + k) of the balances' derivatives
-    residual : (3 + k,) what is left of the balances
-    values : (p,) of the parameters
-    doubt : (2 + 12 c,) of the field there, T and T/m, see `field_doubts`
-    moment : (3,) unit
-    directions : (k, 3) of the torques
+    From the `inverse` (3 + k, 3 + k) of the balances' derivatives, their `residual` (3 + k,), `values` (p,) of the
+    parameters, the `doubt` (2 + 12 c,) of the field there (see `field_doubts`), the unit `moment` (3,), and the
+    `directions` (k, 3) of the torques.
     """
     torque, length, inertia = values[[Parameter.TORQUE, Parameter.LENGTH, Parameter.INERTIA]]
     pull = inertia * length
@@ -115,24 +110,15 @@ def solve(
     reach: float = 0.3,
     far: float = np.inf,
 ) -> tuple[Array, Array, Array]:
-    """Newton's method from many starts at once.
+    """Newton's method for a `balance` from many starts `position` and `moment` (n, 3) at once.
 
     Returns positions and moments (n, 3), and lengths (n,) of the last steps: the errors before these; infinite where it
-    failed.
-
-    Parameters
-    ----------
-    balance : what shall vanish
-    position, moment : starts (n, 3)
-    free : which unknowns move and which balances count, e.g. `LATERAL` to keep the height
-    iterations : at most
-    reach : longest step of the position (floater radii) and of the moment (rad)
-    far : farther than this from the origin, in floater radii, the longest step grows with the distance, as the scale
-        of the field does
+    failed. `free` says which unknowns move and which balances count, e.g. `LATERAL` to keep the height. There are so
+    many `iterations` at most, with steps of `reach` (floater radii, and rad) at most; farther than `far` (radii) from
+    the origin this grows with the distance, as the scale of the field does.
     """
-    position, moment = position.copy(), moment.copy()
+    position, moment, active = position.copy(), moment.copy(), np.arange(len(position))
     length = np.full(len(position), np.inf)
-    active = np.arange(len(position))
     for _ in range(iterations):
         value, slope = balance.at(active)(position[active], moment[active])
         step = np.zeros((len(active), 5))
@@ -147,11 +133,9 @@ def solve(
         shift, tilt = np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1)
         scale = np.maximum(1.0, np.linalg.norm(position[active], axis=1) / far)
         step *= (reach / np.maximum(np.maximum(shift / scale, tilt), reach))[:, None]
-        size = np.maximum(shift, tilt)
         position[active], moment[active] = moved_pose(position[active], moment[active], step)
-        done = ~good | (size < 1e-11)
-        length[active] = np.where(good, size, np.inf)
-        active = active[~done]
+        length[active] = np.where(good, np.maximum(shift, tilt), np.inf)
+        active = active[good & (length[active] >= 1e-11)]
         if not len(active):
             break
     return position, moment, length

@@ -106,18 +106,11 @@ def newton_search(
 ) -> tuple[Indices, Array]:
     """Solutions that Newton's method finds from starts, in one problem or in several as a batch, each once.
 
-    Returns problems (k,) in order, and positions with moments (k, 6), of each problem the lowest first.
-
-    Parameters
-    ----------
-    balance : of problems (n,), one for each point
-    holds : which of the scaled positions (n, 3) lie in the ranges of problems (n,), or at most a margin (radii) outside
-    problem : (n,) of each start
-    points : (n, 6) the starts: scaled positions and moments
-    free : which balances shall vanish and which unknowns move, see `balance.solve`
-    margin : so far outside the range (radii) solutions are kept
-    reach, far : longest steps, see `balance.solve`
-    watch : progress of the search
+    Returns problems (k,) in order, and positions with moments (k, 6), of each problem the lowest first. `balance` is
+    of problems (n,), one for each point; `holds` says which of the scaled positions (n, 3) lie in the ranges of
+    problems (n,), or at most a margin (radii) outside: solutions are kept up to `margin`. Starts are `points` (n, 6),
+    scaled positions and moments, each of a `problem` (n,); `free`, `reach`, `far` are as of `balance.solve`, and
+    `watch` gets progress.
     """
 
     def solved(problem: Indices, points: Array, rough: bool) -> tuple[Indices, Array]:
@@ -164,11 +157,8 @@ def from_starts(
     Of a `balance`, from one of `every` so many starts; `watch` as for `newton_search`.
     """
     points = where.starts()[::every]
-
-    def holds(_: Indices, position: Array, margin: float) -> NDArray[np.bool_]:
-        return where.holds(position, margin)
-
-    return newton_search(lambda _: balance, holds, np.zeros(len(points), int), points, free, watch=watch)[1]
+    one = np.zeros(len(points), int)
+    return newton_search(lambda _: balance, lambda _, *places: where.holds(*places), one, points, free, watch=watch)[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +173,8 @@ class Curve:
 
     def passes(self, point: Array) -> bool:
         """Whether the curve goes through a point (6,), judged by cubic interpolation at the point's own height."""
-        crossings = self._height.solve(point[2], extrapolate=False)
+        heights = CubicHermiteSpline(self.arc, self.points[:, 2], self.tangents[:, 2])
+        crossings = heights.solve(point[2], extrapolate=False)
         apart = self._spline(crossings[np.isfinite(crossings)]) - point
         return bool(np.min(np.linalg.norm(apart, axis=1), initial=np.inf) < 1e-3)
 
@@ -196,16 +187,10 @@ class Curve:
     def _spline(self) -> CubicHermiteSpline:
         return CubicHermiteSpline(self.arc, self.points, self.tangents)
 
-    @cached_property
-    def _height(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.arc, self.points[:, 2], self.tangents[:, 2])
-
 
 @dataclass(frozen=True, eq=False)
 class _Lateral(AtRest):
-    """Everything but the axial force, as equations of a curve: unknown are position and moment."""
-
-    balance: Balance
+    balance: Balance  # but for the axial force; unknown are position and moment
 
     def linear(self, points: Array, which: Indices) -> tuple[Array, Array]:
         value, slope = self.balance(points[:, :3], points[:, 3:])

@@ -27,14 +27,10 @@ MOST_STEPS = 20  # of the quasi-Newton method
 
 
 def balanced_directions(scene: Scene, balance: Balance, places: Array, start: float, guess: Array) -> Array:
-    """Moment directions (n, 3) whose torque is balanced, followed downwards and upwards from `start` (m) below.
+    """Moment directions (n, 3) whose torque is balanced at `places` (n, 3) m, a `scene`'s of which is the `balance`.
 
-    Parameters
-    ----------
-    scene, balance : a scene's
-    places : (n, 3) m
-    start : distance below the rotor's origin, m
-    guess : (3,) for the first ones; each other begins at its neighbour's, which stays where no balance is near
+    Followed downwards and upwards from a distance `start` (m) below the rotor's origin: the first from a `guess` (3,),
+    each other from its neighbour's, which stays where no balance is near.
     """
     result, depths = np.zeros_like(places), -places[:, 2]
     order = np.argsort(depths)
@@ -57,14 +53,9 @@ def shifted_equilibrium(
     """Follow an equilibrium to where additional forces put it.
 
     Quasi-Newton from the table's own Jacobian (C. G. Broyden, Math. Comp. 19 (1965) 577). Returns the shift (3,) m to
-    first order, and the new position (3,) m; NaN if none was reached.
-
-    Parameters
-    ----------
-    scene, balance : a scene's, without the additional forces
-    position, moment : (3,) m and direction of the equilibrium
-    extra : of a position (3,) m and a direction (3,): additional force (3,) N and torque (3,) N m, rotor's frame
-    tolerance : of the place, in radii of the floater
+    first order, and the new position (3,) m; NaN if none was reached. `scene` and `balance` are without the additional
+    forces; the equilibrium has `position` (3,) m and direction `moment`; `extra` gives the additional force (3,) N and
+    torque (3,) N m, rotor's frame, of both; `tolerance` is that of the place, in radii of the floater.
     """
     scales, floater = Scales.of(scene), scene.floater
 
@@ -157,7 +148,6 @@ def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses,
 
 
 def _growth(scene: Scene, fixed: Equilibrium, brake: Array, included: bool) -> float:
-    """Change of the growth rate (1/s) by a part of the Jacobian, which has it or has not."""
     # To first order, of the mode that grows fastest with it: the fastest one without it may be another mode, and the
     # difference of their growth rates is no effect.
     scales = Scales.of(scene)

@@ -122,19 +122,12 @@ def survey(
     """All synchronous equilibria with z < 0 between contact with the rotor and the `bound` of a `SearchRange`.
 
     Raises EquilibriumError: the rotor is at rest and the floater does not spin. Returns equilibria, the stable ones
-    first, then by distance, accurate to round-off in the table's field.
-
-    Parameters
-    ----------
-    scene : the scene; its plate is left out
-    table : the rotor's field
-    spin : body spin s = Ω·m̂/ω, which magnetic torque does not change; beside a rotor at rest the scene's start says
-        how fast the floater spins about its moment, of which stability depends, as of a spinning top
-    rates : `Rates` of the same table, to compile them once for many scenes
-    remembered : gets a search with its kind and gives what it finds, perhaps from an earlier one, see `cached_points`
-    watch : progress of the search
-
-    With gravity across the axis equilibria are periodic motions, followed from the fixed points without it.
+    first, then by distance, accurate to round-off in the field of `table`. The plate of the `scene` is left out. The
+    body `spin` s = Ω·m̂/ω magnetic torque does not change; beside a rotor at rest the scene's start says how fast the
+    floater spins about its moment, of which stability depends, as of a spinning top. `rates` are of the same table, to
+    compile them once for many scenes; `remembered` gets a search with its kind and gives what it finds, perhaps from an
+    earlier one, see `cached_points`; `watch` gets progress. With gravity across the axis equilibria are periodic
+    motions, followed from the fixed points without it.
     """
     check_turning(scene)
 
@@ -367,7 +360,6 @@ def with_plate(
 
 
 def _forced(problem: ForcedMotion, known: Survey) -> Survey:
-    """Equilibria with the plate's currents and the whole gravity; those that are none are left out."""
     found = [problem.equilibrium(e) if problem.reaches(e) else e for e in known.equilibria]
     return _survey(found, known.curves, known.left_out)
 

@@ -263,20 +263,15 @@ def ensemble(
     memory: PlateMemory | None = None,
     currents: Array | None = None,
 ) -> Endings:
-    """Simulate a scene's floater from many starts for `duration` (s) each, or until contact or loss.
+    """Simulate the floater of a `scene` in `table` from many starts for `duration` (s) each, or to contact or loss.
 
     Raises InputError: `duration` is not positive, or there is no start; IntegrationError: a state became infinite.
-
-    Parameters
-    ----------
-    scene, table : the problem
-    starts : states (n, 3) at t = 0, SI units; the moments are made unit vectors.  Without their axes bodies that are
-        not round are turned about them as little as can be
-    mapped : as the built-in `map`; `concurrent.futures.ProcessPoolExecutor(2).map` uses two cores
-    together : trajectories that a worker gets at once
-    offset : (n, 3) m of the starts from an equilibrium, if it is known: bodies that are not round are faster about it
-    memory : the plate's currents; left out, the plate is only an obstacle
-    currents : (k,) √J, states of the plate at all starts; left out, those of a floater that had long turned at each
+    `starts` are states (n, 3) at t = 0, SI units, whose moments are made unit vectors; without their axes bodies that
+    are not round are turned about them as little as can be. They are `mapped` as by the built-in `map`, so many
+    `together`: `concurrent.futures.ProcessPoolExecutor(2).map` uses two cores. `offset` is (n, 3) m of the starts from
+    an equilibrium, if it is known: bodies that are not round are faster about it. `memory` is of the plate's currents
+    (left out, the plate is only an obstacle), and `currents` (k,) √J are its states at all starts (left out, those of a
+    floater that had long turned at each).
 
     Accuracy: that of a trajectory in balls, whose field errs by 1e-6 of its gradient; see `ERROR_OF_BODIES` for those
     of a body that is not round.

@@ -132,7 +132,7 @@ class Flight:
 
     @property
     def each(self) -> "list[tuple[Flight, slice, slice]]":
-        """Of each floater its own flight, its runtime parameters and states: here this, all, all but the work."""
+        """Of each floater its motion alone, its runtime parameters and states: here this, all, all but the work."""
         return [(self, slice(None), slice(-1))]
 
     def degree(self, values: Array) -> Any:

@@ -4,7 +4,7 @@ import hashlib
 import io
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +96,10 @@ class Trajectory:
     @property
     def rotor(self) -> State:
         """Motion (n, 3) along the rotor's axes, SI units."""
-        return (self.lab if self.pose is None else self.lab.brought_back(*self.pose)).to_rotor(self.angle)
+        if self.pose is None:
+            return self.lab.to_rotor(self.angle)
+        back = replace(self.lab, position=self.lab.position - self.pose[0])
+        return back.moved(np.zeros(3), self.pose[1].swapaxes(1, 2)).to_rotor(self.angle)
 
 
 # All that are kept have so many bytes at most

@@ -34,7 +34,7 @@ from ...fem.rotor.table import DerivedField, FieldFormula, RangeError
 from ...geometry.common import Array, even_directions
 from ...geometry.scene.floater import Floater
 from ...geometry.solids import Solid
-from .effect import Added, Motion, Poses
+from .effect import NOTHING, ZERO, Added, Motion, Poses
 from .floater_effects import FLOATER_SHAPE, by_tensor, is_even
 from .rotor_effects import Mutual
 from .state import Parameter, State, Vector, add, cross, dot, dotted, matrices_of, subtract
@@ -193,8 +193,7 @@ class BodyShape:
         return interior.turns(HIGHEST)[:, self.kept[:, None], self.kept]
 
     @property
-    def _unit(self) -> float:
-        """Of the multipoles' states, A m."""
+    def _unit(self) -> float:  # of the multipoles' states, A m
         return strength(self.floater) / self.floater.radius / LITTLE
 
     def states_at(self, state: State) -> Array:
@@ -225,8 +224,7 @@ class BodyShape:
             rates=rates,
         )
 
-    def _dipole(self, motion: Motion) -> Added:
-        """What the `rest` does."""
+    def _dipole(self, motion: Motion) -> Added:  # what the `rest` does
         along = float(self.rest @ self.floater.pointing)
         across = self.rest - along * self.floater.pointing
         if np.linalg.norm(across) <= ROUND_OFF * strength(self.floater):
@@ -246,12 +244,9 @@ class BodyShape:
         assert self.first is not None
         length, inertia, share = (motion.given[p] for p in WHICH)
         place = regular_harmonics(self._way, self.ball.offset([length * p for p in motion.position]))
-        size = len(place)
-        zero, known = hy.expression(0.0), self._known
-        numbers = [
-            [hy.par[self.first + k * size + n] if known[k, n] else zero for n in range(size)]
-            for k in range(len(states))
-        ]
+        first, known = self.first, self._known
+        rows = np.arange(known.size).reshape(known.shape).tolist()
+        numbers = [[hy.par[first + n] if known.flat[n] else ZERO for n in row] for row in rows]
         unit = self._unit * share * share
         sums = [dotted(column, states) for column in zip(*numbers, strict=True)]
         field = [dotted(row, place) for row in numbers]
@@ -267,16 +262,14 @@ class BodyShape:
     def _by_dipoles(self, motion: Motion) -> Added:
         assert motion.axes is not None
         length, inertia, share = (motion.given[p] for p in WHICH)
-        axes, unit, poles = motion.axes, share * share, self.poles
-        force, torque, energy = [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3, hy.expression(0.0)
+        axes, unit, poles, force, torque, energy = motion.axes, share * share, self.poles, NOTHING, NOTHING, ZERO
         for own, pole in zip(poles.places, poles.moments, strict=True):
             arm, source = ([_combined(part, row) for row in axes] for part in (own, pole))
-            place = [length * p + a for p, a in zip(motion.position, arm, strict=True)]
-            field, gradient = self.field.expressions(place)
-            pull = [dot(source, [gradient[i][j] for i in range(3)]) for j in range(3)]
-            turns = zip(cross(source, field), cross(arm, pull), strict=True)
-            force = add(force, pull)
-            torque = [t + b + c for t, (b, c) in zip(torque, turns, strict=True)]
+            field, gradient = self.field.expressions(
+                [length * p + a for p, a in zip(motion.position, arm, strict=True)]
+            )
+            pull = [dot(source, column) for column in zip(*gradient, strict=True)]
+            force, torque = add(force, pull), add(torque, cross(source, field), cross(arm, pull))
             energy = energy - dot(source, field)
         return Added([unit * length * f for f in force], [unit / inertia * t for t in torque], energy=unit * energy)
 
@@ -286,13 +279,10 @@ class BodyShape:
         if motion.quaternion is None:
             turn: Vector = cross(given[3:6], motion.moment)
         else:
-            (w, x, y, z), (a, b, c, d) = given[3:7], motion.quaternion
+            (w, *before), (a, *now) = given[3:7], motion.quaternion
             # twice the vector part of q q0*, which is the small turn from the one to the other
-            turn = [
-                2.0 * (-a * x + b * w - c * z + d * y),
-                2.0 * (-a * y + b * z + c * w - d * x),
-                2.0 * (-a * z - b * y + c * x + d * w),
-            ]
+            turned = zip(now, before, cross(before, now), strict=True)
+            turn = [2.0 * (n * w - a * b + c) for n, b, c in turned]
         change = [*subtract(motion.position, given), *turn]
         values = [given[7 + i] + dotted(given[13 + 6 * i : 19 + 6 * i], change) for i in range(6)]
         return Added(values[:3], values[3:])
@@ -338,7 +328,7 @@ class BodyShape:
         unit = interior.sizes(HIGHEST)[self.kept, None]
         moved = unit * interior.shifted(there, degree, self._way + 1)[self.kept]
         way = interior.shells(self._way + 1)
-        moved = moved * (ball.radius / self.floater.radius) ** way
+        moved *= (ball.radius / self.floater.radius) ** way
         found, known = moved[:, way <= self._way], self._known
         left_out = np.concatenate([moved[:, way == self._way + 1], found * ~known], axis=1)
         rest = np.linalg.norm(left_out, axis=1) @ np.abs(self.moments[self.kept] / unit[:, 0])
@@ -394,25 +384,16 @@ class InducedShape:
         return tuple(self.tensor.ravel().tolist())
 
     def added(self, motion: Motion) -> Added:
-        which = Parameter.LENGTH, Parameter.INERTIA, Parameter.PLATE_SHARE
-        length, inertia, share = (motion.given[p] for p in which)
-        field, gradient, unit = motion.field, motion.gradient, share * share
-        induced = by_tensor(self.tensor, field, motion)
-        if is_even(self.tensor):
-            # as of a sphere, whatever its turn: there is no torque
-            energy = -0.5 * unit * dot(induced, field)
-            return Added(pulled=[unit * length * b for b in induced], energy=energy)
-        return Added(
-            force=[unit * length * dot(induced, [gradient[i][j] for i in range(3)]) for j in range(3)],
-            torque=[unit / inertia * t for t in cross(induced, field)],
-            energy=-0.5 * unit * dot(induced, field),
-        )
+        length, inertia, share = (motion.given[p] for p in WHICH)
+        unit, induced = share * share, by_tensor(self.tensor, motion.field, motion)
+        energy, pulled = -0.5 * unit * dot(induced, motion.field), [unit * length * b for b in induced]
+        if is_even(self.tensor):  # as of a sphere, whatever its turn: there is no torque
+            return Added(pulled=pulled, energy=energy)
+        return Added(pulled=pulled, torque=[unit / inertia * t for t in cross(induced, motion.field)], energy=energy)
 
 
 def _combined(weights: Array, values: Vector) -> hy.expression:
     """Σ weight · value without what is zero; a product is one expression whatever its sign, for sums to share it."""
     parts = [[abs(float(w)) * v for w, v in zip(weights, values, strict=True) if sign * w > 0] for sign in (1.0, -1.0)]
-    plus, minus = (hy.sum(part) if part else None for part in parts)
-    if plus is None:
-        return hy.expression(0.0) if minus is None else -minus
-    return plus if minus is None else plus - minus
+    plus, minus = map(hy.sum, parts)
+    return plus if not parts[1] else plus - minus if parts[0] else -minus

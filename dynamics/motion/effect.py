@@ -18,7 +18,7 @@ from ...geometry.common import Array
 from .state import STEADY, Given, Parameter, State, Turn, Vector
 
 ZERO = hy.expression(0.0)
-NOTHING = (ZERO, ZERO, ZERO)
+NOTHING: Vector = (ZERO, ZERO, ZERO)
 PARAMETERS = Given()
 SMALLEST = 4  # Degree of the ball in which a body that is not round moves about an equilibrium, see `flights.balls`
 

@@ -33,21 +33,21 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
     if requested == "rigid":
         return False, "as requested"
     magnets, floater = scene.rotor, scene.floater.ball
-    reasons = {k: why for k, magnet in enumerate(magnets, 1) if (why := without_response(magnet))}
+    which, why = next(((k, why) for k, m in enumerate(magnets, 1) if (why := without_response(m))), (0, ""))
     if requested == "mutual":
         if table.model == "map":
             raise InputError(
                 "Input --interaction must be rigid or auto with a measured map, which does not tell what the "
                 "floater induces in the rotor; instead received mutual. Leave the map out (--model fem) to include it."
             )
-        if reasons:
+        if why:
             raise InputError(
                 f"Input --interaction must be rigid or auto with such magnets; instead received mutual, and magnet "
-                f"{min(reasons)} is {reasons[min(reasons)]}"
+                f"{which} is {why}"
             )
     if floater.recoil_permeability == 1 and all(magnet.contrast == 0 for magnet in magnets):
         return False, NOTHING_PERMEABLE
-    points = 0 if reasons else all_points(magnets, floater.radius)
+    points = 0 if why else all_points(magnets, floater.radius)
     if requested == "mutual":
         if points > LARGEST:
             raise InputError(
@@ -57,9 +57,8 @@ def mutual_choice(scene: Scene, table: FieldTable, requested: str, rtol: float) 
         return True, "as requested"
     if table.model not in PERMEABLE:
         return False, f"the field model {table.model} has no permeability"
-    if reasons:
-        why = reasons[min(reasons)].split(".")[0]
-        return False, f"what is induced in magnet {min(reasons)} is not known: it is {why}"
+    if why:
+        return False, f"what is induced in magnet {which} is not known: it is {why.split('.')[0]}"
     if points > LARGEST:
         return False, f"so small a floater would need {points} points in the magnets"
     part = rough_part(scene, table)
@@ -76,8 +75,7 @@ def rough_part(scene: Scene, table: FieldTable) -> float:
     """Roughly, what induced magnetisation adds to the force near the rotor, relative to the rigid dipole's."""
     magnets, floater = scene.rotor, scene.floater.ball
     lowest = min((float(corner[2]) for magnet in magnets for corner in magnet.box.corners), default=0.0)
-    direction = np.array([0.0, 0.0, 1.0])
-    deep = lowest - NEAR * floater.radius * 2.0 ** np.arange(10)
+    direction, deep = np.array([0.0, 0.0, 1.0]), lowest - NEAR * floater.radius * 2.0 ** np.arange(10)
     known = table.in_range((deep[:, None] + STEP * floater.radius) * direction)  # not near, of a tiny floater
     place = deep[int(np.argmax(known))] * direction
     force = rough_force(magnets, floater, table, place, direction)

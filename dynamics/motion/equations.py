@@ -42,7 +42,7 @@ from ...fem.closed_forms.eddy_bodies import thin_field_torque
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
-from .effect import NOTHING, PARAMETERS, Motion, interaction_of
+from .effect import NOTHING, PARAMETERS, ZERO, Motion, interaction_of
 from .plate import PlateMemory, memory_terms
 from .state import (
     DRIVEN,
@@ -52,6 +52,7 @@ from .state import (
     Parameter,
     Scales,
     Vector,
+    about_z,
     add,
     cross,
     dot,
@@ -237,8 +238,13 @@ def equations_of_motion(
         given[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
     )
     field, gradient = table.expressions([length * p for p in position])
-    force, turn = [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
-    axial, lateral = _gravity(tilted_gravity, rotor.angle) if not moving else (NOTHING, rotor.gravity)
+    force, turn, lateral = NOTHING, NOTHING, NOTHING
+    axial: Vector = [ZERO, ZERO, hy.par[Parameter.GRAVITY_Z]]
+    if moving:
+        axial, lateral = NOTHING, rotor.gravity
+    elif tilted_gravity:
+        across = [hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y], ZERO]
+        lateral = about_z(across, rotor.angle, -1.0)
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
     drift = subtract(velocity, turned(position, rotor.rate, rotor.across))
     drift = subtract(drift, rotor.velocity) if moving else drift
@@ -247,7 +253,7 @@ def equations_of_motion(
     jacobi = [
         0.5 * dot(velocity, velocity),
         inertia * attitude.energy,
-        NOTHING[0],  # of the magnet, below
+        ZERO,  # of the magnet, below
         -axial[2] * position[2],
         -rotor.rate * momenta[2],
     ]
@@ -256,13 +262,10 @@ def equations_of_motion(
         position, velocity, moment, spin, drift, lag, field, gradient, rotor, attitude.axes, attitude.quaternion, given
     )
     parts = [effect.added(motion) for effect in whole.effects]
+    if memory is not None:
+        parts.append(memory_terms(memory, first, position, moment, driven))
     states = [state for added in parts for state in added.states]
     state_rates = [rate for added in parts for rate in added.rates]
-    if memory is not None:
-        currents = [hy.expression(f"plate_{i}") for i in range(len(memory.table.rates))]
-        by_plate, their_rates = memory_terms(memory, first, position, moment, currents, driven)
-        parts.append(by_plate)
-        states, state_rates = [*states, *currents], [*state_rates, *their_rates]
     if more := sum(added.more for added in parts):
         torque = torque + given[Parameter.PLATE_SHARE] * given[Parameter.PLATE_SHARE] / inertia * more
     pulled, turning = [torque * inertia * length * m for m in moment], [torque * b for b in field]
@@ -291,16 +294,6 @@ def equations_of_motion(
     acceleration = subtract(add(force, axial, push), turned(velocity, rotor.rate, rotor.across))
     rates = [*drift, *acceleration, *attitude.rates(turn), *state_rates]
     return Equations([*variables, *states], rates, jacobi, power)
-
-
-def _gravity(tilted: bool, angle: hy.expression) -> tuple[Vector, Vector]:
-    """Gravity along the axis and across it, both along the rotor's axes."""
-    zero = hy.expression(0.0)
-    axial = [zero, zero, hy.par[Parameter.GRAVITY_Z]]
-    if not tilted:
-        return axial, [zero, zero, zero]
-    x, y = hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y]
-    return axial, [hy.cos(angle) * x + hy.sin(angle) * y, hy.cos(angle) * y - hy.sin(angle) * x, zero]
 
 
 # Position, moment, its two tangents, and body spin s: what balances are functions of.

@@ -49,8 +49,8 @@ Degree 3 is left out; it changes the growth rates of modes by 1 to 2 % of this e
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import astuple, dataclass, replace
+from typing import Any, TypeVar
 
 import heyoka as hy
 import numpy as np
@@ -123,8 +123,8 @@ class RealAir:
         return cls(REAL_AIR, radius / floater.radius, min(4 * np.pi * radius**2 / area, 1.0), ratio)
 
     @property
-    def compiled_in(self) -> tuple[float, ...]:
-        return self.size, self.sphericity or 0.0, self.spin_ratio  # a sphere's law is not that of sphericity 1
+    def compiled_in(self) -> tuple[Any, ...]:
+        return astuple(self)
 
     def added(self, motion: Motion) -> Added:
         length, time, spin, moment = hy.par[Parameter.LENGTH], hy.par[Parameter.TIME], motion.spin, motion.moment
@@ -218,8 +218,7 @@ class FloaterShape:
     def added(self, motion: Motion) -> Added:
         length, torque, inertia = (hy.par[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA))
         fields: list[FieldFormula] = [self.field, *(self.fields or [self.field] * (len(self.heights) - 1))]
-        moment, force, turn = motion.moment, [hy.expression(0.0)] * 3, [hy.expression(0.0)] * 3
-        energy = hy.expression(0.0)
+        moment, force, turn, energy = motion.moment, NOTHING, NOTHING, ZERO
         for height, dipole, formula in zip(self.heights, self.dipoles, fields, strict=True):
             place = [length * x + float(height) * m for x, m in zip(motion.position, moment, strict=True)]
             field, gradient = formula.expressions(place) if height else (motion.field, motion.gradient)
@@ -227,8 +226,7 @@ class FloaterShape:
             pull = [strength * inertia * length * dot(moment, [gradient[i][j] for i in range(3)]) for j in range(3)]
             force = add(force, pull)
             arm = [float(height) / length / inertia * m for m in moment]
-            turns = zip(cross(moment, field), cross(arm, pull), strict=True)
-            turn = [a + strength * b + c for a, (b, c) in zip(turn, turns, strict=True)]
+            turn = add(turn, [strength * t for t in cross(moment, field)], cross(arm, pull))
             energy = energy - strength * inertia * dot(moment, field)
         return Added(force, turn, energy=energy)
 
@@ -367,19 +365,14 @@ class FloaterCurrents:
         if scene.floater.is_sphere:
             return cls()
         shape = current_shape(scene.floater)
-        return cls(
-            delays=tuple(shape.delays.tolist()),
-            tensors=tuple(tuple(tensor.ravel().tolist()) for tensor in shape.tensors),
-            gradient=tuple(shape.gradient.ravel().tolist()),
-            gradient_delay=shape.gradient_delay,
-            coupling=tuple(shape.coupling.ravel().tolist()) if shape.coupling.any() else (),
-            coupling_delay=shape.coupling_delay,
-        )
+        tensors = tuple(tuple(tensor.ravel().tolist()) for tensor in shape.tensors)
+        gradient = tuple(shape.gradient.ravel().tolist()), shape.gradient_delay
+        coupling = tuple(shape.coupling.ravel().tolist()) if shape.coupling.any() else ()
+        return cls(FLOATER_CURRENTS, tuple(shape.delays.tolist()), tensors, *gradient, coupling, shape.coupling_delay)
 
     @property
-    def compiled_in(self) -> Numbers:
-        tensors = (number for tensor in self.tensors for number in tensor)
-        return (*self.delays, *tensors, *self.gradient, self.gradient_delay, *self.coupling, self.coupling_delay)
+    def compiled_in(self) -> tuple[Any, ...]:
+        return astuple(self)
 
     def added(self, motion: Motion) -> Added:
         length, inertia = hy.par[Parameter.LENGTH], hy.par[Parameter.INERTIA]
@@ -387,7 +380,7 @@ class FloaterCurrents:
         moment, drift, lag = motion.moment, motion.drift, self._lag(motion)
         gradient = [[length * entry for entry in row] for row in motion.gradient]
         bend, moving = curvature(motion), [dot(row, drift) for row in gradient]
-        dipole: Vector = NOTHING
+        dipole = NOTHING
         for delay, tensor in zip(self.delays, self.tensors, strict=True):
             change = _changed_field(lag, motion.field, moving, delay)
             dipole = add(dipole, by_tensor(np.reshape(tensor, (3, 3)), change, motion))
@@ -423,7 +416,7 @@ class FloaterCurrents:
         if not self.gradient or motion.axes is not None:
             return motion.lag
         less = (1.0 / hy.par[Parameter.INERTIA_Z] - 1.0) * dot(motion.spin, motion.moment)
-        return [w + less * m for w, m in zip(motion.lag, motion.moment, strict=True)]
+        return add(motion.lag, [less * m for m in motion.moment])
 
     def _of_shape(
         self, dipole: Vector, changes: Matrix, coupled: tuple[Vector, Matrix] | None, motion: Motion
@@ -484,38 +477,28 @@ def _pointed(changes: Matrix, moment: Vector) -> tuple[hy.expression, list[hy.ex
     return along, [p - along * m for p, m in zip(pointed, moment, strict=True)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Mode:
-    """A mode at a lag: its share c, its delay τ, and q² = w²τ²."""
+def _modes(degree: int, lag: Vector, slower: float) -> list[tuple[float, hy.expression, hy.expression]]:
+    """At a lag the share c, delay τ and w²τ² of those that are followed, `slower` than a ball's by a factor.
 
-    share: float
-    delay: hy.expression
-    square: hy.expression
-
-
-def _modes(degree: int, lag: Vector, slower: float) -> list[_Mode]:
-    """Those that are followed, and one for all others, so fast that it is never behind by much.
-
-    Each is `slower` than a ball's by a factor.
+    And of one for all others, so fast that it is never behind by much.
     """
     inverse = np.array(ZEROS[degree - 1]) ** -2.0
     fourth, sixth = SUMS[degree - 1]
     shares, delays = inverse**2 / fourth, inverse * slower
     rest = 1 - shares.sum()
+    pairs = [*zip(shares.tolist(), delays.tolist(), strict=True)]
+    pairs.append((float(rest), float(sixth / fourth * slower - shares @ delays) / float(rest)))
     square, slowness = dot(lag, lag), hy.par[Parameter.SLOWNESS]
-    modes = [_Mode(float(c), t * slowness, square * (t * slowness) ** 2.0) for c, t in zip(shares, delays, strict=True)]
-    last = float(sixth / fourth * slower - shares @ delays) / rest
-    return [*modes, _Mode(float(rest), last * slowness, square * (last * slowness) ** 2.0)]
+    return [(c, t * slowness, square * (t * slowness) ** 2.0) for c, t in pairs]
 
 
 def _changed_field(lag: Vector, field: Vector, moving: Vector, slower: float) -> Vector:
     """Σ c [(1 - τX)⁻² G v - X (1 - τX)⁻¹ B], from X³ = -w² X."""
-    modes = _modes(1, lag, slower)
-    once = [1 / (1 + mode.square) for mode in modes]
-    turned = hy.sum([m.share * o for m, o in zip(modes, once, strict=True)])
-    lifted = hy.sum([m.share * m.delay * o for m, o in zip(modes, once, strict=True)])
-    late = hy.sum([2 * m.share * m.delay * o * o for m, o in zip(modes, once, strict=True)])
-    later = hy.sum([m.share * m.delay**2.0 * (3 + m.square) * o * o for m, o in zip(modes, once, strict=True)])
+    modes = [(c, t, s, 1 / (1 + s)) for c, t, s in _modes(1, lag, slower)]
+    turned = hy.sum([c * once for c, _, _, once in modes])
+    lifted = hy.sum([c * t * once for c, t, _, once in modes])
+    late = hy.sum([2 * c * t * once * once for c, t, _, once in modes])
+    later = hy.sum([c * t**2.0 * (3 + s) * once * once for c, t, s, once in modes])
     sheared = [late * a - turned * b for a, b in zip(moving, field, strict=True)]
     twice = [later * a - lifted * b for a, b in zip(moving, field, strict=True)]
     following = cross(lag, add(sheared, cross(lag, twice)))
@@ -525,22 +508,21 @@ def _changed_field(lag: Vector, field: Vector, moving: Vector, slower: float) ->
 def _turned_gradient(lag: Vector, gradient: Matrix, slower: float) -> Matrix:
     """Σ c X (1 - τX)⁻¹ G, from X (X² + w²) (X² + 4w²) = 0: 1/(1 - τ²X²) by Newton's differences at 0, w², 4w²."""
     modes, square = _modes(2, lag, slower), dot(lag, lag)
-    first = _commutator(lag, gradient)
-    second = _commutator(lag, first)
-    powers = [first, second, _commutator(lag, second)]
-    powers.append(_commutator(lag, powers[2]))
-    powers.append(_combined([-5.0 * square, -4.0 * square * square], [powers[2], first]))
+    powers = [_commutator(lag, gradient)]
+    for _ in range(3):
+        powers.append(_commutator(lag, powers[-1]))
+    first, second, third, fourth = powers
+    powers.append(_combined([-5.0 * square, -4.0 * square * square], [third, first]))
     odd, even = [], []
-    for m in modes:
-        once, both = 1 / (1 + m.square), 1 / ((1 + m.square) * (1 + 4 * m.square))
-        weights = [m.share * (m.delay**2.0 * once + square * m.delay**4.0 * both), m.share * m.delay**4.0 * both]
+    for c, t, s in modes:
+        once, both = 1 / (1 + s), 1 / ((1 + s) * (1 + 4 * s))
+        weights = [c * (t**2.0 * once + square * t**4.0 * both), c * t**4.0 * both]
         odd.append(weights)
-        even.append([m.delay * weight for weight in weights])
-    slow = hy.sum([m.share * m.delay for m in modes])
-    terms = [hy.expression(1.0), slow]
+        even.append([t * weight for weight in weights])
+    terms = [hy.expression(1.0), hy.sum([c * t for c, t, _ in modes])]
     # X²ⁿ⁺¹ goes with the odd part, X²ⁿ⁺² with the even one, which is one delay more
     terms += [hy.sum([row[0] for row in odd]), hy.sum([row[0] for row in even]), hy.sum([row[1] for row in odd])]
-    sixth = _combined([-5.0 * square, -4.0 * square * square], [powers[3], second])
+    sixth = _combined([-5.0 * square, -4.0 * square * square], [fourth, second])
     return _combined([*terms, hy.sum([row[1] for row in even])], [*powers, sixth])
 
 

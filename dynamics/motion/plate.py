@@ -122,18 +122,16 @@ def _signal_weights(table: PlateTable) -> Array:
     return table.weights * table.multipoles.factors(1)
 
 
-def memory_terms(
-    memory: PlateMemory, first: int, position: Vector, moment: Vector, states: Vector, driven: bool = False
-) -> tuple[Added, Vector]:
-    """The plate's part of the equations of motion, and the scaled rates of its states.
+def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vector, driven: bool = False) -> Added:
+    """The plate's part of the equations of motion; its states are p - q.
 
     Its energy is that of the floater's currents, and of the floater in the field of the rotor's; power is what both
     gain from heat, from what turns the rotor and from what lowers the plate. The numbers of `memory` are the runtime
-    parameters from number `first` on; `position` and `moment` are the floater's, scaled; `states` are p - q of the
-    plate; the rotor's rate changes in time if it is `driven`.
+    parameters from number `first` on; `position` and `moment` are the floater's, scaled; the rotor's rate changes in
+    time if it is `driven`.
     """
     plate, table, lowered = memory.plate, memory.table, memory.plate.lowering is not None
-    rotor = DRIVEN if driven else STEADY
+    rotor, states = DRIVEN if driven else STEADY, [hy.expression(f"plate_{i}") for i in range(len(table.rates))]
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place = seen_by_plate(plate, position, rotor)
     pointing = _product(plate.box.rotation.T, about_z(moment, rotor.angle, 1.0))
@@ -160,14 +158,15 @@ def memory_terms(
     turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field, rotor))]
     speed = hy.par[Parameter.PLATE_SPEED] if lowered else hy.expression(0.0)
     drive = dot(force, [*turned(position, rotor.rate)[:2], speed]) + rotor.rate * turn[2]
-    added = Added(
+    return Added(
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
         energy=0.5 * hy.sum([y * y for y in own]) + stored,
         power=dotted(own, decay) - spent - drive,
         motor=braked,
+        states=states,
+        rates=add(decay, forced) if forced else decay,
     )
-    return added, add(decay, forced) if forced else decay
 
 
 def _rotor_terms(

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import IntEnum, auto
+from enum import IntEnum
 from typing import Any
 
 import heyoka as hy
@@ -16,60 +16,24 @@ from ...geometry.scene.floater import frame_about
 Vector = Sequence[hy.expression]
 
 
-class Parameter(IntEnum):
-    """Places of the runtime parameters; free of units but LENGTH (m), TORQUE (1/T), TIME (s) and the last ones.
-
-    PLATE_MOMENT is the floater's moment by the root of the unit of energy (A m²/√J), PLATE_SHARE one by that root.
-    RATE, ANGLE and PLATE_DEPTH are those at t = 0, had ACCELERATION and PLATE_SPEED always been as they are.
-    INDUCED is the moment that 1 T induces in the floater, by the same root, A m²/(T √J).
-    TILT_EDDY and SPIN_EDDY are the floater's own eddy currents, 1/T²: accelerations by unit field and relative turn;
-    SLOWNESS is μ0σR² of it in units of time.
-    INERTIA_X to _Z are principal moments of inertia over that of INERTIA, POINTING_X to _Z the moment's direction along
-    the body's axes: those of a body that is not round about its moment.
-    Of a rotor that is moved: TILT_X, _Y is the direction across its axis about which that turns, at TILT_RATE, by TILT
-    at t = 0, MOVE_X to _Z its velocity; these and gravity along the axes that it had, before its turn, where TILT is 0.
-    TABLE is the number of a row's table where there are several (`Rates.among`), on the way to that of NEXT by the part
-    BETWEEN.
-    """
-
-    RATE = 0
-    LENGTH = auto()
-    TORQUE = auto()
-    INERTIA = auto()
-    GRAVITY_X = auto()
-    GRAVITY_Y = auto()
-    GRAVITY_Z = auto()
-    LINEAR_DRAG = auto()
-    TILT_DRAG = auto()
-    SPIN_DRAG = auto()
-    LOST_DISTANCE = auto()
-    PLATE_DEPTH = auto()
-    PLATE_SPEED = auto()
-    TIME = auto()
-    PLATE_MOMENT = auto()
-    PLATE_SHARE = auto()
-    INDUCED = auto()
-    TILT_EDDY = auto()
-    SPIN_EDDY = auto()
-    SLOWNESS = auto()
-    INERTIA_X = auto()
-    INERTIA_Y = auto()
-    INERTIA_Z = auto()
-    POINTING_X = auto()
-    POINTING_Y = auto()
-    POINTING_Z = auto()
-    TABLE = auto()
-    NEXT = auto()
-    BETWEEN = auto()
-    ACCELERATION = auto()
-    ANGLE = auto()
-    TILT_X = auto()
-    TILT_Y = auto()
-    TILT = auto()
-    TILT_RATE = auto()
-    MOVE_X = auto()
-    MOVE_Y = auto()
-    MOVE_Z = auto()
+# Places of the runtime parameters; free of units but LENGTH (m), TORQUE (1/T), TIME (s) and the last ones.
+# PLATE_MOMENT is the floater's moment by the root of the unit of energy (A m²/√J), PLATE_SHARE one by that root. RATE,
+# ANGLE and PLATE_DEPTH are those at t = 0, had ACCELERATION and PLATE_SPEED always been as they are. INDUCED is the
+# moment that 1 T induces in the floater, by the same root, A m²/(T √J). TILT_EDDY and SPIN_EDDY are the floater's own
+# eddy currents, 1/T²: accelerations by unit field and relative turn; SLOWNESS is μ0σR² of it in units of time.
+# INERTIA_X to _Z are principal moments of inertia over that of INERTIA, POINTING_X to _Z the moment's direction along
+# the body's axes: those of a body that is not round about its moment. Of a rotor that is moved: TILT_X, _Y is the
+# direction across its axis about which that turns, at TILT_RATE, by TILT at t = 0, MOVE_X to _Z its velocity; these
+# and gravity along the axes that it had, before its turn, where TILT is 0. TABLE is the number of a row's table where
+# there are several (`Rates.among`), on the way to that of NEXT by the part BETWEEN.
+Parameter = IntEnum(
+    "Parameter",
+    "RATE LENGTH TORQUE INERTIA GRAVITY_X GRAVITY_Y GRAVITY_Z LINEAR_DRAG TILT_DRAG SPIN_DRAG LOST_DISTANCE "
+    "PLATE_DEPTH PLATE_SPEED TIME PLATE_MOMENT PLATE_SHARE INDUCED TILT_EDDY SPIN_EDDY SLOWNESS "
+    "INERTIA_X INERTIA_Y INERTIA_Z POINTING_X POINTING_Y POINTING_Z TABLE NEXT BETWEEN ACCELERATION ANGLE "
+    "TILT_X TILT_Y TILT TILT_RATE MOVE_X MOVE_Y MOVE_Z",
+    start=0,
+)
 
 
 # That nothing changes during a trajectory at one frequency; in those that are `WHOLE` a number that nearly is, is one
@@ -131,20 +95,16 @@ def moved() -> Turn:
     """That of a rotor that is driven and moved."""
     x, y, rate = (hy.par[p] for p in (Parameter.TILT_X, Parameter.TILT_Y, Parameter.TILT_RATE))
     tilt = hy.par[Parameter.TILT] + rate * hy.time
-    cosine, sine = hy.cos(DRIVEN.angle), hy.sin(DRIVEN.angle)
-
-    def spun(vector: Vector) -> list[hy.expression]:
-        return [cosine * vector[0] + sine * vector[1], cosine * vector[1] - sine * vector[0], vector[2]]
+    cosine, sine, axis = hy.cos(tilt), hy.sin(tilt), [x, y, hy.expression(0.0)]
 
     def seen(first: Parameter) -> list[hy.expression]:
         # by Rodrigues' formula, turned back by the tilt
-        vector, axis = [hy.par[first + k] for k in range(3)], [x, y, hy.expression(0.0)]
-        along, side = (1.0 - hy.cos(tilt)) * dot(axis, vector), cross(axis, vector)
-        return spun(
-            [hy.cos(tilt) * v - hy.sin(tilt) * s + along * a for v, s, a in zip(vector, side, axis, strict=True)]
-        )
+        vector = [hy.par[first + k] for k in range(3)]
+        along, side = (1.0 - cosine) * dot(axis, vector), cross(axis, vector)
+        back = [cosine * v - sine * s + along * a for v, s, a in zip(vector, side, axis, strict=True)]
+        return about_z(back, DRIVEN.angle, -1.0)
 
-    about = spun([rate * x, rate * y, hy.expression(0.0)])
+    about = about_z([rate * a for a in axis], DRIVEN.angle, -1.0)
     return replace(DRIVEN, across=about[:2], velocity=seen(Parameter.MOVE_X), gravity=seen(Parameter.GRAVITY_X))
 
 
@@ -221,21 +181,15 @@ class State:
 
     def to_lab(self, angle: ArrayLike) -> "State":
         """Components along the laboratory's axes, from those along the rotor's; `angle` of the rotor in rad."""
-        axes = None
-        if self.axes is not None:
-            columns = turned_about_z(self.axes.swapaxes(-1, -2), np.asarray(angle, float)[..., None])
-            axes = columns.swapaxes(-1, -2)
+        axes = self.axes
+        if axes is not None:
+            axes = turned_about_z(axes.swapaxes(-1, -2), np.asarray(angle, float)[..., None]).swapaxes(-1, -2)
         return replace(State(*(turned_about_z(v, angle) for v in self.vectors)), axes=axes)
 
     def moved(self, center: Array, axes: Array) -> "State":
         """In the laboratory, from along axes (n, 3, 3) with an origin at (n, 3) m; velocities are the same."""
         position, *rest = (np.einsum("nij,nj->ni", axes, vector) for vector in self.vectors)
         return replace(State(position + center, *rest), axes=None if self.axes is None else axes @ self.axes)
-
-    def brought_back(self, center: Array, axes: Array) -> "State":
-        """What `moved` takes away."""
-        shifted = replace(self, position=self.position - center)
-        return shifted.moved(np.zeros(3), axes.swapaxes(1, 2))
 
     @property
     def orientation(self) -> Array:

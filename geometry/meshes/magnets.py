@@ -86,17 +86,12 @@ def mesh_magnets(
     planes: tuple[int, ...] = (),
     edges_of: Sequence[Solid] | None = None,
 ) -> MagnetMesh:
-    """Mesh magnets in a ball of air; they may touch each other.
+    """Mesh `magnets` in a ball of air as finely as `settings` say; they may touch each other.
 
     Raises ValueError: no magnet, or two that overlap; MeshError, ComputationError: a part from a file cannot be meshed,
-    takes too long or too much memory.
-
-    Parameters
-    ----------
-    magnets, settings : what is meshed, and how finely
-    planes : coordinate planes (0: across x, …) that mirror the magnets; only the positive side is meshed. The faces
-        there are the boundaries `plane0`, …
-    edges_of : the bodies at whose edges and corners the field is singular; by default the magnets
+    takes too long or too much memory. Coordinate `planes` (0: across x, …) mirror the magnets; only the positive side
+    is meshed, and the faces there are the boundaries `plane0`, … At edges and corners of the bodies `edges_of`, by
+    default the magnets, the field is singular.
     """
     settings = settings or MeshSettings()
     if not (magnets := tuple(magnets)):

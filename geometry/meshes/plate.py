@@ -149,16 +149,11 @@ def plate_mesh(
     rule: MeshRule | None = None,
     endless: bool = False,
 ) -> ConductorMesh:
-    """Mesh for a plate and dipoles at `positions` (n, 3) m, along the plate's axes from its middle, wherever that is.
+    """Mesh for a plate `body` and dipoles at `positions` (n, 3) m, along its axes from its middle, wherever that is.
 
-    Raises ValueError: a size is not positive, or a position is not outside the plate.
-
-    Parameters
-    ----------
-    body : the plate
-    conductivity, frequency : S/m, of several bodies of each, and Hz, of which the skin depth follows
-    rule : how fine the mesh is
-    endless : on the same cells, the plate reaches to the end of the air along its two longer edges: of a cuboid only
+    Raises ValueError: a size is not positive, or a position is not outside the plate. From `conductivity` (S/m, of
+    several bodies of each) and `frequency` (Hz) the skin depth follows; `rule` says how fine the mesh is. An `endless`
+    plate reaches, on the same cells, to the end of the air along its two longer edges: of a cuboid only.
     """
     rule, half, places = rule or MeshRule(), body.half_edges, np.asarray(positions, float).reshape(-1, 3)
     if not np.all(half > 0):

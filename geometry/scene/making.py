@@ -23,17 +23,12 @@ MOST_BODIES = 64  # Magnets and conductors of a scene beside a known one, unless
 
 
 def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, known: Scene | None = None) -> Scene:
-    """The scene of a scene file's keys, which it keeps; names of files in them are from the folder at hand then.
+    """The scene of a scene file's `keys`, as TOML has them, which it keeps; names of files in them become paths.
 
-    Raises SceneError: unknown, missing or wrong keys, bodies that overlap, or a file that is not known.
-
-    Parameters
-    ----------
-    keys : as TOML has them
-    source : names it in messages
-    folder : where the files lie that it names; left out, where `source` does
-    known : for keys of which nothing is known, a scene whose files alone they may name, as it has them: no path is
-        opened, and there are at most `MOST_BODIES` or as many as it has. Left out: any file, which is read.
+    Raises SceneError: unknown, missing or wrong keys, bodies that overlap, or a file that is not known. `source` names
+    it in messages; `folder` is where the files lie that it names, by default that of `source`. Keys of which nothing is
+    known may name the files of a scene `known` alone, as it has them: no path is opened, and there are at most
+    `MOST_BODIES` or as many as it has.
     """
     keys, tolerances, faults = without_tolerances(keys)
     if faults:

@@ -37,7 +37,7 @@ def start_of(rates):
 @pytest.mark.slow
 def test_flights_last_within_the_ends_and_not_beyond(rates):
     """Searches that know no branch, one resolution within each end and two beyond it."""
-    found = lasting_frequencies(SCENE, TABLE, rates, start_of(rates), SCENE.frequency, resolution=0.5)
+    found = lasting_frequencies(SCENE, TABLE, rates, start_of(rates), SCENE.frequency)
     assert found.ended_by == "instability"
 
     def lasts(frequency):
