@@ -245,8 +245,10 @@ class BodyShape:
         length, inertia, share = (motion.given[p] for p in WHICH)
         place = regular_harmonics(self._way, self.ball.offset([length * p for p in motion.position]))
         first, known = self.first, self._known
-        rows = np.arange(known.size).reshape(known.shape).tolist()
-        numbers = [[hy.par[first + n] if known.flat[n] else ZERO for n in row] for row in rows]
+        numbers = [
+            [hy.par[first + k * len(row) + n] if one else ZERO for n, one in enumerate(row)]
+            for k, row in enumerate(known.tolist())
+        ]
         unit = self._unit * share * share
         sums = [dotted(column, states) for column in zip(*numbers, strict=True)]
         field = [dotted(row, place) for row in numbers]

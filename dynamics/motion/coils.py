@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...fem.closed_forms.coil import Filaments
-from ...fem.harmonics.expressions import CompiledField, FieldExpressions
+from ...fem.harmonics.expressions import FieldExpressions
 from ...fem.harmonics.solid import tensors
 from ...fem.rotor.table import FieldFormula, errors_of_sum, keeps_shape
 from ...geometry.common import Array
 from ...geometry.scene.contents import Coil, Scene
-from .effect import ZERO, Added, Interaction, Motion, interaction_of
+from .effect import ZERO, Added, Interaction, Motion, derived, interaction_of
 from .state import Parameter, about_z, add, cross, dot
 
 COILS = "coils off the axis, or with currents that change"
@@ -49,17 +49,18 @@ class BesideCoils:
         return str(self.table.model)
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
-        parts = [self.table.expressions(position), self._filaments.expressions(position, self._currents.tolist())]
-        (one, steep), (other, steeper) = parts
+        one, steep = self.table.expressions(position)
+        other, steeper = self._filaments.expressions(position, self._currents.tolist())
         return add(one, other), [add(*rows) for rows in zip(steep, steeper, strict=True)]
 
     def derivatives(self, points: Array, order: int) -> Array:
-        found = (self.table if hasattr(self.table, "derivatives") else self._compiled).derivatives(points, order)
-        return np.asarray(found + self._filaments.derivatives(points, order, self._currents))
+        return np.asarray(
+            self._own.derivatives(points, order) + self._filaments.derivatives(points, order, self._currents)
+        )
 
     @cached_property
-    def _compiled(self) -> CompiledField:
-        return CompiledField(self.table.expressions)
+    def _own(self) -> Any:
+        return derived(self.table)
 
     @keeps_shape
     def evaluate(self, points: Array) -> tuple[Array, Array]:

@@ -5,13 +5,13 @@ All in the units of `Scales`, energies in M R²/T², along the axes that turn wi
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, cast, runtime_checkable
+from typing import Any, Protocol, cast, runtime_checkable
 
 import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...fem.harmonics.expressions import FieldExpressions
+from ...fem.harmonics.expressions import CompiledField, FieldExpressions
 from ...fem.harmonics.interior import Ball, BallField
 from ...fem.rotor.table import DerivedField, FieldFormula, FieldTable
 from ...geometry.common import Array
@@ -193,6 +193,11 @@ class Interaction:
     @property
     def _table(self) -> FieldTable:
         return cast(FieldTable, self.field)
+
+
+def derived(field: FieldFormula) -> Any:
+    """A field with its derivatives; one known by its expressions alone is compiled for itself."""
+    return field if hasattr(field, "derivatives") else CompiledField(field.expressions)
 
 
 def interaction_of(table: FieldFormula) -> Interaction:

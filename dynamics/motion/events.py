@@ -35,9 +35,7 @@ def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events
     metres = [length * p for p in position]
     inner = scene.floater.inner_radius
     gaps = [_excess(body, metres, inner) for body in scene.turning_bodies]
-    if scene.standing_bodies:
-        seen = raised(position, turn)
-        gaps += [_excess(body, seen, inner) for body in scene.standing_bodies]
+    gaps += [_excess(body, raised(position, turn), inner) for body in scene.standing_bodies]
     within = (scene.floater.inner_radius / scene.floater.radius) ** 2  # its own contact is found at the samples
     reach = hy.par[Parameter.LOST_DISTANCE] ** 2.0 - hy.sum([p * p for p in position])
     return [*((gap / (length * length) - within, CONTACT) for gap in gaps), (reach, LOST)]
@@ -167,15 +165,10 @@ class Leg:
 
 def motion_legs(scene: Scene, duration: float) -> list[Leg]:
     """The stretches of so many seconds, in turn."""
-    lowering = scene.plate.lowering if scene.plate else None
     plate = [(duration, 0.0, 0.0)]
-    if lowering is not None and lowering.speed:
-        finish = lowering.start + lowering.distance / lowering.speed
-        plate = [
-            (lowering.start, 0.0, 0.0),
-            (finish, -lowering.start * lowering.speed, lowering.speed),
-            (duration, lowering.distance, 0.0),
-        ]
+    if scene.plate and (down := scene.plate.lowering) and down.speed:
+        sinking = down.start + down.distance / down.speed, -down.start * down.speed, down.speed
+        plate = [(down.start, 0.0, 0.0), sinking, (duration, down.distance, 0.0)]
     plate = [(min(end, duration), depth, speed) for end, depth, speed in plate]
     times, rates, angles = scene.knots
     slopes = np.append(np.diff(rates) / np.diff(times), 0.0)

@@ -53,7 +53,6 @@ from .state import (
     dotted,
     matrices_of,
     rotation_slopes,
-    subtract,
     turned,
     turned_about_z,
 )
@@ -95,9 +94,8 @@ class PlateMemory:
         return self.table.in_range(self.plate.box.to_body(lab + depth[:, None] * [0.0, 0.0, 1.0]))
 
     def __repr__(self) -> str:
-        harmonics = len(self.share.series) // 2
-        text = f"relative error {self.error:.1e}, {harmonics} harmonics of the rotor"
-        return f"PlateMemory {self.model!r}: {text}\n{self.table!r}"
+        said = f"relative error {self.error:.1e}, {len(self.share.series) // 2} harmonics of the rotor"
+        return f"PlateMemory {self.model!r}: {said}\n{self.table!r}"
 
 
 def plate_numbers(memory: PlateMemory, values: Array, driven: bool = False) -> Array:
@@ -130,7 +128,7 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     parameters from number `first` on; `position` and `moment` are the floater's, scaled; the rotor's rate changes in
     time if it is `driven`.
     """
-    plate, table, lowered = memory.plate, memory.table, memory.plate.lowering is not None
+    plate, table = memory.plate, memory.table
     rotor, states = DRIVEN if driven else STEADY, [hy.expression(f"plate_{i}") for i in range(len(table.rates))]
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place = seen_by_plate(plate, position, rotor)
@@ -156,7 +154,7 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     push = [dot(source, [weighted(row, slope_sums) for row in rows]) for rows in cartesian(2)]
     force = [length * f for f in _seen_by_rotor(plate, push, rotor)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field, rotor))]
-    speed = hy.par[Parameter.PLATE_SPEED] if lowered else hy.expression(0.0)
+    speed = hy.par[Parameter.PLATE_SPEED] if plate.lowering else hy.expression(0.0)
     drive = dot(force, [*turned(position, rotor.rate)[:2], speed]) + rotor.rate * turn[2]
     return Added(
         force=force,
@@ -197,7 +195,7 @@ def _rotor_terms(
         """Of q of a state, or with a drive of r."""
         return hy.par[start + len(functions) * count + harmonic * len(own) + state]
 
-    if memory.plate.lowering is not None:
+    if memory.plate.lowering:
         sinking = [speed * hy.subs(hy.diff(f, depth), now) for f in [*constant, *functions]]
         changing = add(changing, sinking[len(constant) :])
         parts = sinking[: len(constant)] if driven else sinking
@@ -222,9 +220,8 @@ def raised(position: Vector, rotor: Turn) -> Vector:
 
 def seen_by_plate(plate: Plate, position: Vector, rotor: Turn) -> Vector:
     """A scaled position in the rotor's frame along the plate's axes, m, from its centre."""
-    return _product(
-        plate.box.rotation.T, subtract(raised(position, rotor), [hy.expression(float(c)) for c in plate.box.center])
-    )
+    away = [x - float(c) for x, c in zip(raised(position, rotor), plate.box.center, strict=True)]
+    return _product(plate.box.rotation.T, away)
 
 
 def _seen_by_rotor(plate: Plate, vector: Vector, rotor: Turn) -> Vector:
@@ -336,6 +333,5 @@ class PlateForce:
 
     @property
     def _depth(self) -> float:
-        if self.memory.plate.lowering is None:
-            return 0.0
-        return float(self.values[Parameter.PLATE_DEPTH] * self.values[Parameter.LENGTH])
+        depth = self.values[Parameter.PLATE_DEPTH] * self.values[Parameter.LENGTH]
+        return float(depth) if self.memory.plate.lowering else 0.0

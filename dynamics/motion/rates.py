@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...fem.compiled_code import compiled_later, one_thread
-from ...fem.harmonics.expressions import CompiledField
 from ...fem.harmonics.interior import LocalField
 from ...fem.rotor.table import FieldFormula
 from ...geometry.common import Array
-from .effect import Effect, Interaction, Placeable, Poses, interaction_of
+from .effect import Effect, Interaction, Placeable, Poses, derived, interaction_of
 from .equations import Equations, balances, equations_of_motion, locked_balances, still_balances
 from .state import Parameter, matrices_of
 
@@ -34,38 +33,32 @@ class Rates:
 
     def __init__(self, table: FieldFormula, optimised: bool = False) -> None:
         whole = interaction_of(table)
-        self._field = _derived(whole)
+        self._field = derived(whole.field)
         self._rough, self._each = False, tuple[Rates, ...]()
         # where the field was asked for last, m, and what it is: other parameters there, as frequencies, need it again
         self._last = NOWHERE
-        self._placed: list[Placeable] = []
-        effects: list[Effect] = []
-        self._local = LocalField(len(Parameter))
+        self._effects, self._local = list[Effect](), LocalField(len(Parameter))
         first = self._local.first + self._local.count
         for effect in whole.effects:
             if isinstance(effect, Placeable):
                 effect = effect.placed(first)
-                self._placed.append(effect)
                 first += effect.count
-            effects.append(effect)
+            self._effects.append(effect)
+        self._placed = [effect for effect in self._effects if isinstance(effect, Placeable)]
         self.turning, self.code = whole.turning, code_of(whole)
-        self._equations = equations_of_motion(Interaction(self._local, tuple(effects), whole.turning))
         # Unoptimised code is compiled three times as fast, and a search is over before faster code would be ready.
         self._level = 1 if optimised else 0
         self._known: dict[str, Any] = {}  # machine code by what is written from the equations, shared by copies
 
+    @cached_property
+    def _equations(self) -> Equations:
+        return equations_of_motion(Interaction(self._local, tuple(self._effects), self.turning))
+
     def elsewhere(self, table: FieldFormula) -> "Rates":
         """The rates in another table, by the same code where its effects differ by runtime parameters alone."""
-        whole, first = interaction_of(table), self._local.first + self._local.count
-        if code_of(whole) != self.code:
-            return Rates(table, bool(self._level))
-        found = copy(self)
-        found.__dict__.pop("rough", None)
-        found._field, found._placed, found._last = _derived(whole), [], NOWHERE
-        for effect in whole.effects:
-            if isinstance(effect, Placeable):
-                found._placed.append(effect.placed(first))
-                first += effect.count
+        found = Rates(table, bool(self._level))
+        if found.code == self.code:
+            found._known = self._known
         return found
 
     def among(self, each: Sequence["Rates"]) -> "Rates":
@@ -199,11 +192,6 @@ class Rates:
 def code_of(whole: Interaction) -> tuple[Any, ...]:
     """What decides the code of rates: of effects their kind, and what they have in it, as places of dipoles."""
     return whole.turning, *((one.name, getattr(one, "compiled_in", None)) for one in whole.effects)
-
-
-def _derived(table: Interaction) -> Any:
-    """The field with its derivatives; one known by its expressions alone is compiled for itself."""
-    return table.field if hasattr(table.field, "derivatives") else CompiledField(table.field.expressions)
 
 
 def _with_jacobian(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:

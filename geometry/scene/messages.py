@@ -159,15 +159,13 @@ def _table(form: Any) -> type[schema.Table] | None:
 
 
 def _close(place: Sequence[Any]) -> list[str]:
-    """The key that an unknown one was likely meant for, if there is one."""
     return difflib.get_close_matches(str(place[-1])[:LONGEST], _allowed(place), n=1)
 
 
 def key_faults(table: schema.SceneTable) -> Iterator[str]:
     """One sentence for each rule between keys that is broken."""
     rotor, there = table.rotor, table.model_fields_set
-    for k, start in enumerate(table.starts):
-        place = f"start[{k}]" if isinstance(table.start, list) else "start"
+    for place, start in table.starts.items():
         if start.offset_mm is not None and start.position_mm is not None:
             yield f"Input {place} must have offset_mm or position_mm; instead received both."
         for key in ("velocity_mm_s", "moment", "spin_hz", "body_x"):
@@ -196,14 +194,15 @@ def key_faults(table: schema.SceneTable) -> Iterator[str]:
     needed = () if table.coils and "rotor" not in there else ("frequency_hz", "rotor")
     yield from (f"Input {key} must be given; instead it is missing." for key in needed if key not in there)
     yield from _coil_faults(table, table.coils or ())
-    for name, floater in table.floaters.items():
-        yield from (re.sub("(?<!the )floater", name, fault) for fault in _floater_faults(floater, table))
+    for name, floater in table.named("floater").items():
+        yield from (re.sub("(?<!the )floater", name, fault) for fault in _floater_faults(floater))
     yield from _several_faults(table)
-    for k, plate in table.plates:
-        yield from _shape_faults(f"plate[{k}]" if k >= 0 else "plate", plate)
-        if plate.lowering != table.plates[0][1].lowering:
+    plates = table.named("plate")
+    for name, plate in plates.items():
+        yield from _shape_faults(name, plate)
+        if plate.lowering != plates.get("plate[0]", plate).lowering:
             yield (
-                f"Input plate[{k}].lowering must be that of plate[0], as all plates are lowered together; "
+                f"Input {name}.lowering must be that of plate[0], as all plates are lowered together; "
                 "instead it is another."
             )
     yield from _drive_faults(table)
@@ -264,8 +263,7 @@ def _coil_faults(table: schema.SceneTable, coils: Sequence[schema.CoilTable]) ->
             "has a current that changes: what it drives in the floater is not computed; instead it has. Steady "
             "currents about the axis may stand beside any floater."
         )
-    for k, plate in table.plates:
-        name = f"plate[{k}]" if k >= 0 else "plate"
+    for name, plate in table.named("plate").items():
         if any(changing):
             yield (
                 f"Input {name} must be left out beside coils[{changing.index(True)}], whose current changes and would "
@@ -279,26 +277,23 @@ def _coil_faults(table: schema.SceneTable, coils: Sequence[schema.CoilTable]) ->
 
 
 def _several_faults(table: schema.SceneTable) -> Iterator[str]:
-    """Faults of a list of floaters, or of starts."""
-    number, starts = len(table.floaters), table.start if isinstance(table.start, list) else None
-    given = 0 if table.start is None else len(table.starts)
+    number, starts = len(table.named("floater")), table.named("start")
     if not isinstance(table.floater, list):
-        if starts is not None:
+        if isinstance(table.start, list):
             yield "Input start must be one table beside one floater; instead received a list."
     elif number < 2:
         yield f"Input floater must be one table, or a list of two and more; instead received a list of {number}."
-    elif starts is None or given != number:
+    elif not isinstance(table.start, list) or len(starts) != number:
         yield (
             f"Input start must be a list of {number} tables [[start]], one for each floater; instead received "
-            f"{given or 'none'}."
+            f"{len(starts) or 'none'}."
         )
     else:
-        for k in (k for k, start in enumerate(starts) if start.position_mm is None):
-            yield f"Input start[{k}].position_mm must be given where there are several floaters; instead it is missing."
+        for name in (name for name, start in starts.items() if start.position_mm is None):
+            yield f"Input {name}.position_mm must be given where there are several floaters; instead it is missing."
 
 
-def _floater_faults(floater: schema.FloaterTable, whole: schema.SceneTable) -> Iterator[str]:
-    """Faults of a floater's keys among themselves and beside others of a scene's."""
+def _floater_faults(floater: schema.FloaterTable) -> Iterator[str]:
     single = [k for k in (*schema.SIZE_KEYS, "file", "remanence_T", "recoil_permeability", "density_kg_m3")
               if getattr(floater, k, None) is not None]  # fmt: skip
     sphere = floater.shape == "sphere" and not floater.composite
@@ -330,7 +325,6 @@ def _floater_faults(floater: schema.FloaterTable, whole: schema.SceneTable) -> I
 
 
 def _shape_faults(place: str, table: Any) -> Iterator[str]:
-    """The fault of the sizes of a shape at a place of the scene file."""
     given = [key for key in schema.SIZE_KEYS if getattr(table, key, None) is not None]
     file, sizes = getattr(table, "file", None), " and ".join(given)
     if table.shape == "file" and not file:
@@ -435,7 +429,6 @@ def overlap_faults(scene: Scene) -> Iterator[str]:
 
 
 def _own_overlaps(owner: str, kinds: str, bodies: Sequence[tuple[str, Solid]]) -> Iterator[str]:
-    """Overlaps of the bodies of a rotor or floater among themselves."""
     for (first, one), (second, other) in combinations(bodies, 2):
         if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING:
             yield (

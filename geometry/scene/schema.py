@@ -92,8 +92,6 @@ def solid_of(table: Table) -> Solid:
 
 
 class _Placed(Table):
-    """A body in a place, with the keys of its shape."""
-
     size_mm: Three[Length] | None = None
     diameter_mm: Length | None = None
     height_mm: Length | None = None
@@ -128,9 +126,6 @@ class ConductorTable(_Placed):
 
     shape: Literal["cuboid", "cylinder"] = "cuboid"
     conductivity_S_m: Metal
-
-    def conductor(self) -> Conductor:
-        return Conductor(solid_of(self), self.conductivity_S_m)
 
 
 class MagnetTable(_Shaped):
@@ -208,7 +203,6 @@ class ExplicitRotor(AnyRotor):
 
 
 def _rotor_kind(rotor: Any) -> str | None:
-    """Which of the rotor tables a `[rotor]` table is."""
     table = dict(rotor) if isinstance(rotor, dict | BaseModel) else {}
     configuration = table.get("configuration")
     return "magnets" if "magnets" in table else configuration if isinstance(configuration, str) else None
@@ -264,16 +258,15 @@ class FloaterTable(Table):
     def floater(self, parts: Parts) -> Floater:
         permeability = self.recoil_permeability or RECOIL_PERMEABILITY
         given = None if self.inertia_kg_m2 is None else tuple(self.inertia_kg_m2)
-        if self.composite:
-            pieces = [table.piece(parts, self.conductivity_S_m) for table in self.tables]
-            return Floater.composed(pieces, given)  # type: ignore[arg-type]
-        assert self.remanence_T is not None
-        assert self.density_kg_m3 is not None
+        pieces = [table.piece(parts, self.conductivity_S_m) for table in self.tables]
+        assert pieces or (self.remanence_T is not None and self.density_kg_m3 is not None)
         if self.file:
             body = known_shape(parts[self.file]) or parts[self.file]
             polarization = body.rotation.T @ np.array([0.0, 0.0, self.remanence_T])
             magnet = Magnet(body, polarization, permeability, conductivity=self.conductivity_S_m)
-            return Floater.composed([FloaterPart(magnet, self.density_kg_m3)], given)  # type: ignore[arg-type]
+            pieces = [FloaterPart(magnet, self.density_kg_m3)]  # type: ignore[arg-type]
+        if pieces:
+            return Floater.composed(pieces, given)  # type: ignore[arg-type]
         shape = solid_of(self)
         material = self.remanence_T, permeability, self.density_kg_m3, self.conductivity_S_m
         own = None if isinstance(shape, Sphere | Part) else shape
@@ -281,7 +274,6 @@ class FloaterTable(Table):
 
     @property
     def tables(self) -> list[BallastTable]:
-        """Its magnets, then its ballast."""
         return [*self.magnets, *self.bodies]
 
 
@@ -379,7 +371,12 @@ class DriveTable(Table):
         return DriveStep(0.0 if self.stop else self.to_hz, self.in_s or self.hold_s or 0.0, center, axis)
 
 
-ONE_OR_SEVERAL = Discriminator(lambda given: "several" if isinstance(given, list) else "one")
+One = TypeVar("One")
+Several = TypeVar("Several")
+OneOrSeveral = Annotated[
+    Annotated[One, Tag("one")] | Annotated[Several, Tag("several")],
+    Discriminator(lambda given: "several" if isinstance(given, list) else "one"),
+]
 
 
 class SceneTable(Table):
@@ -394,42 +391,29 @@ class SceneTable(Table):
         | Annotated[ExplicitRotor, Tag("magnets")],
         Discriminator(_rotor_kind),
     ] = ExplicitRotor.model_construct(magnets=[])  # none, beside coils
-    floater: Annotated[
-        Annotated[FloaterTable, Tag("one")] | Annotated[list[FloaterTable], Tag("several")], ONE_OR_SEVERAL
-    ]
-    plate: Annotated[
-        Annotated[PlateTable | None, Tag("one")]
-        | Annotated[Annotated[list[PlateTable], Field(min_length=1)], Tag("several")],
-        ONE_OR_SEVERAL,
-    ] = None
+    floater: OneOrSeveral[FloaterTable, list[FloaterTable]]
+    plate: OneOrSeveral[PlateTable | None, Annotated[list[PlateTable], Field(min_length=1)]] = None
     drag: DragTable | None = None
-    start: Annotated[
-        Annotated[StartTable | None, Tag("one")] | Annotated[list[StartTable], Tag("several")], ONE_OR_SEVERAL
-    ] = None
+    start: OneOrSeveral[StartTable | None, list[StartTable]] = None
     drive: list[DriveTable] | None = None
     coils: list[CoilTable] | None = None
 
-    @property
-    def plates(self) -> list[tuple[int, PlateTable]]:
-        """The plates by their number, -1 of a single one."""
-        return list(enumerate(self.plate)) if isinstance(self.plate, list) else [(-1, self.plate)] if self.plate else []
+    def named(self, name: str) -> dict[str, Any]:
+        """The tables of plates, floaters or starts by what messages call them."""
+        given = getattr(self, name)
+        if isinstance(given, list):
+            return {f"{name}[{k}]": one for k, one in enumerate(given)}
+        return {} if given is None else {name: given}
 
     @property
-    def floaters(self) -> dict[str, FloaterTable]:
-        """The floaters' tables by what messages call them."""
-        if isinstance(self.floater, list):
-            return {f"floater[{k}]": one for k, one in enumerate(self.floater)}
-        return {"floater": self.floater}
-
-    @property
-    def starts(self) -> list[StartTable]:
-        return self.start if isinstance(self.start, list) else [self.start or StartTable()]
+    def starts(self) -> dict[str, StartTable]:
+        return self.named("start") or {"start": StartTable()}
 
     def scene(self, parts: Parts) -> Scene:
         """The scene in SI units."""
         rotor, drag = self.rotor, self.drag or DragTable()
-        floater, *others = (table.floater(parts) for table in self.floaters.values())
-        start, *elsewhere = (table.start() for table in self.starts)
+        floater, *others = (table.floater(parts) for table in self.named("floater").values())
+        start, *elsewhere = (table.start() for table in self.starts.values())
         return Scene(
             frequency=self.frequency_hz,
             gravity=np.array(self.gravity_m_s2),
@@ -438,12 +422,12 @@ class SceneTable(Table):
             companions=tuple(
                 Companion(one, drag.drag(one), begins) for one, begins in zip(others, elsewhere, strict=True)
             ),
-            plate=Plate.of([table.plate(parts) for _, table in self.plates]) if self.plate else None,
+            plate=Plate.of([table.plate(parts) for table in self.named("plate").values()]) if self.plate else None,
             drag=drag.drag(floater),
             start=start,
             field_map=Path(rotor.field_map) if rotor.field_map else None,
             map_reading=MapReading(rotor.map_length_unit, rotor.map_field_unit, rotor.map_columns),
-            conductors=tuple(conductor.conductor() for conductor in rotor.conductors),
+            conductors=tuple(Conductor(solid_of(table), table.conductivity_S_m) for table in rotor.conductors),
             drive=tuple(step.step() for step in self.drive or ()),
             coils=tuple(coil.coil() for coil in self.coils or ()),
         )
