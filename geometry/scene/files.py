@@ -37,7 +37,17 @@ LARGEST = 2**1000  # Integers below it are floats
 
 
 def load_scene(path: str | Path) -> Scene:
-    """Read and check the scene file at a `path`; the scene is in SI units.
+    """Read and check a scene file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Scene
+        What it describes, in SI units.
 
     Raises
     ------
@@ -79,7 +89,7 @@ def _text(path: str | Path, name: str) -> str:
 def parse_scene(
     text: str, source: str = "scene", changes: Mapping[str, float] | None = None, known: Scene | None = None
 ) -> Scene:
-    """Build a scene, in SI units, from the text of a scene file.
+    """Build a scene from the text of a scene file.
 
     Parameters
     ----------
@@ -91,6 +101,11 @@ def parse_scene(
         Numbers that replace those of the text, by key, such as `rotor.displacement_mm` or `plate.center_mm.2`.
     known : Scene, optional
         A scene whose files alone the text may name, for a text of which nothing is known: no other path is opened.
+
+    Returns
+    -------
+    Scene
+        What it describes, in SI units.
 
     Raises
     ------
@@ -198,7 +213,7 @@ def scene(
     drive: Sequence[Mapping[str, Any]] | None = None,
     **more: Any,
 ) -> Scene:
-    """A scene, in SI units, from the tables of a scene file.
+    """A scene from the tables of a scene file; the object itself is in SI units.
 
     Parameters
     ----------
@@ -221,6 +236,11 @@ def scene(
         its way, "center_mm" and "axis".
     **more : float or list
         Further keys that stand in no table of a scene file.
+
+    Returns
+    -------
+    Scene
+        In SI units.
 
     Raises
     ------

@@ -153,7 +153,7 @@ def _rotor(configuration: str, edge_mm: float | None, **keys: Any) -> Table:
 
 @spelled
 def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """The table `[rotor]` of a scene file: one cube magnetised along +x and displaced along it from the axis.
+    """One cube magnetised along +x and displaced along it from the axis.
 
     Parameters
     ----------
@@ -163,13 +163,18 @@ def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | N
         Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
         Further keys, as for `magnets`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
     """
     return _rotor("horizontal", edge_mm, displacement_mm=displacement_mm, remanence_T=remanence_T, **more)
 
 
 @spelled
 def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """The table `[rotor]` of a scene file: a cube magnetised along +x and one above it along +z.
+    """A cube magnetised along +x and one above it along +z.
 
     Parameters
     ----------
@@ -177,13 +182,18 @@ def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | Non
         From centre to centre, mm.
     remanence_T, edge_mm, **more : float or list
         As for `horizontal`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
     """
     return _rotor("vertical", edge_mm, displacement_mm=displacement_mm, remanence_T=remanence_T, **more)
 
 
 @spelled
 def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
-    """The table `[rotor]` of a scene file: one cube, turned with its magnetisation about y.
+    """One cube, turned with its magnetisation about y.
 
     Parameters
     ----------
@@ -191,12 +201,17 @@ def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, 
         The magnetisation is along (cos angle, 0, sin angle), degrees.
     remanence_T, edge_mm, **more : float or list
         As for `horizontal`.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
     """
     return _rotor("tilt", edge_mm, angle_deg=angle_deg, remanence_T=remanence_T, **more)
 
 
 def magnets(*bodies: Table, **more: Any) -> Table:
-    """The table `[rotor]` of a scene file: any set of magnets.
+    """Any set of magnets.
 
     Parameters
     ----------
@@ -210,13 +225,18 @@ def magnets(*bodies: Table, **more: Any) -> Table:
         currents, else left out), coercivity_kA_m (the knee of their demagnetisation curves), field_map, and
         conductors, a list of tables with shape ("cuboid" or "cylinder"), size_mm or diameter_mm and height_mm,
         center_mm, rotation_deg and conductivity_S_m: metal that turns with the rotor.
+
+    Returns
+    -------
+    dict
+        The table `[rotor]` of a scene file.
     """
     return {"magnets": list(bodies), **more}
 
 
 @spelled
 def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **more: Any) -> Table:
-    """The table `[floater]` of a scene file: the floating sphere.
+    """The floating sphere.
 
     Parameters
     ----------
@@ -224,6 +244,11 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
         Diameter, mm, remanence, T, and density, kg/m³.
     **more : float
         Further keys: recoil_permeability (1.05), conductivity_S_m (its eddy currents, else left out).
+
+    Returns
+    -------
+    dict
+        The table `[floater]` of a scene file.
     """
     return {"diameter_mm": diameter_mm, "remanence_T": remanence_T, "density_kg_m3": density_kg_m3, **more}
 
@@ -232,7 +257,7 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
 def plate(
     *, center_mm: Sequence[float], conductivity_S_m: float, size_mm: Sequence[float] | None = None, **more: Any
 ) -> Table:
-    """The table `[plate]` of a scene file: a conducting plate.
+    """A conducting plate.
 
     Parameters
     ----------
@@ -246,6 +271,11 @@ def plate(
         Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}; in place of
         size_mm shape "disc" with diameter_mm and height_mm, "ring" with inner_diameter_mm beside, "sphere" with
         diameter_mm, or "file" with the name of a STEP file as file.
+
+    Returns
+    -------
+    dict
+        The table `[plate]` of a scene file.
     """
     size = {} if size_mm is None else {"size_mm": size_mm}
     return {**size, "center_mm": center_mm, "conductivity_S_m": conductivity_S_m, **more}
