@@ -119,18 +119,14 @@ class Cells:
 def cells_of(body: Solid, nearest: float) -> Cells:
     """Cells for expansions `nearest` (m) from the surface; a cuboid stays whole. Raises InputError: too many."""
     counts = np.ones(3, dtype=int)
-    while True:
-        cells = _cells(body, (int(counts[0]), int(counts[1]), int(counts[2])))
-        depth = -body.distance(cells.centers)
-        if isinstance(body, Box) or np.all(nearest + depth >= CONVERGENCE * cells.radii):
-            return cells
+    cells = Cells(body, (1, 1, 1), body.center[None], np.array([body.circumradius]), np.zeros((1, 1, 1), dtype=int))
+    while not isinstance(body, Box) and np.any(nearest - body.distance(cells.centers) < CONVERGENCE * cells.radii):
         _cut_further(counts, body.half_edges / counts, body, nearest)
+        cells = _cells(body, (int(counts[0]), int(counts[1]), int(counts[2])))
+    return cells
 
 
 def _cells(body: Solid, counts: tuple[int, int, int]) -> Cells:
-    if counts == (1, 1, 1):
-        radius = np.array([body.circumradius])
-        return Cells(body, counts, body.center[None], radius, np.zeros(counts, dtype=int))
     lines = [np.linspace(-h, h, n * SAMPLES + 1) for h, n in zip(body.half_edges, counts, strict=True)]
     size = 2 * body.half_edges / counts
     step = float(np.linalg.norm(size)) / SAMPLES

@@ -94,7 +94,6 @@ def _opened(path: str | Path) -> BinaryIO | str:
 
 
 def _fault(path: str | Path, error: OSError | ValueError) -> str:
-    """Why there is no such file, as the end of a sentence."""
     name, number = _named(path), getattr(error, "errno", None)
     if number in (errno.ENOENT, errno.ENOTDIR):
         return f"{name} is a link to a file that is not there" if os.path.islink(path) else f"there is no {name}"
@@ -106,7 +105,6 @@ def _fault(path: str | Path, error: OSError | ValueError) -> str:
 
 
 def _named(path: str | Path) -> str:
-    """The file's name on one line of a message: the end of a long one."""
     text = printable(str(path)).replace("\n", "\\n")
     return text if len(text) <= LONGEST else f"…{text[-LONGEST:]}"
 
@@ -217,7 +215,6 @@ def _prefix(path: Path) -> str:
 
 
 def _tidy(path: Path) -> None:
-    """Remove temporary files of processes that are no more."""
     prefix = _prefix(path)
     for left in path.parent.glob(f".*{path.suffix}"):
         owner = left.name.removeprefix(prefix).partition("-")[0] if left.name.startswith(prefix) else ""

@@ -106,10 +106,9 @@ def apart(first: Solid, second: Solid) -> bool:
 
 def body_overlap(first: Solid, second: Solid) -> float:
     """Penetration depth of two bodies, m, negative if apart; exact as `separation`, and of a sphere and any body."""
-    if isinstance(second, Sphere):
-        return sphere_overlap(second.center, second.radius, first)
-    if isinstance(first, Sphere):
-        return sphere_overlap(first.center, first.radius, second)
+    for ball, body in ((second, first), (first, second)):
+        if isinstance(ball, Sphere):
+            return sphere_overlap(ball.center, ball.radius, body)
     return -separation(first, second)[0]
 
 
@@ -151,7 +150,6 @@ def deepest_overlap_in_a_turn(rotating: Solid, fixed: Solid) -> float:
 
 
 def shifted_magnet(magnet: Magnet, shift: Array) -> Magnet:
-    """The magnet moved by (3,) m."""
     return replace(magnet, body=moved(magnet.body, magnet.body.center + shift)) if shift.any() else magnet
 
 

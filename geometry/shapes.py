@@ -20,7 +20,7 @@ def rotation_matrix(degrees_xyz: ArrayLike) -> Array:
     Entries within round-off of 0 or ±1 are just that: rotors of one kind are alike in which entries are plain.
     """
     angles = np.radians(np.asarray(degrees_xyz, float))
-    (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)  # SciPy's rotations take longer to load than NumPy
+    (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
     about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
@@ -41,12 +41,10 @@ METRES = {"units": "m"}  # of a field of a dataclass
 
 
 def at_origin() -> Array:
-    """(3,) m: the centre of a body that is given no other."""
     return np.zeros(3)
 
 
 def unturned() -> Array:
-    """(3, 3): the rotation of a body whose axes are the frame's."""
     return np.eye(3)
 
 

@@ -186,7 +186,6 @@ class Compound(Body):
 
     @classmethod
     def of(cls, bodies: Sequence["Solid"]) -> "Compound":
-        """Of solids where they are."""
         first = bodies[0]
         local = (moved(body, first.to_body(body.center), first.rotation.T @ body.rotation) for body in bodies)
         return cls(tuple(local), first.center, first.rotation)
@@ -328,7 +327,6 @@ def _candidates(part: Part) -> Iterator[Solid]:
 
 
 def _directions(normals: Iterable[Array]) -> list[Array]:
-    """Unit vectors of which opposite ones are the same, each once."""
     found = list[Array]()
     for normal in normals:
         if all(np.linalg.norm(np.cross(normal, other)) > ALONG for other in found):

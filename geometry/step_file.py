@@ -189,7 +189,6 @@ def _box(solid: Any, triangles: Array, outer: Array) -> Array:
 
 
 def _sampled(solid: Any, size: float) -> Array:
-    """Points (n, 3) mm all over the surface."""
     import netgen.occ as occ
     import ngsolve as ng
     from netgen.meshing import MeshingStep

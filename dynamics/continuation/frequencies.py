@@ -304,7 +304,6 @@ def is_over(scene: Scene, point: BranchPoint) -> bool:
 
 
 def levitates(point: BranchPoint) -> bool:
-    """Whether no mode grows faster than what is tolerated."""
     return point.excess(MARGINAL) <= 0
 
 

@@ -51,7 +51,6 @@ class Grid:
         return len(self.values)
 
     def balance(self, point: Indices) -> Balance:
-        """The balance in which every point has its own problem."""
         return Balance(self.rates, self.values[point], self.spin[point])
 
     def alone(self, point: int) -> Balance:
@@ -156,12 +155,10 @@ class EquilibriumMap:
 
     @property
     def growth_per_s(self) -> Array:
-        """(k,) largest growth rate of a mode."""
         return np.asarray(self.eigenvalues.real.max(axis=1))
 
     @property
     def lasting(self) -> NDArray[np.bool_]:
-        """(k,) whether no mode grows faster than `MARGINAL`."""
         return np.asarray(self.growth_per_s <= np.maximum(MARGINAL, self.errors))
 
     @property

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 
 from ...fem.rotor.table import FieldTable
-from ...geometry.common import Array
+from ...geometry.common import Array, InputError
 from ...geometry.scene.contents import Scene
 from ..equilibria.equilibrium import FOLD, EquilibriumError
 from ..equilibria.path import Steps
@@ -69,7 +69,11 @@ class SlowTorque:
 
         Raises InputError for a floater that is no sphere.
         """
-        scene.floater.must_be("sphere", where="for its slow drift", instead="Simulate it (`simulate`).")
+        if (shape := scene.floater.shape) != "sphere":
+            raise InputError(
+                f'Input floater.shape must be "sphere" for its slow drift; instead received "{shape}". Simulate it '
+                "(`simulate`)."
+            )
         return cls(rates, parameters(scene, Scales.of(scene)), scene.floater.radius, not (stokes or scene.drag.air))
 
     def __call__(self, state: Array) -> float:

@@ -42,7 +42,6 @@ class Balance:
     still: bool = False  # whether the body stands still in the rotor's frame: then s is `spin` times cos θ
 
     def at(self, rows: NDArray[Any]) -> Self:
-        """The balance of some of the points only."""
         if self.values.ndim == 1:
             return self
         spin = self.spin if np.ndim(self.spin) == 0 else np.asarray(self.spin)[rows]

@@ -86,7 +86,6 @@ class SearchRange:
 
 
 def _rings(heights: Array, radii: Array, number: int) -> Array:
-    """Points (n, 3) on rings about the axis, `number` on each."""
     angles = np.arange(number) * (2 * np.pi / number)
     z, r, a = (part.ravel() for part in np.meshgrid(heights, radii, angles, indexing="ij"))
     points = np.column_stack([r * np.cos(a), r * np.sin(a), z])

@@ -83,8 +83,6 @@ class Nearby:
 
 @dataclass(frozen=True, eq=False)
 class _ModeAt:
-    """An eigenvalue of the pencil with its vectors."""
-
     name: str
     value: complex  # λ per unit of scaled time
     left: NDArray[Any]
@@ -171,7 +169,6 @@ class Implicit:
         return _ModeAt(name, value, left, right, speed)
 
     def _linear(self, setting: Setting, turn: State) -> tuple[Array, Pencil, Array, Array]:
-        """Of equations here or nearby, with this body spin and on this side."""
         return setting.linear(turn, self.known.spin, self.start[0])
 
     def missed(self, nearby: Sequence[Nearby]) -> Array:
@@ -281,7 +278,6 @@ class Implicit:
         return None
 
     def _equilibrium(self, states: Array) -> Equilibrium:
-        """The equilibrium of other states (n, m), of which the motion alone is right."""
         mean = states.mean(axis=0)
         mean[6:-3] /= np.linalg.norm(mean[6:-3])
         scales = self.setting.scales

@@ -50,7 +50,6 @@ class Modes:
 
     @property
     def stable(self) -> bool:
-        """Whether no mode grows faster than its round-off error."""
         return bool(is_stable(self.eigenvalues, self.errors))
 
     @property
@@ -203,7 +202,6 @@ class Equilibrium:
 
     @property
     def stability(self) -> str:
-        """Stable, or unstable and marginal up to the growth rate `MARGINAL`."""
         return "stable" if self.stable else "marginal" if self.growth_per_s <= MARGINAL else "unstable"
 
     @property
@@ -260,17 +258,14 @@ class Equilibrium:
 
     @property
     def distance_swing(self) -> Array:
-        """(2,) smallest and largest distance in a turn, m."""
         return _extremes(self._course[0])
 
     @property
     def lateral_offset_swing(self) -> Array:
-        """(2,) smallest and largest offset in a turn, m."""
         return _extremes(self._course[1])
 
     @property
     def polar_angle_swing_deg(self) -> Array:
-        """(2,) smallest and largest angle in a turn."""
         return _extremes(self._course[2])
 
     @property
@@ -284,7 +279,6 @@ class Equilibrium:
 
     @property
     def spin_rate(self) -> float:
-        """Angular velocity about the moment, rad/s."""
         return float(self.start.spin @ self.start.moment)
 
     def __repr__(self) -> str:

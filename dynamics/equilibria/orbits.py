@@ -87,7 +87,6 @@ def periodic_orbit(rates: Rates, values: Array, spin: float, plate: PlateForce |
 
 
 def _orbit_near(rates: Rates, values: Array, spin: float, plate: PlateForce | None, states: Array) -> Orbit | None:
-    """The orbit near a turn (n, m) of states, at as many instants; see `periodic_orbit`."""
     problem = OrbitProblem(rates, values, plate, len(states))
     states, size = states.copy(), np.inf
     for _ in range(25):

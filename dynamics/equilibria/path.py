@@ -44,7 +44,6 @@ class AtRest:
     """Unknowns of a floater at rest: position (3), unit vector of the moment (3), and any further numbers."""
 
     def onto(self, points: Array) -> Array:
-        """The points (n, 6 + e), their moments of unit length."""
         points = points.copy()
         points[:, 3:6] /= np.linalg.norm(points[:, 3:6], axis=1, keepdims=True)
         return points
@@ -103,7 +102,6 @@ class Steps:
     far: float = np.inf
 
     def limits(self, points: Array) -> Array:
-        """The longest steps (n,) at points (n, k + 1)."""
         return np.asarray(self.longest * np.maximum(1.0, np.linalg.norm(points[:, :3], axis=1) / self.far))
 
 

@@ -103,7 +103,6 @@ class Balls:
         return tuple(kind for kind in self.kinds if kind.degree > abs(number) > 0) or self.kinds[-1:]
 
     def allowed(self, formula: BallField) -> float:
-        """The error of a ball's field."""
         return ERROR_OF_BODIES[formula.degree] if self.whole.turning else ERROR
 
     @cached_property
@@ -161,7 +160,6 @@ class Balls:
         return found[1]
 
     def _spacing(self, formula: BallField) -> float:
-        """Of the lattice of a small ball, m."""
         fine = self.whole.turning and formula.degree == SMALLEST
         return (FINE if fine else SPACING) * self.scene.floater.radius
 
@@ -212,7 +210,6 @@ class Balls:
         return self._known[key]
 
     def _distance(self, place: Array) -> float:
-        """Of a place (3,) m from the nearest body that turns with the rotor, m."""
         return rotor_gap(self.scene, place) + self.scene.floater.radius
 
     def _largest(self, formula: BallField, lost: float, center: Array) -> tuple[Array, float] | None:
@@ -237,7 +234,6 @@ class Balls:
         return (values, error) if error <= allowed else None
 
     def _fit(self, formula: BallField, ball: Ball) -> tuple[Array, float]:
-        """Parameters of a ball, and the largest error, those of effects by what they may have."""
         values, error = formula.fit(self.whole.evaluate, ball)
         effects = _fitted(self.whole, formula)
         if not effects:
@@ -253,7 +249,6 @@ class Balls:
 
 
 def _fitted(whole: Interaction, formula: BallField) -> list[Fittable]:
-    """Those of the effects in a ball that have numbers of their own."""
     return [effect for effect in in_ball(whole, formula).effects if isinstance(effect, Fittable)]
 
 

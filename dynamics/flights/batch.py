@@ -175,7 +175,6 @@ class SimdBatch:
                     del active[slot]
 
     def _next(self, slot: int, waiting: Iterator[_Passenger], ends: Array) -> _Passenger | None:
-        """Put the next one on a slot; an empty slot stays where it is."""
         following = next(waiting, None)
         ends[slot] = following.end if following else self._integrator.time[slot]
         if following is None:
@@ -293,7 +292,6 @@ def _check(scene: Scene, starts: State, duration: float) -> None:
 
 
 def _whole(scene: Scene, starts: State) -> State:
-    """Starts (n, 3) with unit moments and, of a body that is not round, with axes."""
     unit = starts.moment / np.linalg.norm(starts.moment, axis=1)[:, None]
     starts = replace(starts, moment=unit)
     if scene.floater.round or starts.axes is not None:

@@ -105,7 +105,6 @@ class ConductorMotion:
 
     @property
     def height(self) -> Array:
-        """(n,) m, of the centre."""
         return self.position[:, 2]
 
 

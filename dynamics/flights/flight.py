@@ -310,7 +310,6 @@ class Course:
         self.recorder = Recorder(self.flight.balanced(self.values, now, row)[0], interval, MOST_SAMPLES)
 
     def _gained(self, before: Array) -> float:
-        """Change of J by other runtime parameters than those before."""
         flight, now, row = self.flight, np.array([self.time[0]]), self.state[None]
         return float(flight.jacobi(self.values, now, row).sum() - flight.jacobi(before, now, row).sum())
 
@@ -351,7 +350,6 @@ class Course:
         return done / (perf_counter() - flight.compile_seconds - began)
 
     def fly(self, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None) -> None:
-        """Propagate in pieces until something ends the trajectory."""
         flight, unit, kept = self.flight, self.flight.scales.time, perf_counter()
         assert self.recorder is not None
         for leg in events.motion_legs(flight.scene, self.duration):

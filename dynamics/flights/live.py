@@ -101,7 +101,6 @@ class LiveFlight:
         self._become(replace(self.now, position=place, velocity=turning))
 
     def _check_range(self, place: Array) -> None:
-        """Raises StartError where the plate's table does not know the field at a place (3,) m in the laboratory."""
         memory = self._course.flight.memory
         if memory and not memory.in_range(place[None], self.time)[0]:
             where = ", ".join(f"{1e3 * c:.4g}" for c in place)

@@ -110,7 +110,6 @@ def first_contact(scene: Scene, time: Array, position: Array, orientation: Array
 
 
 def _pairs(scene: Scene, time: float, position: Array, orientation: Array) -> list[tuple[Solid, Solid]]:
-    """Each body of a scene with each part of its floater in one place, always in one order."""
     parts = scene.floater.placed(position, orientation)
     found = [(body, part) for body in scene.turning_bodies for part in parts]
     if scene.standing_bodies:

@@ -77,7 +77,6 @@ class Rates:
         _ = self._code(_with_jacobian), self._code(locked_balances if self.turning else balances)
 
     def _code(self, write: Callable[[Equations], tuple[list[hy.expression], list[hy.expression]]]) -> Any:
-        """Outputs and variables that are written from the equations, compiled when they are first asked for."""
         if write.__name__ not in self._known:
             source = write.__name__, self._equations.variables, self._equations.rates
             options = {"compact_mode": True, "opt_level": self._level}
@@ -174,7 +173,6 @@ class Rates:
         return np.ascontiguousarray(np.concatenate([part.T for part in parts]))
 
     def _mixed(self, position: Array, turn: Array, rows: Array) -> Array:
-        """`_about` with the tables that the `rows` (n, p) name."""
         first, following, part = rows[:, [Parameter.TABLE, Parameter.NEXT, Parameter.BETWEEN]].T
         part = np.where(first == following, 0.0, part)
         size = len(Parameter) + self._local.count + sum(effect.count for effect in self._placed)

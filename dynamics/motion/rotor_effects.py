@@ -117,7 +117,6 @@ class Mutual(_Near):
 
     @property
     def _degrees(self) -> tuple[int, ...]:
-        """Of u, V and H in a ball."""
         return IN_SMALLEST if self.ball is not None and self.ball.degree == SMALLEST else IN_BALL
 
     def added(self, motion: Motion) -> Added:
@@ -290,7 +289,6 @@ class RotorCurrents(_Near):
         return dissipative(force, torque, motion)
 
     def _response(self, motion: Motion, rates: Vector) -> Vector:
-        """S · rates."""
         metres = [hy.par[Parameter.LENGTH] * x for x in motion.position]
         if self.first is None:
             parts = self.table.multipoles.expressions(metres)

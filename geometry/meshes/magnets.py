@@ -134,12 +134,10 @@ def _meshed_apart(*given: Any) -> Any:
 
 
 def _layered(edges_of: Sequence[Solid], settings: MeshSettings) -> bool:
-    """Whether there are layers of elements, at the edges of all bodies that are no parts from files."""
     return bool(settings.hp_layers) and not all(isinstance(body, Part) for body in edges_of)
 
 
 def _finished(mesh: Any, edges_of: Sequence[Solid], settings: MeshSettings) -> Any:
-    """A mesh of `_meshed` with its layers, and curved."""
     if _layered(edges_of, settings):
         mesh.RefineHP(settings.hp_layers, settings.hp_factor)
     mesh.Curve(settings.curve_order)
@@ -196,7 +194,6 @@ def _meshed(
 
 
 def _size(body: Solid, settings: MeshSettings) -> float:
-    """Largest element in a magnet, m."""
     thinnest, cube = float(body.size.min()), body.volume ** (1 / 3)
     return float(settings.magnet_size * (min(thinnest, cube) * cube) ** 0.5)
 
@@ -214,7 +211,6 @@ def _mark_singular(shape: Any, bodies: Sequence[Solid], unit: float) -> None:
 
 
 def _middle(edge: Any) -> Array:
-    """The point (3,) in the middle of an edge, in the mesh's coordinates."""
     start, end = edge.parameter_interval
     return np.array(list(edge.Value((start + end) / 2)))
 

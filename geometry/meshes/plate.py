@@ -43,12 +43,10 @@ class ConductorMesh:
 
     @property
     def images(self) -> int:
-        """Number of mirror images that make up the whole."""
         return 1 << len(self.mirrors)
 
     @property
     def pattern(self) -> str:
-        """Regular expression of the conducting materials."""
         return "|".join(self.conductivity)
 
 
@@ -179,7 +177,6 @@ def plate_mesh(
 
 
 def _cell_size(coordinate: Array, axis: int, half: Array, places: Array, depth: float, rule: MeshRule) -> Array:
-    """Cell size wanted at coordinates of one axis, m."""
     edge = half[axis]
     clamped = np.minimum(coordinate, edge)[:, None]
     beside = np.maximum(np.delete(places - half, axis, axis=1), 0.0)

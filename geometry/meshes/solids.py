@@ -71,7 +71,6 @@ class SolidMesh:
     unit: float  # length of one unit of the mesh, m
 
     def to_meter(self, points: Array) -> Array:
-        """Positions (n, 3) in m of `points` (n, 3) in the mesh's coordinates."""
         return np.asarray(points * self.unit + self.center)
 
 
@@ -114,7 +113,6 @@ def read_brep(brep: str) -> Any:
 
 
 def _turned(shape: Any, rotation: Array) -> Any:
-    """A shape turned about the origin by a matrix (3, 3)."""
     turn = Rotation.from_matrix(rotation).as_rotvec(degrees=True)
     angle = float(np.linalg.norm(turn))
     return shape.Rotate(occ.Axis(occ.Pnt(0, 0, 0), occ.gp_Dir(*map(float, turn / angle))), angle) if angle else shape

@@ -28,7 +28,6 @@ class Lowering:
     distance: float
 
     def depth(self, time: ArrayLike) -> Array:
-        """Distance (m) by which the plate is lowered at each `time`, s."""
         return np.clip((np.asarray(time) - self.start) * self.speed, 0.0, self.distance)
 
 
@@ -105,7 +104,6 @@ class Coil:
 
     @property
     def steady(self) -> bool:
-        """Whether its current never changes."""
         return not isinstance(self.current, np.ndarray) and not self.frequency
 
     @property
@@ -310,7 +308,6 @@ class Scene:
 
     @property
     def moving(self) -> bool:
-        """Whether a step of the drive moves the rotor or turns its axis."""
         return any(step.center or step.axis for step in self.drive)
 
     @cached_property
@@ -360,7 +357,6 @@ class Scene:
 
     @property
     def turning_bodies(self) -> tuple[Solid, ...]:
-        """The rotor's magnets and conductors."""
         return (*(magnet.body for magnet in self.rotor), *(conductor.body for conductor in self.conductors))
 
     def __repr__(self) -> str:

@@ -456,7 +456,6 @@ def _start(scene: Scene) -> dict[str, Any] | None:
 
 
 def shape_keys(body: Solid) -> dict[str, Any]:
-    """The keys of a body's shape, without round-off."""
     return {
         key: _all_rounded(value) if isinstance(value, np.ndarray) else _rounded(value) if key.endswith("mm") else value
         for key, value in body.keys.items()
@@ -471,7 +470,6 @@ def body_keys(body: Solid) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float:
-    """A number without the round-off of its way through SI units."""
     return float(f"{float(value):.14g}") + 0.0
 
 
@@ -498,7 +496,6 @@ FIELDS: dict[str, tuple[tuple[str, ...], Callable[[Scene], Any]]] = {
 
 
 def _toml(keys: Mapping[str, Any], table: str = "") -> str:
-    """Keys as TOML: numbers and texts first, then tables, then lists of tables."""
     plain, tables = "", ""
     for key, value in keys.items():
         name = f"{table}.{key}".lstrip(".")

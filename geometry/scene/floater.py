@@ -61,39 +61,31 @@ class Floater:
 
     @classmethod
     def composed(
-        cls,
-        pieces: Sequence[FloaterPart],
-        moments_of_inertia: tuple[float, float, float] | None = None,
+        cls, pieces: Sequence[FloaterPart], moments_of_inertia: tuple[float, float, float] | None = None
     ) -> Self:
         """A floater of pieces whose centre of mass may be anywhere.
 
         `pieces`: in the scene file's frame; `moments_of_inertia`: kg m² about the file's axes through the centre of
         mass, in place of those of the pieces.
         """
-        masses = np.array([piece.mass for piece in pieces])
-        center = masses @ [centroid(piece.magnet.body) for piece in pieces] / masses.sum()
-        moment = np.sum([piece.magnet.moment for piece in pieces], axis=0)
-        axis = moment / np.linalg.norm(moment) if moment.any() else np.array([0.0, 0.0, 1.0])
-        if moments_of_inertia is not None:
-            turn = np.eye(3)
-        elif _round_about(pieces, center, axis):
-            turn = frame_about(axis)
-        else:
-            turn = _principal_axes(_inertia(pieces, center))
-        bodies = [piece.magnet.body for piece in pieces]
-        metals = [piece.magnet.conductivity for piece in pieces if piece.magnet.conductivity is not None]
+        masses, magnets = np.array([piece.mass for piece in pieces]), [piece.magnet for piece in pieces]
+        center = masses @ [centroid(magnet.body) for magnet in magnets] / masses.sum()
+        moment = np.sum([magnet.moment for magnet in magnets], axis=0)
+        axis, turn = moment / np.linalg.norm(moment) if moment.any() else np.array([0.0, 0.0, 1.0]), np.eye(3)
+        if moments_of_inertia is None:
+            is_round = _round_about(pieces, center, axis)
+            turn = frame_about(axis) if is_round else _principal_axes(_inertia(pieces, center))
         if center.any() or not np.array_equal(turn, np.eye(3)):
-            bodies = [with_frame(moved(body, body.center - center), turn.T) for body in bodies]
+            shifted = (moved(magnet.body, magnet.body.center - center) for magnet in magnets)
+            magnets = [replace(m, body=with_frame(body, turn.T)) for m, body in zip(magnets, shifted, strict=True)]
+        metals = [magnet.conductivity for magnet in magnets if magnet.conductivity is not None]
         return cls(
-            radius=max(body.farthest(np.zeros(3)) for body in bodies),
-            remanence=max(float(np.linalg.norm(piece.magnet.polarization)) for piece in pieces),
-            recoil_permeability=max(piece.magnet.recoil_permeability for piece in pieces),
-            density=float(masses.sum() / sum(body.volume for body in bodies)),
+            radius=max(magnet.body.farthest(np.zeros(3)) for magnet in magnets),
+            remanence=max(float(np.linalg.norm(magnet.polarization)) for magnet in magnets),
+            recoil_permeability=max(magnet.recoil_permeability for magnet in magnets),
+            density=float(masses.sum() / sum(magnet.body.volume for magnet in magnets)),
             conductivity=max(metals, default=None),
-            pieces=tuple(
-                FloaterPart(replace(piece.magnet, body=body), piece.density)
-                for piece, body in zip(pieces, bodies, strict=True)
-            ),
+            pieces=tuple(FloaterPart(one, piece.density) for one, piece in zip(magnets, pieces, strict=True)),
             moments_of_inertia=moments_of_inertia,
             file_axes=turn.T,
         )
@@ -117,7 +109,6 @@ class Floater:
 
     @property
     def bodies(self) -> tuple[Solid, ...]:
-        """The solids of its parts."""
         return tuple(part.magnet.body for part in self.parts)
 
     @property
@@ -263,24 +254,15 @@ class Floater:
         return tuple(with_frame(body, axes, position) for body in self.bodies)
 
     def magnets_at(self, position: Array, orientation: Array) -> tuple[Magnet, ...]:
-        """Its magnets in their places, see `placed`."""
         axes = self.axes(orientation)
         return tuple(replace(magnet, body=with_frame(magnet.body, axes, position)) for magnet in self.magnets)
 
-    def must_be(self, *shapes: str, where: str, instead: str) -> None:
-        """Raises InputError for a floater of another shape than `where` needs; `instead` is a way out."""
-        if self.shape not in shapes:
-            rule = " or ".join(f'"{shape}"' for shape in shapes)
-            raise InputError(f'Input floater.shape must be {rule} {where}; instead received "{self.shape}". {instead}')
-
     def __repr__(self) -> str:
-        if self.is_sphere:
-            size = f"Ø {self.radius * 2e3:.4g} mm"
-        else:
-            sizes = [b.described_size if b.kind in b.described_size else f"{b.kind} {b.described_size}"
-                     for b in self.bodies]  # fmt: skip
-            size = " and ".join(sizes)
-        text = f"Floater {size}, {self.mass * 1e3:.4g} g, {self.moment:.4g} A m², μr {self.recoil_permeability:g}"
+        sizes = [f"Ø {self.radius * 2e3:.4g} mm"] if self.is_sphere else [
+            b.described_size if b.kind in b.described_size else f"{b.kind} {b.described_size}" for b in self.bodies
+        ]  # fmt: skip
+        size = f"{' and '.join(sizes)}, {self.mass * 1e3:.4g} g"
+        text = f"Floater {size}, {self.moment:.4g} A m², μr {self.recoil_permeability:g}"
         return text if self.conductivity is None else f"{text}, {self.conductivity:.3g} S/m"
 
 

@@ -137,9 +137,9 @@ def _described(detail: ErrorDetails) -> str:
 
 def _named(key: str) -> str:
     """A key as it stands in the file: in quotes where TOML wants them, and letters that look like others escaped."""
-    plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum() and len(key) <= LONGEST
-    escaped = key[:LONGEST].encode("unicode_escape").decode() + ("..." if len(key) > LONGEST else "")
-    return key if plain else repr(key) if key.isascii() and len(key) <= LONGEST else f'"{escaped}"'
+    if key.isascii() and len(key) <= LONGEST:
+        return key if key.replace("_", "").replace("-", "").isalnum() else repr(key)
+    return f'"{key[:LONGEST].encode("unicode_escape").decode()}{"..." if len(key) > LONGEST else ""}"'
 
 
 def _allowed(place: Sequence[Any]) -> list[str]:

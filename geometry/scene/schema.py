@@ -100,8 +100,6 @@ class _Placed(Table):
 
 
 class _Shaped(_Placed):
-    """A body in a place that a file may hold."""
-
     shape: Literal["cuboid", "cylinder", "ring", "sphere"] = "cuboid"
     inner_diameter_mm: Length | None = None
     file: Name | None = None
@@ -410,7 +408,6 @@ class SceneTable(Table):
         return self.named("start") or {"start": StartTable()}
 
     def scene(self, parts: Parts) -> Scene:
-        """The scene in SI units."""
         rotor, drag = self.rotor, self.drag or DragTable()
         floater, *others = (table.floater(parts) for table in self.named("floater").values())
         start, *elsewhere = (table.start() for table in self.starts.values())
