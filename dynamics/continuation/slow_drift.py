@@ -46,16 +46,12 @@ class SlowTorque:
 
         ds/dt = -(γ/I) [f s_z cos θ + h (s - s_z cos θ)] + κ B⊥² (cos θ - s) / I,   B⊥² = B² - (m̂·B)²,
 
-    with γ and κ those of `motion.equations`, which are compiled and evaluated here.  Seen from the laboratory the
-    floater spins steadily about the rotor's axis, at s_z ω = (sin²θ + s cos θ) ω, and swings across it once a turn; f
-    and h are the factors of the air for these two.  Where f = h = 1, Stokes, drag is -γ s / I.  As h > f, the
+    with γ and κ of `motion.equations` and the gradient's part of `FloaterCurrents`, compiled and evaluated here, and
+    with the air's factors f of the steady spin s_z ω = (sin²θ + s cos θ) ω and h of the swing across it.  As h > f, the
     swing, which the rotor keeps up, drives s to a small positive value instead of zero, about (h/f - 1) sin²θ.  To
-    second order in θ the swing also drives a steady flow, but none about the axis: the mean of a × (a × r) over a turn,
-    with a the turning rate of a shell of air, has no such part.
-
-    The field's gradient adds to κ as in `FloaterCurrents`, which is compiled and evaluated here: that of a
-    dipole at distance d, which turns across its way, (12/7) (R/d)² of it on a small θ, 8 % at 30 mm.  A plating of
-    copper and nickel, t thick, adds 5 σ't/(σR) to 1: a half for 5 µm of each of Ni, Cu and Ni.
+    second order in θ it also drives a steady flow, but none about the axis: the mean of a × (a × r) over a turn, with a
+    the turning rate of a shell of air, has no such part.  Of a dipole at distance d the gradient adds (12/7) (R/d)² of
+    κ; a plating of copper and nickel, t thick, adds 5 σ't/(σR) of it: a half for 5 µm of each of Ni, Cu and Ni.
     """
 
     rates: Rates  # compiled equations

@@ -20,16 +20,16 @@ Without drag and with gravity along the axis everything is autonomous, and the J
 
     J = v²/2 + i Ω²/2 - i (m T²/I) m̂·B - g·r - W·(r × v + i Ω),   i = I/(M R²)   (unit: M R²/T²)
 
-is conserved: the energy less ω times the angular momentum about the axis.  What drag and a horizontal part of gravity
-do in the rotating frame is integrated along as the last state, `work`, so that J - work never changes.
-With a drive W changes in time, and dJ/dt = -Ẇ ẑ·(r × v + iΩ); velocity and spin are those seen from the laboratory, so
-that nothing else changes.  What the rotor does to the floater, and a plate to the rotor, the motor gives: its angular
-momentum and its work, W times the torque, are integrated along as two more states.
-A rotor that is moved has an angular velocity W across its axis, too, and an origin with a velocity; positions are seen
-from there, and all of gravity is in `work`, as what moves the rotor does work that the motor does not.
+is conserved.  What drag and a horizontal part of gravity do in the rotating frame is integrated along as the last
+state, `work`, so that J - work never changes.  With a drive W changes in time, and dJ/dt = -Ẇ ẑ·(r × v + iΩ).  What the
+rotor does to the floater, and a plate to the rotor, the motor gives: its angular momentum and its work, W times the
+torque, are two more states.  A rotor that is moved has an angular velocity W across its axis, too, and an origin with a
+velocity; positions are seen from there, and all of gravity is in `work`, as what moves the rotor does work that the
+motor does not.
+
 Effects (`effect`) add what else acts on the floater: accelerations of position and spin, their energy to J, their
-power to `work`.  A plate adds its currents as further states (`memory_terms`) and their energy to J.  Every number that
-a sweep may change is a runtime parameter; only the tables' own geometry is compiled in.
+power to `work`; so does a plate, whose currents are further states (`memory_terms`).  Every number that a sweep may
+change is a runtime parameter; only the tables' own geometry is compiled in.
 """
 
 from collections.abc import Callable

@@ -28,24 +28,20 @@ theirs; of cubes and octahedra it is within 5 % of the laws of E. S. Pettyjohn a
 44 (1948) 157).  There is no such law of torques: theirs are those of the sphere of their volume, and what spheres in
 them and about them would meet is the range that results state.
 
-Eddy currents follow the rotor's field as the turning and moving floater sees it change.  In a field that turns against
-the ball with angular velocity -w, each of its modes follows the field with a delay τ = μ0σR²/z², z a zero of the
-spherical Bessel function j_{l-1} for a field of potential degree l (W. R. Smythe, Static and Dynamic Electricity, 3rd
-ed., section 10.06).  With X = w× of the field B of degree 1, and the commutator with w× of its gradient G of degree 2,
-the ball takes the dipole and quadrupole moments -κ Ḃ and -(2/21) R² κ Ġ, κ = (2π/15) σ R⁵,
+Eddy currents follow the rotor's field as the turning and moving floater sees it change (docs/mathematics-currents.md).
+In a field that turns against the ball with angular velocity -w, a mode follows with a delay τ = μ0σR²/z², z a zero of
+the spherical Bessel function j_{l-1} for a field of potential degree l (W. R. Smythe, Static and Dynamic Electricity,
+3rd ed., section 10.06).  With X = w× of the field B of degree 1, and the commutator with w× of its gradient G of degree
+2, the ball takes the dipole and quadrupole moments -κ Ḃ and -(2/21) R² κ Ġ, κ = (2π/15) σ R⁵,
 
     Ḃ = Σ c [(1 - τX)⁻² G v - X (1 - τX)⁻¹ B],        Ġ = Σ c [(v·∇) G - X (1 - τX)⁻¹ G],
 
-where the sums run over the modes, c ∝ 1/z⁴, Σ c = 1, and v, w are drift and lag, seen from the rotor.  Exact for a
-steady turn at every frequency: what is odd in X of X (1 - τX)⁻¹ = X + τX² … is the torque, which the skin effect
-weakens, the even part the ball's lift, its push out of the field.  What changes the turn, and the drift through G, is
-taken as slow against the delays (`slow_error`); a magnet's motions are not always (`too_slow`).  Where skin depth is
-large against R all is that of a thin field, a loss κ |Ḃ|² + (2/21) R² κ |Ġ|² whose derivatives by v and w force and
-torque are.  A body of another shape has tensors of field and gradient in place of κ and (2/21) R² κ, and where it has
-no centre of symmetry one between the two (`fem.floater_metal`).  Each part of a uniform field's has the shares c of a
-ball and delays τ that are longer or shorter by one ratio, such that B̈ has the right factor; so it is exact for a
-slow turn up to the second order; delays of the gradient, and of what joins it to the field, are right in the mean.
-Degree 3 is left out; it changes the growth rates of modes by 1 to 2 % of this effect's at 14 to 22 mm, more nearer by.
+with sums over the modes, c ∝ 1/z⁴, Σ c = 1, and drift v and lag w as seen from the rotor.  Exact for a steady turn at
+every frequency; what changes the turn, and the drift through G, is taken as slow against the delays (`slow_error`).
+A body of another shape has tensors of field and gradient in place of κ and (2/21) R² κ, and one between the two where
+it has no centre of symmetry (`fem.floater_metal`).  Each part of a uniform field's has the shares c of a ball and
+delays that are longer or shorter by one ratio, such that B̈ has the right factor; delays of the others are right in
+the mean.  Degree 3 is left out: 1 to 2 % of this effect's growth rates at 14 to 22 mm, more nearer by.
 """
 
 from collections.abc import Sequence

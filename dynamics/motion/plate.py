@@ -1,4 +1,4 @@
-"""The currents that the turning rotor alone drives in a plate, known beforehand.
+"""A plate in the motion, the currents that the turning rotor alone drives in it known beforehand.
 
 While the plate stands at depth d the rotor's share r_i = Re Σ_h r_ih e^{ihφ} of its signals leaves the states
 
@@ -8,23 +8,17 @@ What is integrated is p_i - q_i.  The floater drives it, and the rotor only as t
 
     d(p_i - q_i)/dt = -λ_i (p_i - q_i - m·b_i) - u ∂q_i/∂d,    y_i = (p_i - q_i - m·b_i) + (q_i - r_i),
 
-exact for every motion.  The rotor's harmonics would be the fastest motion among all states and decide how long a step
-of Taylor's method may be; so they act on the floater alone, by the weak field of the currents q - r.
+exact for every motion: the rotor's harmonics, the fastest motion of all, act on the floater alone, by the weak field of
+the currents q - r.  To the floater these are a field given in time.  So -m·Σ (q_i - r_i) b_i is counted as its energy
+in a field from outside, and ½ Σ y_f², y_f = y - q + r, as what it has stored; together they lose, beside their work,
 
-Energy.  To the floater the currents y_r = q - r are a field that is given as a function of time: they are what the
-motor makes them to be, whatever the floater does.  So -m·Σ y_ri b_i is counted as the energy of a dipole in a field
-from outside, and ½ Σ y_f², y_f = y - y_r, as what the floater has stored; together they lose, beside their work on it,
+    Σ [λ y_f² + u y_f ∂q/∂d] + m·Σ b_i d(q_i - r_i)/dt.
 
-    Σ [λ y_f² + u y_f ∂q/∂d] + m·Σ b_i dy_ri/dt.
+With a drive the rate W changes, and q would follow with a delay.  There q is the share's mean r_0 over a turn alone,
 
-Whatever depends on the rotor's rate is a runtime parameter.
+    d(p_i - q_i)/dt = -λ_i (p_i - q_i - m·b_i) + λ_i (r_i - r_i0) - u ∂r_i0/∂d,
 
-With a drive the rate W changes, and q would follow with a delay.  There q is the share's mean r_0 over a turn alone, so
-that all the rest is integrated, exact for every W(t) and in shorter steps:
-
-    d(p_i - q_i)/dt = -λ_i (p_i - q_i - m·b_i) + λ_i (r_i - r_i0) - u ∂r_i0/∂d.
-
-The plate's torque on the rotor is Σ y_i ∂r_i/∂φ.
+exact for every W(t), in shorter steps.  The plate's torque on the rotor is Σ y_i ∂r_i/∂φ.
 """
 
 from dataclasses import dataclass, replace

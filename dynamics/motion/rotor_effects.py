@@ -2,19 +2,16 @@
 
 Both are known as tables, whose expressions are long.  About a pose and in a ball they are polynomials about a place,
 whose numbers are runtime parameters.  What bodies do to each other falls steeply with their distance, but much the same
-in all its parts: in a ball they are q⁻³ times polynomials with one q of degree 2.  With degree 2 they err by a tenth of
+in all its parts: in a ball they are q⁻³ times polynomials with one q of degree 2, which with degree 2 err by a tenth of
 what polynomials of degree 3 alone do.
 
-Mutual magnetisation has one energy.  With M = m + α B0 the floater's whole moment, the magnetisation that it induces in
-the rotor and what the floater's own currents of magnetisation do have the energy u(x) + V(x)·M + ½ M·H(x)·M.  About one
-pose (searches, modes) the table's values and first and second derivatives are all that counts: u, V and H are
-polynomials of degree 2, 1 and 0, and M is counted from the pose's.  In balls they are q⁻³ times polynomials.
+With M = m + α B0 the floater's whole moment, mutual magnetisation has the energy u(x) + V(x)·M + ½ M·H(x)·M.  About one
+pose (searches, modes) u, V and H are polynomials of degree 2, 1 and 0, and M is counted from the pose's.
 
 The currents are in metal that turns with the rotor.  A rate u_k = d/dt m·c_k is linear in eight numbers, the five of
 the traceless symmetric part of m ⊗ (drift) and the three of the rate of m, by the five of ∇c_k and the three of c_k. So
-the power is quadratic in them, with a matrix S of place alone, S_ab = Σ_k w_ka w_kb, whatever the moment is.  About one
-pose S is a constant: where the floater is frequency-locked the rates vanish, so that derivatives are right as well.  In
-a ball S is q⁻³ times polynomials of degree 1. The work that force and torque do is that power exactly.
+the power is quadratic in them, with a matrix S of place alone, S_ab = Σ_k w_ka w_kb.  About one pose S is a constant:
+where the floater is frequency-locked the rates vanish, so that derivatives are right as well.
 """
 
 from collections.abc import Sequence
