@@ -13,7 +13,7 @@ from ...geometry.common import Array, frozen_array
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.shapes import Box, Cylinder, Sphere
-from ...geometry.solids import Part as SolidPart, Solid
+from ...geometry.solids import Part, Solid
 from . import solid
 from .expressions import FieldExpressions, harmonic_sums, whole_gradient
 from .interior import Ball, moment
@@ -25,7 +25,7 @@ def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
 
     To round-off, but for a part: as well as curved elements fill it, 1e-8.
     """
-    if isinstance(body, SolidPart):
+    if isinstance(body, Part):
         return part_rule(body, degree)
     nodes = degree // 2 + 1
     if isinstance(body, Box):
@@ -265,7 +265,9 @@ def merged(parts: Iterable[tuple[MultipoleExpansion, float]]) -> tuple[Multipole
     return tuple(found.values())
 
 
-Part = tuple[int, int, int, complex]  # number of the expansion, l, m, and the real or imaginary part of the coefficient
+# One of many expansions by its number, l, m, and the real or imaginary part of the coefficient
+PART = np.dtype([("owner", int), ("l", int), ("m", int), ("value", complex)])
+Parts = NDArray[np.void]
 MOST = 300  # coefficients up to which a fit is worth its time
 ROUNDS = 6  # of reweighting in a fit
 MANY_PARTS = 2000  # of which each is looked at wherever the field is
@@ -283,19 +285,21 @@ def trimmed_expansions(
     stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.
     Coefficients are those along each expansion's own axes, where its expressions are written.
     """
-    parts = [
-        (k, int(l), int(m), part)
-        for k, expansion in enumerate(expansions)
-        for own in (expansion.own_coefficients,)
-        for l, m in zip(*np.nonzero(own), strict=True)
-        for part in (own[l, m].real, 1j * own[l, m].imag)
-        if part
-    ]
-    if not parts:
-        return list(expansions), [_with(e, [], 0) for e in expansions]
-    degrees, owner = np.array([part[1] for part in parts]), np.array([part[0] for part in parts])
+    parts = np.array(
+        [
+            (k, l, m, part)
+            for k, expansion in enumerate(expansions)
+            for own in (expansion.own_coefficients,)
+            for l, m in zip(*np.nonzero(own), strict=True)
+            for part in (own[l, m].real, 1j * own[l, m].imag)
+            if part
+        ],
+        PART,
+    )
+    if not len(parts):
+        return list(expansions), [_with(e, parts, 0) for e in expansions]
 
-    def added(some: list[Part]) -> Array:
+    def added(some: Parts) -> Array:
         """Their field (n, 3), by what is allowed."""
         chosen = [one for k, e in enumerate(expansions) if (one := _with(e, some, k)).degree]
         return summed_derivatives(chosen, points, 1) / allowed[:, None] if chosen else np.zeros_like(points)
@@ -303,34 +307,46 @@ def trimmed_expansions(
     total, sizes = added(parts), np.empty(len(parts))
     every = slice(None, None, 1 + len(parts) // MANY_PARTS)  # of more some places tell which ones are small
     for k, expansion in enumerate(expansions):
-        fields = _fields(expansion, [part for part in parts if part[0] == k], points[every])
-        sizes[owner == k] = (np.linalg.norm(fields, axis=2) / allowed[every]).max(axis=1, initial=0.0)
-    dipoles = [part for part in parts if part[1] == 1] if _largest(total) > 1 else []
-    total -= added(dipoles)
+        mine = parts["owner"] == k
+        fields = _fields(expansion, parts[mine], points[every])
+        sizes[mine] = (np.linalg.norm(fields, axis=2) / allowed[every]).max(axis=1, initial=0.0)
+    fixed = (parts["l"] == 1) & (_largest(total) > 1)
+    total -= added(parts[fixed])
     order = np.argsort(-sizes)
-    ordered = [parts[i] for i in order if not dipoles or degrees[i] > 1]
+    ordered = parts[order[~fixed[order]]]
     # the fewest of the largest that will do: enough without a fit, and by halving with one
-    too_few, enough = -1, len(ordered)
+    too_few, enough, below = 0, len(ordered), np.zeros_like(points)
+    if _largest(total) <= 1:
+        enough = 0
     while enough - too_few > 1:
         count = (enough + too_few) // 2
-        too_few, enough = (too_few, count) if _largest(total - added(ordered[:count])) <= 1 else (count, enough)
-    factors = _fewest(expansions, ordered[:enough], points, allowed, total) if 0 < enough <= most else np.ones(enough)
-    kept = [(k, l, m, c * f) for (k, l, m, c), f in zip(ordered, factors, strict=False)] + dipoles
-    missing = [(k, l, m, -c) for k, l, m, c in kept] + parts
+        field = below + added(ordered[too_few:count])
+        if _largest(total - field) <= 1:
+            enough = count
+        else:
+            too_few, below = count, field
+    kept = ordered[:enough]
+    if 0 < enough <= most:
+        factors = _fewest(expansions, kept, points, allowed, total)
+        kept = kept[: len(factors)]
+        kept["value"] *= factors
+    kept = np.concatenate([kept, parts[fixed]])
+    parts = np.concatenate([kept, parts])
+    parts["value"][: len(kept)] *= -1
     return (
         [_with(e, kept, k) for k, e in enumerate(expansions)],
-        [_with(e, missing, k) for k, e in enumerate(expansions)],
+        [_with(e, parts, k) for k, e in enumerate(expansions)],
     )
 
 
 def _fewest(
-    expansions: Sequence[MultipoleExpansion], parts: list[Part], points: Array, allowed: Array, total: Array
+    expansions: Sequence[MultipoleExpansion], parts: Parts, points: Array, allowed: Array, total: Array
 ) -> Array:
     """Factors of the first few of the parts, with which they make the total (n, 3) to 1 at every point."""
     fields = np.empty((len(parts), len(points), 3))
     for k, expansion in enumerate(expansions):
-        here = [number for number, part in enumerate(parts) if part[0] == k]
-        fields[here] = _fields(expansion, [parts[number] for number in here], points) / allowed[:, None]
+        here = parts["owner"] == k
+        fields[here] = _fields(expansion, parts[here], points) / allowed[:, None]
     too_few, enough, factors = 0, len(parts), np.ones(len(parts))
     while enough - too_few > 1:
         count = (enough + too_few) // 2
@@ -362,26 +378,25 @@ def _largest(field: Array) -> float:
     return float(np.sqrt(np.einsum("ni,ni->n", field, field).max(initial=0.0)))
 
 
-def _fields(expansion: MultipoleExpansion, parts: list[Part], points: Array) -> Array:
+def _fields(expansion: MultipoleExpansion, parts: Parts, points: Array) -> Array:
     """B (parts, n, 3) of every single part, which is along the expansion's own axes."""
-    if not parts:
+    if not len(parts):
         return np.zeros((0, len(points), 3))
     places = (points - expansion.center) @ expansion.axes / expansion.radius
     harmonics = solid.irregular_values(expansion.degree + 1, places)
     fields = []
-    for _, l, m, value in parts:
+    for _, l, m, value in parts.tolist():
         gradient = solid.irregular_gradient(harmonics, l, m)
         fields.append([-(1 if m == 0 else 2) * np.real(value * component) for component in gradient])
     return np.moveaxis(np.array(fields), 1, 2) @ expansion.axes.T
 
 
-def _with(expansion: MultipoleExpansion, parts: list[Part], number: int) -> MultipoleExpansion:
+def _with(expansion: MultipoleExpansion, parts: Parts, number: int) -> MultipoleExpansion:
     """The expansion with only the given parts among those of its number, along its own axes; as long as they need."""
-    mine = [part for part in parts if part[0] == number]
-    degree = max((l for _, l, _, _ in mine), default=0)
+    mine = parts[parts["owner"] == number]
+    degree = int(mine["l"].max(initial=0))
     coefficients = np.zeros((degree + 1, degree + 1), complex)
-    for _, l, m, value in mine:
-        coefficients[l, m] += value
+    np.add.at(coefficients, (mine["l"], mine["m"]), mine["value"])
     return replace(expansion, coefficients=solid.rotated_harmonics(coefficients, expansion.axes))
 
 
@@ -405,7 +420,7 @@ class FittedExpansions:
         self._parts = [(i // len(parts), *parts[i % len(parts)]) for i in order.tolist()]
         self._columns = np.empty((len(order), 3 * len(points)))  # hundreds of megabytes
         for one, rows in zip(self._empty, np.argsort(order).reshape(-1, len(parts)), strict=True):
-            fields = _fields(one, [(0, *part) for part in parts], points) / allowed[:, None]
+            fields = _fields(one, np.array([(0, *part) for part in parts], PART), points) / allowed[:, None]
             self._columns[rows] = fields.reshape(len(parts), -1)
         self._size = np.sqrt(np.einsum("ij,ij->i", self._columns, self._columns))  # `norm` makes a copy
         self._columns /= self._size[:, None]
