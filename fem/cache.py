@@ -20,7 +20,7 @@ import re
 import stat
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, fields, is_dataclass
 from errno import ENOLCK, ENOSYS, EOPNOTSUPP
@@ -330,13 +330,10 @@ def make_room(folder: Path, limit: int) -> None:
     while total > limit and len(kept) > 1:
         _, size, path = kept.pop()
         with suppress(OSError, Timeout):  # of another user, or it is being read
-            lock = path.with_suffix(".lock")
-            if not lock.exists():  # of what needs none
+            lock = path.with_suffix(".lock")  # what needs none has none
+            with FileLock(lock, timeout=0) if lock.exists() else nullcontext():
                 path.unlink(missing_ok=True)
-            else:
-                with FileLock(lock, timeout=0):
-                    path.unlink(missing_ok=True)
-                    lock.unlink()
+                lock.unlink(missing_ok=True)
         total -= size
 
 

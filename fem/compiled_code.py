@@ -49,11 +49,8 @@ def compiled_later(
 ) -> Compiled:
     """What a compiler makes of arguments that take longer to write than to say what they are written from.
 
-    Parameters
-    ----------
-    compiler, options : as of `compiled`
-    write : the compiler's arguments; called only where nothing is in the cache
-    source : all that they depend on, which can be pickled; what else `write` does has the number of "code" in `FORMATS`
+    `compiler`, `options`: as of `compiled`; `write`: the compiler's arguments, called only where nothing is in the
+    cache; `source`: all that they depend on, to be pickled; what else `write` does has the number of "code" in FORMATS.
     """
     name = f"{key_of('code', _target(), _content((compiler, source, options)))}.code"
     path = cache_folder() / name  # in this process; on the disk it is in the user's folder there

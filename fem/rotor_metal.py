@@ -35,7 +35,7 @@ from ..geometry.shapes import Box, Cylinder
 from ..geometry.solids import Solid, places_off
 from .cache import TableKind
 from .elements.condensed import require_memory
-from .elements.spaces import IntegrationPoints, volume_points
+from .elements.spaces import IntegrationPoints, load_vector, volume_points
 from .harmonics.solid import factorials, norm
 from .plate.multipoles import Multipoles, fit_multipoles, real_kinds
 
@@ -74,13 +74,9 @@ class Metal:
 
     def loads(self, sources: Potentials) -> Array:
         """∫ A·∇v (k, unknowns), in units of the mesh."""
-        fields, test, found = sources(self.places), self.space.TestFunction(), []
-        for k in range(fields.shape[2]):
-            form = ng.LinearForm(self.space)
-            form += self.points.vector(fields[:, :, k]) * ng.grad(test) * self.points.measure
-            form.Assemble()
-            found.append(form.vec.FV().NumPy().copy())
-        return np.array(found)
+        slope, fields = ng.grad(self.space.TestFunction()), np.moveaxis(sources(self.places), 2, 0)
+        functions = map(self.points.function, fields)
+        return np.array([load_vector(self.space, one * slope * self.points.measure) for one in functions])
 
     def solutions(self, loads: Array) -> Array:
         """Potentials (k, unknowns) to loads (k, unknowns), of the sign of A."""
@@ -365,10 +361,7 @@ def sparse(weights: Array) -> Array:
 
 
 def places_around(bodies: Sequence[Solid], distance: float, seed: int = 0, directions: int = DIRECTIONS) -> Array:
-    """Places (n, 3) m at a `distance` (m) from the nearest face of `bodies`, along random lines.
-
-    They are so many `directions` of an octant, by `seed`, and their mirror images.
-    """
+    """Places (n, 3) m at a `distance` (m) off `bodies`, in `directions` of an octant by `seed` and their images."""
     octant = np.abs(np.random.default_rng(seed).normal(size=(directions, 3)))
     mirrored = np.concatenate([octant * signs for signs in product((1, -1), repeat=3)])
     mirrored /= np.linalg.norm(mirrored, axis=1)[:, None]

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ...geometry.common import Array, ComputationError
 from ..harmonics.solid import FOUR_PI, Coefficients, harmonic_parity, members, orthonormal, outer_coefficients
-from .spaces import surface_points
+from .spaces import load_vector, surface_points
 
 SEPARATORS = 34.0  # numbers in the factor over the square of the unknowns on a plane; 17 to 36 were measured
 PEAK = 1.2  # the largest amount while the factor is made, over what is kept
@@ -110,13 +110,8 @@ class OpenBoundary:
         harmonics = np.zeros((len(used), len(self.keys)))
         harmonics[used] = orthonormal(self.keys, surface.points[used])
         self.unknowns = np.nonzero(np.array(space.GetDofs(mesh.Boundaries("outer"))))[0]
-        columns = []
-        for values in harmonics.T:
-            form = ng.LinearForm(space)
-            form += surface.function(values) * space.TestFunction() * surface.measure
-            form.Assemble()
-            columns.append(form.vec.FV().NumPy()[self.unknowns])
-        self.projection = np.stack(columns, axis=1)
+        parts = (surface.function(values) * space.TestFunction() * surface.measure for values in harmonics.T)
+        self.projection = np.stack([load_vector(space, one)[self.unknowns] for one in parts], axis=1)
         self.degrees = np.array([l for l, _, _ in self.keys], float)
 
     def apply(self, potential: Array) -> Array:

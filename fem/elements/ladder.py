@@ -16,17 +16,7 @@ from numpy.typing import NDArray
 from ...geometry.common import Array, MeshError, Watch, unwatched
 from ...geometry.cutting import Cells, cells_of
 from ...geometry.magnets import Magnet
-from ...geometry.meshes.magnets import (
-    SAME_PLACE,
-    MagnetMesh,
-    MeshSettings,
-    Symmetry,
-    find_symmetry,
-    mesh_magnets,
-    mirror,
-    mirror_images,
-    parity_parts,
-)
+from ...geometry.meshes import magnets as meshes
 from ...geometry.meshes.solids import OTHERWISE
 from ...geometry.overlap import closing_shifts, shifted_magnet
 from ...geometry.shapes import Box
@@ -94,7 +84,7 @@ def reaction_dipoles(solution: Solution, number: int) -> tuple[Array, Array, Arr
             continue
         points, weights, values = _share(solution, k)
         for flipped in owners:
-            flips = np.prod([np.ones(3), *(mirror(plane) for plane in flipped)], axis=0)
+            flips = np.prod([np.ones(3), *(meshes.mirror(plane) for plane in flipped)], axis=0)
             signs = [sign for plane, sign in zip(mesh.planes, solution.signs, strict=True) if plane in flipped]
             parts.append((points * flips, weights, float(np.prod([1.0, *signs])) * values * flips))
     if not parts:
@@ -109,7 +99,7 @@ def _image_numbers(
     """Number of the magnet that a magnet's share becomes at every set of the planes, and the set."""
     found: list[tuple[int, tuple[int, ...]]] = [(number, ())]
     for plane in planes:
-        image = mirror_images(magnets, plane)
+        image = meshes.mirror_images(magnets, plane)
         assert image is not None
         found += [(image[k], (*flipped, plane)) for k, flipped in found]
     return found
@@ -121,8 +111,8 @@ def _images(
     """Centres and coefficients of a body and its mirror images, from the share on the positive side of the planes."""
     found = [(center, coefficients)]
     for plane, sign in zip(planes, signs, strict=True):
-        reflected = [(place * mirror(plane), sign * mirrored_harmonics(part, plane)) for place, part in found]
-        if abs(center[plane]) < SAME_PLACE:
+        reflected = [(place * meshes.mirror(plane), sign * mirrored_harmonics(part, plane)) for place, part in found]
+        if abs(center[plane]) < meshes.SAME_PLACE:
             found = [(place, part + other) for (place, part), (_, other) in zip(found, reflected, strict=True)]
         else:
             found += reflected
@@ -134,7 +124,7 @@ def _face_moments(solution: Solution, k: int, degree: int, faces: tuple[Array, A
     mesh, (points, areas, potential) = solution.system.mesh, faces
     magnet = mesh.magnets[k]
     box, susceptibility = magnet.box, magnet.permeability_in_rotor - np.eye(3)
-    mine = np.abs(box.distance(points)) < SAME_PLACE * box.circumradius
+    mine = np.abs(box.distance(points)) < meshes.SAME_PLACE * box.circumradius
     body = box.to_body(points[mine])
     axis = np.argmax(np.abs(body) / box.half_edges, axis=1)
     normals = box.rotation.T[axis] * np.sign(np.take_along_axis(body, axis[:, None], axis=1))
@@ -157,7 +147,7 @@ class Refinement:
     """Refinement of a solution: order, mesh and boundary."""
 
     order: int  # of the elements
-    mesh: MeshSettings  # the mesh's settings
+    mesh: meshes.MeshSettings  # the mesh's settings
     boundary_degree: int  # to which the outer boundary is exactly open
 
 
@@ -168,10 +158,10 @@ class RotorSolution:
     # c_lm (T), one per cell of every piece about its centre in `split`, one about the mesh's in `direct`
     coefficients: tuple[Coefficients, ...]
     spheres: tuple[tuple[Array, float], ...]  # centre (3,) m and radius m of every expansion, in the rotor's frame
-    mesh: MagnetMesh  # of the part of space that the mirror planes leave, in their frame
+    mesh: meshes.MagnetMesh  # of the part of space that the mirror planes leave, in their frame
     unknowns: int  # number of unknowns
     layers: int  # of elements at the edges; fewer than asked for where the mesher cannot match more
-    symmetry: Symmetry  # the frame of the mesh and its mirror planes
+    symmetry: meshes.Symmetry  # the frame of the mesh and its mirror planes
     parts: tuple[Solution, ...]  # the potentials of every parity
 
     def expansions(self, coefficients: Sequence[Coefficients]) -> list[MultipoleExpansion]:
@@ -209,7 +199,7 @@ def solve_rotor(
     shifts = closing_shifts(magnets)
     # only the mesh has closed gaps: expansions stay about the true places
     closed = [shifted_magnet(magnet, shift) for magnet, shift in zip(magnets, shifts, strict=True)]
-    symmetry = find_symmetry(closed)
+    symmetry = meshes.find_symmetry(closed)
     planes = symmetry.planes if use_symmetry else ()
     seen = [symmetry.to_frame(magnet) for magnet in closed]
     bodies = [piece for whole in cut for piece in whole]
@@ -219,7 +209,7 @@ def solve_rotor(
     solutions = []
     owners = [k for k, whole in enumerate(cut) for _ in whole]
     groups = [[magnet.polarization_in_rotor for magnet in group] for group in (magnets, carriers or magnets)]
-    for signs, (own, sourced) in parity_parts(seen, planes, np.array(groups) @ symmetry.axes):
+    for signs, (own, sourced) in meshes.parity_parts(seen, planes, np.array(groups) @ symmetry.axes):
         sources = [Magnet(m.body, m.body.rotation.T @ j) for m, j in zip(seen, sourced, strict=True)]
         rest = (own - sourced)[owners]
         solutions.append(solve(system, sources, formulation, refinement.boundary_degree, signs, rest))
@@ -247,7 +237,7 @@ def solve_rotor(
 
 def _meshed_system(
     bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Solid]
-) -> tuple[MagnetMesh, System, int]:
+) -> tuple[meshes.MagnetMesh, System, int]:
     """Mesh, matrix, layers at the edges: where the mesher fails or they do not match, smaller elements, else fewer.
 
     Two elements that touch edges of magnets near each other may be refined otherwise on the face between them; in
@@ -258,7 +248,7 @@ def _meshed_system(
     for layers, (size, smallest) in product(range(requested.hp_layers, -1, -1), SIZES):
         settings = replace(requested, magnet_size=size * requested.magnet_size, smallest=smallest * requested.smallest)
         try:
-            mesh = mesh_magnets(bodies, replace(settings, hp_layers=layers), planes, edges_of)
+            mesh = meshes.mesh_magnets(bodies, replace(settings, hp_layers=layers), planes, edges_of)
         except MeshError as error:
             reason = error
             continue
@@ -332,7 +322,7 @@ def strongest(magnets: Sequence[Magnet]) -> float:
     return max(magnet.contrast for magnet in magnets)
 
 
-def refinement_of(order: int, settings: MeshSettings, contrast: float = 0.0) -> Refinement:
+def refinement_of(order: int, settings: meshes.MeshSettings, contrast: float = 0.0) -> Refinement:
     """Refinement of an `order` of the elements: `settings` with layers for the `contrast`, the largest μ - 1."""
     layers = (LAYERS if contrast < STRONG else LAYERS_STRONG)[order] if settings.hp_layers else 0
     return Refinement(order, replace(settings, hp_layers=layers, curve_order=min(order + 1, 8)), 2 * order + 2)
@@ -343,7 +333,7 @@ def refined(
     points: Array,
     scale: Array,
     target: float,
-    settings: MeshSettings,
+    settings: meshes.MeshSettings,
     watch: Watch = unwatched,
 ) -> tuple[RotorSolution, int, dict[str, list[MultipoleExpansion]]]:
     """The solution at the first order whose error is below the target.

@@ -138,7 +138,7 @@ def solve(
                 points = volume_points(mesh.mesh, name, 2 * system.order + 2)
                 places = mesh.magnets[k].body.within(mesh.to_meter(points.points))
                 source = remanent_field(sources, places) @ susceptibility + own
-                load += points.vector(source) * ng.grad(test) * points.measure
+                load += points.function(source) * ng.grad(test) * points.measure
     load.Assemble()
     free = space.FreeDofs(True)
     for plane, sign in zip(mesh.planes, signs, strict=True):

@@ -72,14 +72,12 @@ class IntegrationPoints:
         return np.stack(columns, axis=1)
 
     def function(self, values: Array) -> Any:
-        """NGSolve function that takes `values` (n,) at the points; only for integrals with `measure`."""
+        """NGSolve function that takes `values` (n,), or (n, 3), at the points; only for integrals with `measure`."""
+        if values.ndim > 1:
+            return ng.CF(tuple(map(self.function, values.T)))
         result = ng.GridFunction(self.space)
         result.vec.FV().NumPy()[:] = values
         return result
-
-    def vector(self, values: Array) -> Any:
-        """As `function`, of three components (n, 3)."""
-        return ng.CF(tuple(map(self.function, values.T)))
 
     def value_matrix(self, space: Any, basis: Any) -> scipy.sparse.csr_matrix:
         """(3n, unknowns) values here of a space's `basis` of three components, those of one point together."""
@@ -114,10 +112,15 @@ def surface_points(mesh: Any, boundary: str, order: int) -> IntegrationPoints:
 
 
 def _collect(space: Any, region: Any, measure: Any) -> IntegrationPoints:
+    return IntegrationPoints(space, region, measure, load_vector(space, space.TestFunction() * measure))
+
+
+def load_vector(space: Any, integral: Any) -> Array:
+    """Numbers (unknowns,) of an integral with a space's test functions."""
     form = ng.LinearForm(space)
-    form += space.TestFunction() * measure
+    form += integral
     form.Assemble()
-    return IntegrationPoints(space, region, measure, form.vec.FV().NumPy().copy())
+    return np.array(form.vec.FV().NumPy())
 
 
 IntArray = NDArray[np.int64]

@@ -30,22 +30,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ...geometry.common import MU_0, Array, even_directions
+from . import solid
 from .expressions import UPPER, FieldExpressions, regular_harmonics, whole_gradient
-from .solid import (
-    CHUNK,
-    FOUR_PI,
-    Coefficients,
-    OuterValues,
-    both_signs,
-    derivative,
-    entries,
-    entry,
-    factorials,
-    gauss_legendre,
-    members,
-    regular_values,
-    weighted_sums,
-)
+from .solid import FOUR_PI, Coefficients, factorials, members, regular_values
 
 # Nodes of the rule for balls beyond their degree. What it cannot tell apart is 1e-3 of the error: a ball's radius is a
 # seventh of the distance from the sources, so that four degrees beyond those that are left out little is left.
@@ -64,7 +51,7 @@ class Ball:
 def sphere(degree: int, more: int = 6) -> tuple[Array, Array]:
     """Points (n, 3) on the unit sphere and their areas (n,), exact for harmonics up to 2 (`degree` + `more`) - 1."""
     nodes = degree + more
-    height, weights = gauss_legendre(nodes)
+    height, weights = solid.gauss_legendre(nodes)
     angle = np.pi * np.arange(2 * nodes) / nodes
     across = np.sqrt(1 - height**2)[:, None]
     grid = np.broadcast_arrays(across * np.cos(angle), across * np.sin(angle), height[:, None])
@@ -108,11 +95,11 @@ class Surroundings:
 
     def __init__(self, points: Array, ball: Ball, degree: int) -> None:
         """Of `points` (n, 3) m outside of a `ball`, for coefficients up to a `degree` about its centre."""
-        self._radius, self._values = ball.radius, OuterValues(degree + 1, (points - ball.center) / ball.radius)
+        self._radius, self._values = ball.radius, solid.OuterValues(degree + 1, (points - ball.center) / ball.radius)
 
     def field(self, sources: Coefficients) -> Array:
         """B (..., n, 3) T at the points, of sources c_lm (T) in the ball, [..., l, m]."""
-        potentials = np.stack([-derivative(sources, axis) for axis in range(3)], axis=-3)
+        potentials = np.stack([-solid.derivative(sources, axis) for axis in range(3)], axis=-3)
         return np.moveaxis(self._values.sums(potentials), -2, -1)
 
     def of_magnetization(self, moments: Array) -> Coefficients:
@@ -141,7 +128,7 @@ class Surroundings:
 
 def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -> Coefficients:
     """`Surroundings.of_magnetization` of points of any number, (n, 3) m, and their `moments` (..., n, 3) T m³."""
-    parts = [slice(start, start + CHUNK) for start in range(0, max(len(points), 1), CHUNK)]
+    parts = [slice(start, start + solid.CHUNK) for start in range(0, max(len(points), 1), solid.CHUNK)]
     return np.asarray(sum(Surroundings(points[p], ball, degree).of_magnetization(moments[..., p, :]) for p in parts))
 
 
@@ -155,12 +142,15 @@ def from_outer(sums: Sequence[Coefficients], radii: Array, centers: Array, ball:
     away, own = (ball.center - centers) / radii[:, None], max(len(each) for each in sums) - 1
     square = np.sum(away**2, axis=1)
     # all at once, because recurrences cost by the call; a point each
-    values = weighted_sums(own + degree, away / square[:, None], np.diag(1 / np.sqrt(square)))
+    values = solid.weighted_sums(own + degree, away / square[:, None], np.diag(1 / np.sqrt(square)))
     values *= factorials(own + degree)
     l, total = np.arange(degree + 1), np.zeros((degree + 1, degree + 1), complex)
     for each, sizes, ratio in zip(sums, values, radii / ball.radius, strict=True):
         last = len(each) - 1
-        (known, zero), (given, middle) = both_signs(sizes[: last + degree + 1, : last + degree + 1]), both_signs(each)
+        (known, zero), (given, middle) = (
+            solid.both_signs(sizes[: last + degree + 1, : last + degree + 1]),
+            solid.both_signs(each),
+        )
         shifts = sliding_window_view(known[:, zero - last : zero + last + degree + 1], (degree + 1, degree + 1))
         part = np.einsum("ab,abij->ij", given[:, middle - last : middle + last + 1], shifts)
         total += ((-1.0) ** l * ratio ** (1.0 - l))[:, None] * part
@@ -264,15 +254,15 @@ class LocalField:
         The gradient has what its own second derivatives at the place need, B what its first one needs.
         """
         way = [p - hy.par[self.first + i] for i, p in enumerate(position)]
-        names = [each for degree in range(1, self.ORDER + 1) for each in entries(degree)]
+        names = [each for degree in range(1, self.ORDER + 1) for each in solid.entries(degree)]
         known = {each: hy.par[self.first + 3 + k] for k, each in enumerate(names)}
-        field = [hy.sum([known[i,], *(entry(known, (i, j)) * s for j, s in enumerate(way))]) for i in range(3)]
+        field = [hy.sum([known[i,], *(solid.entry(known, (i, j)) * s for j, s in enumerate(way))]) for i in range(3)]
         slopes = []
         for i, j in UPPER:
             terms = [known[i, j]]
             for k, s in enumerate(way):
-                steep = [entry(known, (i, j, k, l)) * t for l, t in enumerate(way)]
-                terms.append(s * hy.sum([entry(known, (i, j, k)), 0.5 * hy.sum(steep)]))
+                steep = [solid.entry(known, (i, j, k, l)) * t for l, t in enumerate(way)]
+                terms.append(s * hy.sum([solid.entry(known, (i, j, k)), 0.5 * hy.sum(steep)]))
             slopes.append(hy.sum(terms))
         return field, whole_gradient(slopes)
 

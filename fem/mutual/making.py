@@ -20,23 +20,9 @@ from ..closed_forms.potentials import unit_dipole_fields
 from ..elements.surface import gap as gap_of
 from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
-from . import response
+from . import response, table as formulas
 from .response import ChargeResponse
-from .table import (
-    MANY,
-    PARALLEL,
-    POWERS,
-    RETURNED,
-    MutualTable,
-    ResponseGrid,
-    effort,
-    image_weights,
-    mixed_sum,
-    pair_sum,
-    point_counts,
-    response_box,
-    response_points,
-)
+from .table import PARALLEL, MutualTable, ResponseGrid, effort
 
 # Relative size of a singular value that is none; and up to how many weights they are found. No QR with pivots: their
 # order jumps from a scene to its neighbour, and derivatives would jump with it.
@@ -143,18 +129,18 @@ def mutual_table(
                 "Input magnets must be of the kinds that respond to the floater where both magnetise each other; "
                 f"instead one is {reason}"
             )
-        box, size = response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
+        box, size = formulas.response_box(magnet.body), float(np.linalg.norm(magnet.polarization))
         counts = like.grids[k].counts if like else _counts(magnet, floater.radius, len(magnets))
         axis = magnet.polarization / size if size else np.zeros(3)
         # where the floater can be in a ring's hole, no point is: with them weights run wild again, errors of 21
         hole = magnet.body.inner_radius if isinstance(magnet.body, Cylinder) else 0.0
         hole = hole if hole > floater.radius else 0.0
-        n = len(response_points(box, counts, hole))
-        zeros = np.zeros((n, 3)), np.zeros((n, len(POWERS), 2)), np.zeros((n, len(RETURNED), 2))
+        n = len(formulas.response_points(box, counts, hole))
+        zeros = np.zeros((n, 3)), np.zeros((n, len(formulas.POWERS), 2)), np.zeros((n, len(formulas.RETURNED), 2))
         grids.append(ResponseGrid(box, axis, floater.radius, counts, *zeros, hole))
     taken = effort(len(magnets))
     coarse, rotor = (ChargeResponse(magnets, nodes, min(nodes, response.OWN)) for nodes in taken.nodes)
-    images = image_weights(floater.recoil_permeability)
+    images = formulas.image_weights(floater.recoil_permeability)
     number = like.inner if like else _inner(grids, magnets)
     inner = [grid.inner(number) for grid in grids]
     coupling = np.zeros([3 * sum(len(points) for points in inner)] * 2)
@@ -166,7 +152,7 @@ def mutual_table(
     if floater.recoil_permeability != 1:
         distances = response.SPHERE_GAPS
         facing = response.places_facing(magnets, floater.radius, distances)
-        cuboids = 1 < len(magnets) < MANY and all(isinstance(magnet.body, Box) for magnet in magnets)
+        cuboids = 1 < len(magnets) < formulas.MANY and all(isinstance(magnet.body, Box) for magnet in magnets)
         single = cuboids and sum(len(grid.points) for grid in grids) <= SINGLE
         kind = 0 if len(magnets) == 1 else 1 if single and len(magnets) == 2 else 2
         around, beside = SAMPLES[kind] // len(magnets)
@@ -192,13 +178,13 @@ def _enough_samples(grids: Sequence[ResponseGrid], facing: int) -> float:
     """Places beside those `facing` the magnets that do for the weights of both `_fitted`."""
     free = SPARE * ENOUGH * sum(_classes(grid).shape[1] for grid in grids)
     # of the sphere's response four values a place for two weights a power; of what returns twelve at fewer places
-    direct = 2 * len(POWERS) / 4 * free - facing
-    return float(max(direct, SPARSE * (2 * len(RETURNED) / 12 * free - facing / FACING)))
+    direct = 2 * len(formulas.POWERS) / 4 * free - facing
+    return float(max(direct, SPARSE * (2 * len(formulas.RETURNED) / 12 * free - facing / FACING)))
 
 
 def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
     """Points along the edges of one of a `number` of magnets, where it responds to a floater of this `radius`, m."""
-    enough = point_counts(response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
+    enough = formulas.point_counts(formulas.response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
     x, y, z = enough if number == 1 else np.minimum(enough, MOST).tolist()
     return x, y, z
 
@@ -343,11 +329,11 @@ def sphere_fit(
         return -np.concatenate([(field @ direction)[..., None], direction @ change], axis=-1)
 
     pairs, still = list(combinations(range(len(grids)), 2)), np.zeros_like(places)
-    sums = [pair_sum(grids[a], grids[b], images, effort(len(grids)).charges) for a, b in pairs]
+    sums = [formulas.pair_sum(grids[a], grids[b], images, effort(len(grids)).charges) for a, b in pairs]
     derivatives = [one.derivatives(places, still, 1) for one in sums]
     others = [np.column_stack([value, slope[:, :3]]) for value, slope, _ in derivatives]
     right, sizes = np.column_stack([energy, -force]), np.column_stack([energy_size, *[force_size] * 3])
-    found, weights = _fitted(grids, single, POWERS, places, of_points, others, right, sizes, PENALTY)
+    found, weights = _fitted(grids, single, formulas.POWERS, places, of_points, others, right, sizes, PENALTY)
     coupled = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):
         coupled[a, b] = coupled[b, a] = weight
@@ -375,13 +361,13 @@ def returned_fit(
         return -np.concatenate([field, change.reshape(*change.shape[:-2], 9)], axis=-1)
 
     pairs, still = list(permutations(range(len(grids)), 2)), np.zeros_like(places)
-    sums = [mixed_sum(grids[a], inner[b], images, effort(len(grids)).reflected) for a, b in pairs]
+    sums = [formulas.mixed_sum(grids[a], inner[b], images, effort(len(grids)).reflected) for a, b in pairs]
     derivatives = [one.derivatives(places, still) for one in sums]
     others = [-rows(slope[:, 3:], second[:, 3:, :3]) for _, slope, second in derivatives]
     right, each = rows(field, change), (np.linalg.norm(field, axis=1), np.linalg.norm(change, axis=(1, 2)))
     sizes = np.repeat(np.column_stack(each), (3, 9), axis=1)
     found, weights = _fitted(
-        grids, single, RETURNED, places, lambda _, *known: rows(*known), others, right, sizes, 10 * PENALTY
+        grids, single, formulas.RETURNED, places, lambda _, *known: rows(*known), others, right, sizes, 10 * PENALTY
     )
     mixed = np.zeros((len(grids), len(grids)))
     for (a, b), weight in zip(pairs, weights, strict=True):

@@ -13,27 +13,8 @@ from ...geometry.meshes.plate import MeshRule
 from ...geometry.scene.contents import Plate
 from ..cache import TableKind
 from ..rotor.table import RotorTable
-from .currents import (
-    OtherSources,
-    PlateSolution,
-    cached_currents,
-    error_of,
-    outer_box,
-    outer_frequencies,
-    solve_currents,
-)
+from . import currents, rotor_share as rotors
 from .network import CONDUCTOR, NETWORK_SHARE, PassiveNetwork, Reduction, checked_ranges, from_elements
-from .rotor_share import (
-    MISSED,
-    SHARE_PART,
-    UNNOTICED,
-    TurningRotor,
-    posed_rotor,
-    rotor_box,
-    rotor_parts,
-    rotor_share,
-    without_high_harmonics,
-)
 from .slab import rotor_reach, slab_frame
 from .table import ENOUGH, PlateErrors, PlateTable, Region, RotorShare, refuse, turn_harmonics
 from .waves import from_slab
@@ -61,8 +42,8 @@ def plate_table(
     rtol : relative accuracy asked of reaction tensors G, Frobenius norm
     """
     checked_ranges(frequencies, rtol)
-    solution = solve_currents(plate, [region], frequencies, rtol)
-    reduced = from_elements(plate, solution, region, frequencies, rtol, OtherSources(), solution.space_error)
+    solution = currents.solve_currents(plate, [region], frequencies, rtol)
+    reduced = from_elements(plate, solution, region, frequencies, rtol, currents.OtherSources(), solution.space_error)
     return _reduced_table(reduced, rtol, CONDUCTOR, unwatched)[1]
 
 
@@ -90,7 +71,9 @@ class PlateAround:
     slab: bool = False  # whether it is taken without edges; the errors do not tell how far it is from that
     rule: MeshRule | None = None  # of its mesh; None: by `rtol`
 
-    def tables(self, solve: Callable[..., PlateSolution] = solve_currents, watch: Watch = unwatched) -> Both:
+    def tables(
+        self, solve: Callable[..., currents.PlateSolution] = currents.solve_currents, watch: Watch = unwatched
+    ) -> Both:
         """Both, by `solve` for the finite elements; `cached_currents` has them from the cache.
 
         Raises InputError: the plate is too near to the rotor, or, as a slab, not beside all of it and the region with
@@ -99,20 +82,20 @@ class PlateAround:
         """
         conductor = "this plate, taken as an infinite slab, and this place of the floater" if self.slab else CONDUCTOR
         network, table = _reduced_table(self._reduction(solve, watch), self.rtol, conductor, watch)
-        share = rotor_share(network, self._turning, SHARE_PART * self.rtol, watch)
-        return table, without_high_harmonics(share, table, MISSED * self.rtol)
+        share = rotors.rotor_share(network, self._turning, rotors.SHARE_PART * self.rtol, watch)
+        return table, rotors.without_high_harmonics(share, table, rotors.MISSED * self.rtol)
 
-    def _reduction(self, solve: Callable[..., PlateSolution], watch: Watch) -> Reduction:
+    def _reduction(self, solve: Callable[..., currents.PlateSolution], watch: Watch) -> Reduction:
         plate, rotor, region, frequencies, rtol = self.plate, self.rotor, self.region, self.frequencies, self.rtol
         others = self._turning.others()
         if self.slab:
             far = rotor_reach(plate, rotor, slab_frame(plate, region))
             return from_slab(plate, region, frequencies, rtol, others, far)
-        boxes = [outer_box(region, plate.body), outer_box(rotor_box(plate, rotor), plate.body)]
-        outer = outer_frequencies(frequencies)
+        boxes = [currents.outer_box(region, plate.body), currents.outer_box(rotors.rotor_box(plate, rotor), plate.body)]
+        outer = currents.outer_frequencies(frequencies)
         solution = solve(plate, boxes, outer, rtol, self.rule, None)
         watch("reduced plate model", 0.0)
-        error = error_of(solution, others.probes)
+        error = currents.error_of(solution, others.probes)
         if error > OTHERS_SHARE * (NETWORK_SHARE * rtol - solution.mesh_error):
             solution = solve(plate, boxes, outer, rtol, self.rule, others)
             error = solution.space_error
@@ -131,8 +114,8 @@ class PlateAround:
         return SLAB if self.slab else DRIVEN
 
     @cached_property
-    def _turning(self) -> TurningRotor:
-        return TurningRotor(_seen(self.plate, self.slab), self.rotor, UNNOTICED * self.rtol)
+    def _turning(self) -> rotors.TurningRotor:
+        return rotors.TurningRotor(_seen(self.plate, self.slab), self.rotor, rotors.UNNOTICED * self.rtol)
 
     @cached_property
     def key(self) -> str:
@@ -140,7 +123,7 @@ class PlateAround:
 
     def made(self, report: Report, watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
         """The `tables`, and whether they were cached."""
-        make = partial(self.tables, partial(cached_currents, report=report, watch=watch), watch)
+        make = partial(self.tables, partial(currents.cached_currents, report=report, watch=watch), watch)
         (table, share), cached = self._kind.cached(self.deciding, make, report)
         return table, share, cached
 
@@ -154,7 +137,7 @@ class PlateAround:
         return CHANGED.cached((self.key, more), lambda: (self._changed(known, others, report), 0.0), report)[0][0]
 
     def _changed(self, known: Both, others: Sequence[tuple[Plate, RotorTable]], report: Report) -> Array:
-        reduced = self._reduction(partial(cached_currents, report=report), unwatched)
+        reduced = self._reduction(partial(currents.cached_currents, report=report), unwatched)
         network, (table, share) = reduced(0.0), known
         if network.rates.shape != table.rates.shape:
             network = _reduced_table(reduced, self.rtol, CONDUCTOR, unwatched)[0]
@@ -163,8 +146,8 @@ class PlateAround:
 
         def series(plate: Plate, rotor: RotorTable) -> Array:
             plate = _seen(plate, self.slab)
-            parts = rotor_parts(rotor, plate, 0.0)  # degrees that come and go would be steps
-            return fourier @ network.couplings([posed_rotor(parts, plate, angle, 0.0) for angle in angles])
+            parts = rotors.rotor_parts(rotor, plate, 0.0)  # degrees that come and go would be steps
+            return fourier @ network.couplings([rotors.posed_rotor(parts, plate, angle, 0.0) for angle in angles])
 
         first, stored = series(self.plate, self.rotor), share.series @ share.by_depth(0.0)
         same = first.shape == stored.shape

@@ -26,20 +26,10 @@ from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import Dipole, PolarizedCuboid
 from ..harmonics.expansion import without_noise
 from ..harmonics.solid import Coefficients, rotated_harmonics
+from . import network as networks
 from .currents import OtherSources, probe_places, unit_power
 from .eddy import Source
 from .multipoles import Fit, Multipoles, fit_multipoles
-from .network import (
-    FUNCTION_SHARE,
-    NETWORK_SHARE,
-    PassiveNetwork,
-    Reduction,
-    checked_ranges,
-    coupling_error,
-    fewest_states,
-    ordered_basis,
-    tensor_error,
-)
 from .rotor_share import ExpansionSource, RotorSource
 from .slab import SlabFrame, SlabModes, corners, modes_needed, mutual_tensor, reaction_tensor, slab_frame, slab_modes
 from .table import Region
@@ -155,7 +145,7 @@ def _slab_waves(frame: SlabFrame, near: Array, far: Array, frequency: float, tol
 
 def from_slab(
     plate: Plate, region: Region, frequencies: tuple[float, float], rtol: float, others: OtherSources, far: Array
-) -> Reduction:
+) -> networks.Reduction:
     """Networks of the slab that stands for `plate`, for dipoles in `region` and `others`.
 
     Raises InputError: the region is not over one of the plate's two largest faces; ValueError: frequencies not 0 <
@@ -169,7 +159,7 @@ def from_slab(
     far : (n, 3) m, how far these reach, in the frame of the cylinder
     """
     start = time.perf_counter()
-    low, high = checked_ranges(frequencies, rtol)
+    low, high = networks.checked_ranges(frequencies, rtol)
     frame = slab_frame(plate, region)
     waves = _slab_waves(frame, corners(region, frame), far, high, SUMS_SHARE * rtol)
     modes = waves.modes
@@ -200,14 +190,14 @@ def from_slab(
             field = weight * rates / (rates + 1j * omega) * sources
             fields += [field.real, field.imag]
         snapshots = np.concatenate(fields)
-        full = ordered_basis(snapshots, snapshots / rates, float(2 * np.pi * np.sqrt(every[0] * every[-1])))
+        full = networks.ordered_basis(snapshots, snapshots / rates, float(2 * np.pi * np.sqrt(every[0] * every[-1])))
         held = full.fields.reshape(len(full.fields), *modes.rates.shape)
         basis.append(replace(full, fields=np.einsum("skn,kn->sk", held, to_modes)))
     pairs = [(m, part) for m in range(len(basis)) for part in (probes[:, :, m].real, probes[:, :, m].imag)]
 
-    def reduced(functions_error: float) -> PassiveNetwork:
-        allowed = min(NETWORK_SHARE * rtol, rtol - functions_error) - sums_error
-        chosen, state_error = fewest_states(basis, pairs, truth, len(places), allowed)
+    def reduced(functions_error: float) -> networks.PassiveNetwork:
+        allowed = min(networks.NETWORK_SHARE * rtol, rtol - functions_error) - sums_error
+        chosen, state_error = networks.fewest_states(basis, pairs, truth, len(places), allowed)
         end = max(m for m, part in enumerate(chosen) if len(part.energies)) + 1
         rates, fields = zip(*[part.diagonalised() for part in chosen[:end]], strict=True)
 
@@ -217,7 +207,7 @@ def from_slab(
             halves = [(part.real, part.imag)[: 1 + (m > 0)] for m, part in enumerate(parts)]
             return np.concatenate([half for both in halves for half in both], axis=1)
 
-        return PassiveNetwork(
+        return networks.PassiveNetwork(
             plate, region, frequencies, np.concatenate([rates[0], *(np.tile(part, 2) for part in rates[1:])]),
             couplings, partial(_functions, waves, rates, fields), sums_error, state_error,
             {"conductor": "infinite slab", "wave_numbers": float(len(modes.rates)),
@@ -247,19 +237,19 @@ def _sums_error(waves: SlabWaves, places: Array, sources: Array, frequency: floa
     points = np.concatenate([places, sources])
     found = waves.couplings(waves.amplitudes(local_dipoles(waves.frame, points)), frequency)
     truth = mutual_tensor(waves.frame.slab, points[:, None], points, frequency)
-    return coupling_error(found, truth.swapaxes(1, 2).reshape(found.shape), len(places))
+    return networks.coupling_error(found, truth.swapaxes(1, 2).reshape(found.shape), len(places))
 
 
 def _functions(
     waves: SlabWaves,
     rates: Sequence[Array],
     fields: Sequence[Array],
-    network: PassiveNetwork,
+    network: networks.PassiveNetwork,
     rtol: float,
     watch: Watch,
 ) -> tuple[Multipoles, Array, float]:
     """`PassiveNetwork.field_functions`, order by order from a meridian where cos mφ = sin mφ: all components show."""
-    tolerance = FUNCTION_SHARE * rtol
+    tolerance = networks.FUNCTION_SHARE * rtol
     grid = meridian(network.region, waves.frame, POINTS)
     radius, height = grid[:, 0], grid[:, 2]
     places = grid[(radius == radius.max()) | (height == height.min()) | (height == height.max())]
@@ -287,7 +277,7 @@ def _functions(
             there, turned = places @ turns[m].T, value @ turns[m].T
             fits.append(fit_multipoles(choice, there, turned, scale, point_scale, part, lambda _: True, 1))
         left = _pairs([fit.error @ turn for fit, turn in zip(fits, turns, strict=True)])
-        error = max(tensor_error(_pairs(values), left, doubled, omega) for omega in omegas)
+        error = max(networks.tensor_error(_pairs(values), left, doubled, omega) for omega in omegas)
         if error <= tolerance:
             break
     return *_in_plate(fits, waves.frame), error
