@@ -79,14 +79,9 @@ def free_memory(group: Path = GROUP) -> float:
 class OpenBoundary:
     """Dirichlet-to-Neumann map of the outside of the sphere `outer` about the origin.
 
-    Parameters
-    ----------
-    mesh : NGSolve mesh with the boundary `outer`
-    space : H1 space of the potential
-    radius : of the sphere
-    degree : highest degree that is treated exactly; higher ones see the Robin term
-    order : of the elements
-    planes, signs : mirror planes of the mesh, and whether the potential is even (+1) or odd (-1) there
+    `mesh`: NGSolve mesh with the boundary `outer`; `space`: H1 space of the potential; `radius`: of the sphere;
+    `degree`: highest degree that is treated exactly, higher ones see the Robin term; `order`: of the elements;
+    `planes`, `signs`: mirror planes of the mesh, and whether the potential is even (+1) or odd (-1) there.
 
     Attribute `area_error` is the relative error of the area of the meshed sphere, which measures its roundness.
     """
@@ -156,14 +151,9 @@ class ConvergenceError(ComputationError):
 def solve_open(stiffness: Any, inverse: Any, free_dofs: Any, load: Any, boundary: OpenBoundary) -> Any:
     """The potential, an NGSolve function.
 
-    Raises ConvergenceError: the iteration for the open boundary stalls.
-
-    Parameters
-    ----------
-    stiffness, load : condensed forms, without what harmonics beyond the Robin term do at the boundary
-    inverse : of the stiffness on the free unknowns
-    free_dofs : the unknowns that are not zero, without those that are condensed
-    boundary : of open space
+    Raises ConvergenceError: the iteration for the open boundary stalls. `stiffness`, `load`: condensed forms, without
+    what harmonics beyond the Robin term do at the boundary; `inverse`: of the stiffness on the free unknowns;
+    `free_dofs`: the unknowns that are not zero, without those that are condensed; `boundary`: of open space.
     """
     potential = ng.GridFunction(stiffness.space)
     load.vec.data += stiffness.harmonic_extension_trans * load.vec

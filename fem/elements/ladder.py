@@ -182,18 +182,12 @@ def solve_rotor(
     """Solve for every parity part of the polarisation and add up; gaps too narrow for elements are closed.
 
     Raises ConvergenceError: the iteration for the open boundary stalls; MeshError: no mesh of the magnets fits
-    together.
-
-    Parameters
-    ----------
-    magnets, refinement : the rotor, and how fine
-    formulation : "split" or "direct", see `magnetostatics`
-    degree : of the moments in `split`, where they are those of -(μ - 1) ∇ψ; in `direct` it is the boundary's
-    pieces : of every magnet, each with its own expansion; by default the magnets
-    use_symmetry : whether to mesh only one side of the mirror planes
-    carriers : in `split`, the magnets with μr = 1 whose closed form is split off, each in the place of one of the
-        magnets; by default the magnets' own remanence
-    cells : of every piece, each with its own expansion; by default one
+    together. `magnets`, `refinement`: the rotor, and how fine; `formulation`: "split" or "direct", see
+    `magnetostatics`; `degree`: of the moments in `split`, where they are those of -(μ - 1) ∇ψ, in `direct` it is the
+    boundary's; `pieces`: of every magnet, each with its own expansion, by default the magnets; `use_symmetry`: whether
+    to mesh only one side of the mirror planes; `carriers`: in `split`, the magnets with μr = 1 whose closed form is
+    split off, each in the place of one of the magnets, by default the magnets' own remanence; `cells`: of every piece,
+    each with its own expansion, by default one.
     """
     cut = pieces or [(magnet,) for magnet in magnets]
     shifts = closing_shifts(magnets)
@@ -338,14 +332,10 @@ def refined(
 ) -> tuple[RotorSolution, int, dict[str, list[MultipoleExpansion]]]:
     """The solution at the first order whose error is below the target.
 
-    With its order, and the two estimates of its error, to be added, as fields.
-
-    Parameters
-    ----------
-    solve : solution at an order
-    points, scale : where (n, 3) m the error is looked at, and the field (n,) T to which it is relative
-    settings : of the mesh, as given to `refinement_of`
-    watch : called with the progress, as far as the rate of convergence foretells it
+    With its order, and the two estimates of its error, to be added, as fields. `solve`: solution at an order; `points`,
+    `scale`: where (n, 3) m the error is looked at, and the field (n,) T to which it is relative; `settings`: of the
+    mesh, as given to `refinement_of`; `watch`: called with the progress, as far as the rate of convergence foretells
+    it.
     """
     first, *others = LAYERS
     coarse, before, old = solve(first), np.inf, list[Coefficients]()

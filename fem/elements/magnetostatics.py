@@ -72,15 +72,10 @@ def stiffness_of(
 ) -> tuple[Any, Any]:
     """The space H1 and ∫ ∇v·μ∇ψ on it, condensed, with the Robin term of the sphere `outer`.
 
-    Raises MeshError: layers of elements do not match; TooLargeError: the memory does not hold the system.
-
-    Parameters
-    ----------
-    mesh : of NGSolve, with the boundary `outer`
-    permeability : (3, 3) μ/μ0 by the name of a region; 1 in the others
-    ball_radius : of that sphere, in the unit of the mesh
-    order : of the elements
-    way_out : what to do where memory is short, for the message
+    Raises MeshError: layers of elements do not match; TooLargeError: the memory does not hold the system. `mesh`: of
+    NGSolve, with the boundary `outer`; `permeability`: (3, 3) μ/μ0 by the name of a region, 1 in the others;
+    `ball_radius`: of that sphere, in the unit of the mesh; `order`: of the elements; `way_out`: what to do where memory
+    is short, for the message.
     """
     space = ng.H1(mesh, order=order)
     require_memory(space, space.FreeDofs(True), way_out)
@@ -112,16 +107,11 @@ def solve(
 ) -> Solution:
     """Solve for the potential.
 
-    Raises ConvergenceError: the iteration for the open boundary stalls.
-
-    Parameters
-    ----------
-    system : made by `assemble`
-    formulation : what of the remanence is solved for, see above
-    sources : magnets whose remanent polarisation acts; in `direct` those of the mesh
-    boundary_degree : harmonics up to this degree see an exactly open outer boundary
-    signs : parity of the potential (+1 or -1) at each of the mesh's planes
-    rest : in `split`, J' (n, 3) T of each of the mesh's magnets; by default none
+    Raises ConvergenceError: the iteration for the open boundary stalls. `system`: made by `assemble`; `formulation`:
+    what of the remanence is solved for, see above; `sources`: magnets whose remanent polarisation acts, in `direct`
+    those of the mesh; `boundary_degree`: harmonics up to this degree see an exactly open outer boundary; `signs`:
+    parity of the potential (+1 or -1) at each of the mesh's planes; `rest`: in `split`, J' (n, 3) T of each of the
+    mesh's magnets, by default none.
     """
     mesh, space = system.mesh, system.space
     boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, boundary_degree, system.order, mesh.planes, signs)

@@ -104,16 +104,10 @@ def plate_around(
 ) -> PlateAround:
     """The plate's table for a floater about a place, to be made.
 
-    Raises InputError: the plate leaves the floater no room.
-
-    Parameters
-    ----------
-    model : "slab", or "reduced" for the network of the finite elements
-    table : the rotor's field
-    place : (3,) m, in the frame that turns with the rotor
-    radius, frequency : of the floater, m, and of the rotor, Hz
-    rtol : relative accuracy
-    region : in the frame of the plate, where the floater may be; left out, near the place, all the way down
+    Raises InputError: the plate leaves the floater no room. `model`: "slab", or "reduced" for the network of the finite
+    elements; `table`: the rotor's field; `place`: (3,) m, in the frame that turns with the rotor; `radius`,
+    `frequency`: of the floater, m, and of the rotor, Hz; `rtol`: relative accuracy; `region`: in the frame of the
+    plate, where the floater may be, left out, near the place, all the way down.
     """
     if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
         plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is

@@ -288,15 +288,10 @@ def train(
 ) -> tuple[CurrentSpace, float, Array, ComplexArray]:
     """Currents of the sources at all frequencies (Hz) between the two, and what is missing of the probes.
 
-    That is the `worst_error`, and at angular frequencies (k,) the products of the dipoles' residuals.
-
-    Parameters
-    ----------
-    space : finite elements
-    grid, probes : (n, 3) m, places of the dipoles that are trained and of those that are not
-    others : more sources of both kinds
-    allowed : |ρ|² of a source relative to what it drives, and thus relative error of its coupling with itself
-    watch : progress callback
+    That is the `worst_error`, and at angular frequencies (k,) the products of the dipoles' residuals. `space`: finite
+    elements; `grid`, `probes`: (n, 3) m, places of the dipoles that are trained and of those that are not; `others`:
+    more sources of both kinds; `allowed`: |ρ|² of a source relative to what it drives, and thus relative error of its
+    coupling with itself; `watch`: progress callback.
     """
     watch("vector potentials of the sources", 0.0)
     rows = FieldRows(space)
@@ -402,15 +397,9 @@ def solve_currents(
 
     An order that is expected to do is not solved for the sake of its error alone: the currents are trained on it at
     once, and its error follows from their network. Raises ValueError: a box touches the plate; AccuracyError: the mesh
-    is too coarse for `rtol`.
-
-    Parameters
-    ----------
-    boxes : in the plate's frame
-    rtol : relative accuracy of reaction tensors that a table shall have
-    rule : mesh; left out, the one that has been found to need the least work for `rtol`
-    others : more sources whose currents are held
-    watch : progress callback
+    is too coarse for `rtol`. `boxes`: in the plate's frame; `rtol`: relative accuracy of reaction tensors that a table
+    shall have; `rule`: mesh, left out, the one that has been found to need the least work for `rtol`; `others`: more
+    sources whose currents are held; `watch`: progress callback.
     """
     start = time.perf_counter()
     others = others or OtherSources()

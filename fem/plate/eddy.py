@@ -271,14 +271,9 @@ class Ladder:
 
     What an order leaves is at most its change of a tensor times the reduction of that change against the order before;
     the truncation of the air comes on top. Raises MeshTooLargeError: not even order 3 is within `MOST_UNKNOWNS`.
-
-    Parameters
-    ----------
-    places : (n, 3) m, of the dipoles whose own tensors are compared, plate's frame
-    frequency : Hz
-    rule, allowed : mesh, and relative error
-    growing : compare fields that grow as e^{ωt} instead of phasors: half the memory, a quarter of the work
-    watch : progress callback
+    `places`: (n, 3) m, of the dipoles whose own tensors are compared, plate's frame; `frequency`: Hz; `rule`,
+    `allowed`: mesh, and relative error; `growing`: compare fields that grow as e^{ωt} instead of phasors: half the
+    memory, a quarter of the work; `watch`: progress callback.
     """
 
     def __init__(

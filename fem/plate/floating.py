@@ -228,12 +228,9 @@ def floating_modes(
 ) -> FloatingModes:
     """Modes of a conductor whose centre moves on the common axis z of coils.
 
-    Parameters
-    ----------
-    over : the conductor, mirrored across its x and y, and the coils
-    heights : lowest and highest of its centre, m
-    rtol : relative accuracy asked of the mean force, for the states; the finite elements are as they are
-    order, rule : of the finite elements; `error` is what one order less changes
+    `over`: the conductor, mirrored across its x and y, and the coils; `heights`: lowest and highest of its centre, m;
+    `rtol`: relative accuracy asked of the mean force, for the states, the finite elements are as they are; `order`,
+    `rule`: of the finite elements, `error` is what one order less changes.
     """
     start, (low, high) = time.perf_counter(), heights
     half, outer = float(over.body.half_edges[2]), float(over.body.half_edges[:2].max())

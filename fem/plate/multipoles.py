@@ -182,14 +182,10 @@ def fit_multipoles(
 ) -> Fit:
     """Few of a `choice` of multipoles that meet the tolerance and are `enough`, or as many as still help.
 
-    Parameters
-    ----------
-    values : (functions, n, 3) B of each function at `points` (n, 3)
-    state_scale, point_scale : (functions,) and (n,) factors that make errors comparable
-    tolerance : for the norm of the scaled error over functions and components, at every point
-    enough : whether errors (functions, n, 3) are small enough
-    step : multipoles between two looks at the error
-    watch : progress callback
+    `values`: (functions, n, 3) B of each function at `points` (n, 3); `state_scale`, `point_scale`: (functions,) and
+    (n,) factors that make errors comparable; `tolerance`: for the norm of the scaled error over functions and
+    components, at every point; `enough`: whether errors (functions, n, 3) are small enough; `step`: multipoles between
+    two looks at the error; `watch`: progress callback.
     """
     columns = choice.fields(points) * point_scale[:, None, None]
     columns = columns.swapaxes(1, 2).reshape(-1, len(choice.kinds))

@@ -115,11 +115,9 @@ def fewest_states(
 ) -> tuple[list[OrderedBasis], float]:
     """The fewest leading fields of every `basis` whose worst error meets the tolerance, and that error.
 
-    Parameters
-    ----------
-    probes : numbers of bases with potentials (sources, width) of all probes in them, whose couplings add up
-    truth : (sources, sources) couplings of the probes by angular frequency, rad/s
-    places : of the probes: three dipoles at each come first, then other sources
+    `probes`: numbers of bases with potentials (sources, width) of all probes in them, whose couplings add up; `truth`:
+    (sources, sources) couplings of the probes by angular frequency, rad/s; `places`: of the probes: three dipoles at
+    each come first, then other sources.
     """
 
     def worst(chosen: Sequence[OrderedBasis]) -> float:

@@ -252,11 +252,8 @@ def _left_out(sizes: Array) -> Array:
 def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:
     """The share without its highest harmonics, as many as the floater may miss.
 
-    Parameters
-    ----------
-    table : of the same network
-    allowed : sum over the harmonics left out of their part of the field of the rotor's currents, or of its gradient;
-        it is added to the share's error
+    `table`: of the same network; `allowed`: sum over the harmonics left out of their part of the field of the rotor's
+    currents, or of its gradient, it is added to the share's error.
     """
     # Largest part that each harmonic has in field or gradient, at any place, depth and frequency.
     functions, slopes = table.field_functions(table.region.grid(POINTS))

@@ -86,11 +86,9 @@ def cylinder_moments(
 ) -> ComplexArray:
     """∫ M·∇[J_m(kρ) e^{imφ} e^{-kz}] dV (sources, n, orders), A m, for m = 0 … orders - 1.
 
-    Parameters
-    ----------
-    origin, axes : (3,) m and (3, 3) of the cylinder's frame; columns are its axes, the last is the cylinder's
-    wave_numbers : (n,) k, 1/m
-    directions : number of equidistant α; the sum over them confuses the orders m and directions - m
+    `origin`, `axes`: (3,) m and (3, 3) of the cylinder's frame, columns are its axes, the last is the cylinder's;
+    `wave_numbers`: (n,) k, 1/m; `directions`: number of equidistant α, the sum over them confuses the orders m and
+    directions - m.
     """
     angle = 2 * np.pi * np.arange(directions) / directions
     local: ComplexArray = np.stack([1j * np.cos(angle), 1j * np.sin(angle), -np.ones(directions) + 0j], axis=1)
@@ -149,14 +147,9 @@ def from_slab(
     """Networks of the slab that stands for `plate`, for dipoles in `region` and `others`.
 
     Raises InputError: the region is not over one of the plate's two largest faces; ValueError: frequencies not 0 <
-    lowest < highest, or rtol not between 0 and 1.
-
-    Parameters
-    ----------
-    frequencies : lowest and highest, Hz
-    rtol : relative accuracy of reaction tensors and of the others' fields
-    others : more sources whose currents the networks shall hold: the rotor's
-    far : (n, 3) m, how far these reach, in the frame of the cylinder
+    lowest < highest, or rtol not between 0 and 1. `frequencies`: lowest and highest, Hz; `rtol`: relative accuracy of
+    reaction tensors and of the others' fields; `others`: more sources whose currents the networks shall hold: the
+    rotor's; `far`: (n, 3) m, how far these reach, in the frame of the cylinder.
     """
     start = time.perf_counter()
     low, high = networks.checked_ranges(frequencies, rtol)
