@@ -160,7 +160,6 @@ def _target() -> str:
 
 
 def _read(path: Path) -> tuple[Any, int]:
-    """What was kept, and its size; None where there is none to be trusted."""
     import heyoka as hy
 
     try:

@@ -134,7 +134,6 @@ def loss_and_delay(pieces: Pieces) -> tuple[Array, Array, Array, Array]:
 
 
 def _step(fewer: Array, losses: Array) -> float:
-    """Largest relative change of a uniform field's losses."""
     return float(np.abs(np.diag(fewer)[:3] / np.diag(losses)[:3] - 1).max())
 
 
@@ -169,7 +168,6 @@ def _own_field(
 
 
 def _described(matrices: tuple[Array, Array, Array, Array], radius: float, is_round: bool) -> CurrentShape:
-    """The description of a body with `loss_and_delay`, by a ball of a `radius` (m)."""
     losses, fewer, own, coarser = ((m + m.T) / 2 for m in matrices)
     if is_round:
         losses, fewer, own, coarser = (round_part(matrix) for matrix in (losses, fewer, own, coarser))

@@ -36,8 +36,8 @@ from ..geometry.solids import Solid, places_off
 from .cache import TableKind
 from .elements.condensed import require_memory
 from .elements.spaces import IntegrationPoints, load_vector, volume_points
-from .harmonics.solid import factorials, norm
-from .plate.multipoles import Multipoles, fit_multipoles, real_kinds
+from .harmonics.solid import factorials, members, norm
+from .plate.multipoles import Multipoles, fit_multipoles
 
 Potentials = Callable[[Array], Array]  # Points (n, 3) m -> A (n, 3, k) of k sources
 BLOCK, TOGETHER = 4000, 40  # Points, and places of dipoles, at a time
@@ -287,7 +287,7 @@ def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = B
     for bodies, conductivity in pieces:
         for body in bodies:
             radius = CUBE * body.volume ** (1 / 3)
-            for l, m, part in real_kinds(1, degree):
+            for l, m, part in members(degree, 1):
                 centers.append(body.center)
                 kinds.append((l, m, part))
                 # strength of the field of one harmonic Θ_lm with lengths in metres, √W s/(A m²)
@@ -336,7 +336,7 @@ def rotor_losses(
     # multipoles about the middles of parts of the bodies so compact that their expansions converge
     boxes = [Magnet(Box(b.size, b.center, b.rotation), np.zeros(3)) for group, _ in pieces for b in group]
     centers = [part.box.center for parts in cut_magnets(boxes, nearest) for part in parts]
-    choice = Multipoles.at(centers, real_kinds(1, DEGREE), nearest)
+    choice = Multipoles.at(centers, members(DEGREE, 1), nearest)
     fit = fit_multipoles(choice, places, values, np.ones(found.count), scale, FIT, lambda _: True)
     finer = [metal_of(group, conductivity, ORDER + 1) for group, conductivity in pieces]
     table = RotorLosses(fit.multipoles, sparse(fit.weights), nearest * np.array(CHECKED), np.zeros(len(CHECKED)))

@@ -28,7 +28,8 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...fem.plate.multipoles import cartesian, weighted
+from ...fem.harmonics.expressions import turned_expressions, weighted
+from ...fem.plate.multipoles import cartesian
 from ...fem.plate.table import PlateTable, RotorShare
 from ...geometry.common import Array
 from ...geometry.scene.contents import Plate
@@ -126,7 +127,7 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     rotor, states = DRIVEN if driven else STEADY, [hy.expression(f"plate_{i}") for i in range(len(table.rates))]
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place = seen_by_plate(plate, position, rotor)
-    pointing = _product(plate.box.rotation.T, about_z(moment, rotor.angle, 1.0))
+    pointing = turned_expressions(plate.box.rotation.T, about_z(moment, rotor.angle, 1.0))
     source = [strength * m for m in pointing]
     # x, y and z enter only after the sums over multipoles: every operation counts in Taylor's method
     flux, slopes = (table.multipoles.derivatives(place, order) for order in (1, 2))
@@ -215,16 +216,11 @@ def raised(position: Vector, rotor: Turn) -> Vector:
 def seen_by_plate(plate: Plate, position: Vector, rotor: Turn) -> Vector:
     """A scaled position in the rotor's frame along the plate's axes, m, from its centre."""
     away = [x - float(c) for x, c in zip(raised(position, rotor), plate.box.center, strict=True)]
-    return _product(plate.box.rotation.T, away)
+    return turned_expressions(plate.box.rotation.T, away)
 
 
 def _seen_by_rotor(plate: Plate, vector: Vector, rotor: Turn) -> Vector:
-    return about_z(_product(plate.box.rotation, vector), rotor.angle, -1.0)
-
-
-def _product(matrix: np.ndarray, vector: Vector) -> list[hy.expression]:
-    exact = np.where(np.abs(matrix) < 1e-15, 0.0, matrix)  # a quarter turn leaves 6e-17, which would cost operations
-    return [weighted(row, vector) for row in exact]
+    return about_z(turned_expressions(plate.box.rotation, vector), rotor.angle, -1.0)
 
 
 @dataclass(frozen=True, eq=False)

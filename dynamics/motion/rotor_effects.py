@@ -23,9 +23,9 @@ import heyoka as hy
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...fem.harmonics.expressions import weighted
 from ...fem.harmonics.interior import Ball, BallField
 from ...fem.mutual.table import MutualTable
-from ...fem.plate.multipoles import weighted
 from ...fem.rotor.table import DerivedField, FieldTable
 from ...fem.rotor_metal import GRADIENT, PRODUCTS, RotorLosses
 from ...geometry.common import MU_0, Array, even_directions

@@ -1,6 +1,7 @@
 """Moments of what closed-form fields magnetise, by Gauss rules pressed towards their kinks and logarithms."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -28,17 +29,14 @@ def enough_nodes(degree: int) -> int:
 
 def oblique_contact(bodies: Sequence[Solid]) -> bool:
     """Whether two bodies but parallel boxes (nearly) touch: then kinks run across the panels of the rules."""
-    return any(
-        not parallel(first, second) and separation(first, second)[0] < NEAR * min(first.size.min(), second.size.min())
-        for first, second in combinations(bodies, 2)
-    )
+    oblique = (pair for pair in combinations(bodies, 2) if not parallel(*pair))
+    return any(separation(a, b)[0] < NEAR * min(a.size.min(), b.size.min()) for a, b in oblique)
 
 
 def parallel(first: Solid, second: Solid) -> bool:
     """Whether both are boxes, of the same axes."""
-    if not (isinstance(first, Box) and isinstance(second, Box)):
-        return False
-    return np.allclose(np.abs(first.rotation.T @ second.rotation).max(axis=0), 1, rtol=0, atol=1e-12)
+    along = np.abs(first.rotation.T @ second.rotation).max(axis=0)
+    return isinstance(first, Box) and isinstance(second, Box) and np.allclose(along, 1, rtol=0, atol=1e-12)
 
 
 def graded_rule(breaks: Array, nodes: int) -> tuple[Array, Array]:
@@ -143,11 +141,8 @@ def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes:
     """Coefficients (T) of (μ - 1) H0 in a body, about its centre with radius its circumradius.
 
     Because the harmonics have no Laplacian, faces and H0's potential suffice for boxes. H0 is that of `sources`,
-    magnets with μr = 1. The coefficients are up to a `degree`; `nodes` are of each panel of the rule (None: enough for
-    the degree).
-
-    Accuracy with the default number of nodes: round-off for boxes whose axes are parallel or that do not touch, and for
-    bodies that do not touch.
+    magnets with μr = 1. They are up to a `degree`; `nodes` are of each panel of the rule (None: enough for round-off,
+    but where boxes of other axes, or other bodies, touch).
     """
     if not all(isinstance(part.body, Box) for part in (body, *sources)):
         return cell_moments(body, np.zeros(3), sources, degree, cells_of(body.body, np.inf), nodes)[0]
@@ -168,10 +163,9 @@ def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes:
 def cell_moments(
     body: Magnet, rest: Array, sources: Sequence[Magnet], degree: int, cells: Cells, nodes: int | None = None
 ) -> list[Coefficients]:
-    """Coefficients (T) of (μ - 1) H0 and of a uniform rest, of every cell of any body, by integrals over the volume.
+    """`induced_moments`, and those of a uniform `rest` (3,) T in body axes, of each of `cells` of any `body`.
 
-    `body`, `sources`, `degree` and `nodes` are as of `induced_moments`; `rest` is (3,) T, in body axes; `cells` are of
-    the body.
+    By integrals over the volume; `sources`, `degree` and `nodes` are as there.
     """
     others = [source.body for source in sources]
     enough = enough_nodes(degree) if len(cells.radii) == 1 else CELL_NODES
@@ -182,10 +176,9 @@ def cell_moments(
 
 
 def by_cells(points: Array, weights: Array, field: Array, cells: Cells, degree: int) -> list[Coefficients]:
-    """Coefficients (T) of a magnetisation, cell by cell.
+    """Coefficients (T), up to a `degree` and cell by cell, of a magnetisation in the nearest of `cells`.
 
-    It is `field`, μ0 M (n, 3) T, at `points` (n, 3) m with `weights` (n,) m³, each of the nearest of the `cells`; up to
-    a `degree`.
+    It is `field`, μ0 M (n, 3) T, at `points` (n, 3) m with `weights` (n,) m³.
     """
     owner = cells.which(points)
     return [
@@ -196,10 +189,7 @@ def by_cells(points: Array, weights: Array, field: Array, cells: Cells, degree: 
 
 
 def uniform_cells(magnet: Magnet, nearest: float) -> list[MultipoleExpansion]:
-    """The remanent polarisation of a round magnet (μr = 1) as expansions that converge from `nearest` (m) on.
-
-    With `CELL_DEGREE`, to 1e-6 of the field there; a sphere is one dipole.
-    """
+    """The remanent polarisation of a round magnet as expansions that are right to 1e-6 from `nearest` (m) on."""
     if isinstance(magnet.body, Sphere):
         return [uniform_moments(magnet, 1)]
     cells = cells_of(magnet.body, nearest)
@@ -214,15 +204,14 @@ def uniform_cells(magnet: Magnet, nearest: float) -> list[MultipoleExpansion]:
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
     """Coefficients (T) of what a permeability adds, to a few per cent: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1.
 
-    The permeability is that of `body`; the remanence of `sources` makes H0, where a part, which has no closed form,
-    counts as the cuboid of its volume with the proportions of the box about it. Up to a `degree`.
+    `body`, `sources` and `degree` are as of `induced_moments`, where a part, which has no closed form, counts as the
+    cuboid of its volume with the proportions of the box about it.
     """
     closed = list(sources)
-    for k, magnet in enumerate(sources):
+    for k, (magnet, box) in enumerate((magnet, magnet.box) for magnet in sources):
         if isinstance(magnet.body, Part):
-            box = magnet.box
             size = box.size * (magnet.body.volume / box.volume) ** (1 / 3)
-            closed[k] = Magnet(Box(size, box.center, box.rotation), magnet.polarization)
+            closed[k] = Magnet(replace(box, size=size), magnet.polarization)
     return induced_moments(body, closed, degree) / (1 + body.contrast / 3)
 
 
@@ -261,7 +250,7 @@ def closed_part(
 ) -> tuple[list[Coefficients], list[Coefficients]]:
     """`added_by_closed_form` and its error: round-off, but for bodies in contact the step to finer rules.
 
-    `cut`, `magnets`, `carriers`, `degree` and `cells` are as there. Parallel boxes may touch.
+    Parallel boxes may touch. `cut`, `magnets`, `carriers`, `degree` and `cells` are as there.
     """
     if not oblique_contact([magnet.body for magnet in magnets]):
         closed = added_by_closed_form(cut, magnets, carriers, degree, None, cells)

@@ -1,13 +1,14 @@
 """Potentials of sources in free space: dipole, uniformly polarised cuboid, uniform field."""
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...geometry.common import MU_0, Array, frozen_array
+from ...geometry.common import MU_0, Array, freeze
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box
 from ..harmonics.solid import gauss_legendre
@@ -22,8 +23,7 @@ class Dipole:
     moment: Array  # (3,) A m²
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", frozen_array(self.position, (3,)))
-        object.__setattr__(self, "moment", frozen_array(self.moment, (3,)))
+        freeze(self, position=(3,), moment=(3,))
 
     def vector_potential(self, points: Array) -> Array:
         """A (n, 3), T m, at points (n, 3), m."""
@@ -104,7 +104,7 @@ class Racetrack:
     ampere_turns: float  # total current, A
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
+        freeze(self, center=(3,))
         if not 0 <= self.inner_radius < self.outer_radius <= min(self.outer) / 2:
             raise ValueError(
                 "Input outer_radius_m must lie between inner_radius_m and half the coil's shortest outer edge; "
@@ -123,59 +123,44 @@ class Racetrack:
 
     def vector_potential(self, points: Array) -> Array:
         """A (n, 3), T m, at points (n, 3), m."""
-        local = points - self.center
-        total = np.zeros_like(local)
-        for place, half_edges, direction in self._bars():
-            total += newton_potential(local - place, half_edges)[:, None] * direction
-        for place, weight, tangent in self._ring_elements():
-            offset = local - place
+
+        def of_filament(offset: Array, tangent: Array) -> Array:
             distance = np.hypot(offset[:, 0], offset[:, 1])
-            upper, lower = offset[:, 2] + self.height / 2, offset[:, 2] - self.height / 2
-            total += (weight * (np.arcsinh(upper / distance) - np.arcsinh(lower / distance)))[:, None] * tangent
-        return MU_0 * self.current_density / (4 * np.pi) * total
+            upper, lower = (np.arcsinh((offset[:, 2] + end) / distance) for end in (self.height / 2, -self.height / 2))
+            return (upper - lower)[:, None] * tangent
+
+        return self._total(points, lambda d, half, way: newton_potential(d, half)[:, None] * way, of_filament)
 
     def flux_density(self, points: Array) -> Array:
         """B (n, 3), T, at points (n, 3), m, outside the corners' winding."""
-        local = points - self.center
-        total = np.zeros_like(local)
-        for place, half_edges, direction in self._bars():
-            total += np.cross(direction, attraction(local - place, half_edges))
-        for place, weight, tangent in self._ring_elements():
-            total += weight * np.cross(tangent, self._filament_attraction(local - place))
-        return MU_0 * self.current_density / (4 * np.pi) * total
 
-    def _filament_attraction(self, offset: Array) -> Array:
-        """∫ r/r³ dz over the coil's height, 1/m times m."""
-        square = offset[:, 0] ** 2 + offset[:, 1] ** 2
-        upper, lower = offset[:, 2] + self.height / 2, offset[:, 2] - self.height / 2
-        far, near = np.sqrt(square + upper**2), np.sqrt(square + lower**2)
-        lateral = (upper / far - lower / near) / square
-        return np.stack([offset[:, 0] * lateral, offset[:, 1] * lateral, 1 / near - 1 / far], axis=1)
+        def of_filament(offset: Array, tangent: Array) -> Array:
+            square = offset[:, 0] ** 2 + offset[:, 1] ** 2
+            upper, lower = offset[:, 2] + self.height / 2, offset[:, 2] - self.height / 2
+            far, near = np.sqrt(square + upper**2), np.sqrt(square + lower**2)
+            lateral = (upper / far - lower / near) / square
+            pull = np.stack([offset[:, 0] * lateral, offset[:, 1] * lateral, 1 / near - 1 / far], axis=1)
+            return np.cross(tangent, pull)
 
-    def _bars(self) -> Iterator[tuple[Array, Array, Array]]:
-        """Centre, half edges and current direction of the straight parts."""
-        for axis, side in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            along = 1 - axis
-            length = self.outer[along] - 2 * self.outer_radius
-            if length <= 0:
-                continue
-            place, half_edges, direction = np.zeros(3), np.zeros(3), np.zeros(3)
-            place[axis] = side * (self.outer[axis] - self.width) / 2
-            half_edges[[axis, along, 2]] = self.width / 2, length / 2, self.height / 2
-            direction[along] = side if axis == 0 else -side
-            yield place, half_edges, direction
+        return self._total(points, lambda d, half, way: np.cross(way, attraction(d, half)), of_filament)
 
-    def _ring_elements(self) -> Iterator[tuple[Array, float, Array]]:
-        """Axis, weight ρ dρ dφ and tangent of the quadrature elements of the corners."""
-        radial, radial_weight = gauss_legendre(RADIAL)
-        angular, angular_weight = gauss_legendre(ANGULAR)
+    def _total(
+        self, points: Array, of_bar: Callable[..., Array], of_filament: Callable[[Array, Array], Array]
+    ) -> Array:
+        """Sum over the straight parts, and over filaments as high as the coil that stand for the corners."""
+        local, total = points - self.center, np.zeros(points.shape)
         middle = np.array([*self.outer]) / 2 - self.outer_radius
-        for sign_x, sign_y, start in QUARTERS:
-            for s, ws in zip(angular, angular_weight, strict=True):
-                angle = start + np.pi / 4 * (1 + s)
-                outward, tangent = np.array([np.cos(angle), np.sin(angle), 0]), [-np.sin(angle), np.cos(angle), 0]
-                for q, wq in zip(radial, radial_weight, strict=True):
-                    radius = self.inner_radius + self.width * (1 + q) / 2
-                    corner = np.array([sign_x * middle[0], sign_y * middle[1], 0.0])
-                    weight = radius * ws * wq * np.pi / 4 * self.width / 2
-                    yield corner + radius * outward, weight, np.array(tangent)
+        for (axis, along), side in product(((0, 1), (1, 0)), (1, -1)):
+            if middle[along] > 0:
+                place, half_edges, direction = np.zeros((3, 3))
+                place[axis] = side * (self.outer[axis] - self.width) / 2
+                half_edges[[axis, along, 2]] = self.width / 2, middle[along], self.height / 2
+                direction[along] = side if axis == 0 else -side
+                total += of_bar(local - place, half_edges, direction)
+        rules = (zip(*gauss_legendre(count), strict=True) for count in (ANGULAR, RADIAL))
+        for (*signs, start), (s, ws), (q, wq) in product(QUARTERS, *rules):
+            angle, radius = start + np.pi / 4 * (1 + s), self.inner_radius + self.width * (1 + q) / 2
+            outward = np.array([np.cos(angle), np.sin(angle), 0.0])
+            place, tangent = np.array([*signs * middle, 0.0]) + radius * outward, np.cross([0.0, 0.0, 1.0], outward)
+            total += radius * ws * wq * np.pi / 4 * self.width / 2 * of_filament(local - place, tangent)
+        return MU_0 * self.current_density / (4 * np.pi) * total

@@ -14,13 +14,14 @@ J. D. Jackson, Classical Electrodynamics (1999), § 5.9; the substitution is tha
 Int. J. Numer. Meth. Eng. 62 (2005) 564.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import permutations
 from typing import Any
 
 import heyoka as hy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...geometry.common import Array
 from ...geometry.shapes import Cylinder, Sphere
@@ -46,10 +47,7 @@ def round_tensor(body: Cylinder | Sphere, points: Array) -> Array:
     if isinstance(body, Sphere):
         tensor = _sphere(body.radius, local)[0]
     else:
-        tensor = np.sum(
-            [sign * _turned(_mantle(radius, body.height / 2, local)[0], local) for radius, sign in mantles(body)],
-            axis=0,
-        )
+        tensor = _of_mantles(body, local, slopes=False)
         tensor[:, 2, 2] -= np.where(body.distance(points) < 0, 1.0, 0.0)
     return np.asarray(turn @ tensor @ turn.T)
 
@@ -60,12 +58,13 @@ def round_slope(body: Cylinder | Sphere, points: Array) -> Array:
     Its accuracy is worse by radius over distance from the surface.
     """
     local, turn = body.to_body(points), body.rotation
-    if isinstance(body, Sphere):
-        slope = _sphere(body.radius, local)[1]
-    else:
-        parts = [(sign, _mantle(radius, body.height / 2, local, slopes=True)[1]) for radius, sign in mantles(body)]
-        slope = np.sum([sign * _turned(part, local) for sign, part in parts], axis=0)
+    slope = _sphere(body.radius, local)[1] if isinstance(body, Sphere) else _of_mantles(body, local, slopes=True)
     return np.asarray(np.einsum("ia,jb,kc,nabc->nijk", turn, turn, turn, slope, optimize=True))
+
+
+def _of_mantles(body: Cylinder, local: Array, slopes: bool) -> Array:
+    each = [(sign, _mantle(radius, body.height / 2, local, slopes)[slopes]) for radius, sign in mantles(body)]
+    return np.asarray(np.sum([sign * _turned(part, local) for sign, part in each], axis=0))
 
 
 def mantles(body: Cylinder) -> list[tuple[float, float]]:
@@ -79,9 +78,7 @@ def _sphere(radius: float, points: Array) -> tuple[Array, Array]:
     unit, inside = points / r[:, 0], (distance < radius)[:, None, None]
     one, pair = np.eye(3), unit[:, :, None] * unit[:, None, :]
     tensor = np.where(inside, -one / 3, (radius / r) ** 3 * (pair - one / 3))
-    mixed = (
-        np.einsum("ij,nk->nijk", one, unit) + np.einsum("ik,nj->nijk", one, unit) + np.einsum("jk,ni->nijk", one, unit)
-    )
+    mixed = sum(np.einsum(f"{two},n{third}->nijk", one, unit) for two, third in (("ij", "k"), ("ik", "j"), ("jk", "i")))
     slope = (radius / r[..., None]) ** 3 / r[..., None] * (mixed - 5 * np.einsum("ni,nj,nk->nijk", unit, unit, unit))
     return tensor, np.where(inside[..., None], 0.0, slope)
 
@@ -98,56 +95,55 @@ def _turned(tensor: Array, points: Array) -> Array:
     return np.asarray(np.einsum("nia,njb,nkc,nabc->nijk", turn, turn, turn, tensor, optimize=True))
 
 
-def _mantle(radius: float, half: float, points: Array, slopes: bool = False) -> tuple[Array, Array]:
+def _mantle(radius: float, half: float, points: Array, slopes: bool) -> tuple[Array, Array]:
     """H of polarisations across the axis, and B of one along it, at points turned to φ = 0; the same of the slopes."""
     rho, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
-    width, upper = _width(radius, half, rho, z), np.inf
     tensor, slope = np.zeros((len(rho), 3, 3)), np.zeros((len(rho) if slopes else 0, 3, 3, 3))
-    for least, nodes in RULES:
-        chosen, upper = np.flatnonzero((width >= least) & (width < upper)), least
-        for start in range(0, len(chosen), TOGETHER):
-            part = chosen[start : start + TOGETHER]
-            xx, yy, xz, zz, *bends = _sums(radius, half, rho[part], z[part], width[part], nodes, slopes)
-            tensor[part, 0, 0], tensor[part, 1, 1], tensor[part, 2, 2] = xx, yy, zz
-            tensor[part, 0, 2] = tensor[part, 2, 0] = xz
-            if slopes:
-                slope[part] = _symmetric_slope(*bends)
+    beyond = np.maximum((z - half) * (z + half), 0.0)
+    for part, width, nodes in _parts(radius, half, rho, z, RULES):
+        u, weights = gauss_legendre(nodes)
+        end = np.arcsinh(np.pi / width)
+        given = np.empty((8, len(part), nodes))
+        given[:3], given[3] = np.array([rho[part], z[part], beyond[part]])[:, :, None], width
+        given[4], given[5] = (u + 1) / 2 * end, weights * end * radius
+        given[6:] = np.array([radius, half])[:, None, None]
+        sums = _half_kernel(slopes)(given.reshape(8, -1)).reshape(-1, len(part), nodes).sum(axis=2)
+        xx, yy, xz, zz, *bends = sums
+        tensor[part, 0, 0], tensor[part, 1, 1], tensor[part, 2, 2] = xx, yy, zz
+        tensor[part, 0, 2] = tensor[part, 2, 0] = xz
+        if slopes:
+            xxx, xyy, xxz, yyz, xzz = bends
+            known = {(0, 0, 0): xxx, (0, 1, 1): xyy, (0, 0, 2): xxz, (1, 1, 2): yyz, (0, 2, 2): xzz}
+            for key, value in (known | {(2, 2, 2): -xxz - yyz}).items():
+                for i, j, k in set(permutations(key)):
+                    slope[part, i, j, k] = value
     return tensor, slope
 
 
-def _width(radius: float, half: float, rho: Array, z: Array) -> Array:
-    """(n,) about the angle over which the segments beside a point do most of its field."""
-    apart = np.hypot(rho - radius, np.maximum(np.abs(z) - half, 0.0))
-    return np.clip(apart / np.sqrt(np.maximum(rho, 0.1 * radius) * radius), NARROWEST, WIDEST)
+def _parts(
+    radius: float, half: float, rho: Array, z: Array, rules: Sequence[tuple[float, int]]
+) -> Iterator[tuple[NDArray[np.intp], Array, int]]:
+    """Numbers (k,) of points that one of the rules does for, and its nodes.
 
-
-def _symmetric_slope(xxx: Array, xyy: Array, xxz: Array, yyz: Array, xzz: Array) -> Array:
-    slope = np.zeros((len(xxx), 3, 3, 3))
-    known = {(0, 0, 0): xxx, (0, 1, 1): xyy, (0, 0, 2): xxz, (1, 1, 2): yyz, (0, 2, 2): xzz, (2, 2, 2): -xxz - yyz}
-    for key, value in known.items():
-        for i, j, k in set(permutations(key)):
-            slope[:, i, j, k] = value
-    return slope
-
-
-def _sums(radius: float, half: float, rho: Array, z: Array, width: Array, nodes: int, slopes: bool) -> Array:
-    """Sums over the mantle for points on the half plane φ = 0, where what is odd in φ vanishes.
-
-    xx, yy, xz, zz of the tensor, and xxx, xyy, xxz, yyz, xzz of its slope.
+    Between them the widths (k, 1), about the angle over which the segments beside a point do most of its field.
     """
-    u, weights = gauss_legendre(nodes)
-    end = np.arcsinh(np.pi / width)[:, None]
-    given = np.empty((8, len(rho), nodes))
-    beyond = np.maximum((z - half) * (z + half), 0.0)
-    given[:4] = np.array([rho, z, beyond, width])[:, :, None]
-    given[4], given[5] = (u + 1) / 2 * end, weights * end * radius
-    given[6:] = np.array([radius, half])[:, None, None]
-    return np.asarray(_half_kernel(slopes)(given.reshape(8, -1)).reshape(-1, len(rho), nodes).sum(axis=2))
+    apart = np.hypot(rho - radius, np.maximum(np.abs(z) - half, 0.0))
+    width = np.clip(apart / np.sqrt(np.maximum(rho, 0.1 * radius) * radius), NARROWEST, WIDEST)
+    upper = np.inf
+    for least, nodes in rules:
+        chosen, upper = np.flatnonzero((width >= least) & (width < upper)), least
+        for start in range(0, len(chosen), TOGETHER):
+            part = chosen[start : start + TOGETHER]
+            yield part, width[part, None], nodes
 
 
 @cache
 def _half_kernel(slopes: bool) -> Any:
-    """Compiled: what `_sums` adds of a segment, by place (3, n), angle and strength (3, n) and body (2, n)."""
+    """Compiled: what a segment adds, by place (3, n), angle and strength (3, n) and body (2, n).
+
+    On the half plane φ = 0 of the points, where what is odd in φ vanishes: xx, yy, xz, zz of the tensor, and xxx, xyy,
+    xxz, yyz, xzz of its slope.
+    """
     variables = hy.make_vars(*(f"v_{k}" for k in range(8)))
     rho, z, beyond, width, u, strength, radius, half = variables
     angle, weight = width * hy.sinh(u), strength / FOUR_PI * width * hy.cosh(u)
@@ -188,9 +184,8 @@ def segments_field(
     centre along the body axes) for a `polarization` (3,) T.
     """
     parts = [_straight_segment(position, row) for row in _segments(body, polarization).tolist()]
-    return [hy.sum([part[i] for part in parts]) for i in range(3)], whole_gradient(
-        [hy.sum([part[k] for part in parts]) for k in range(3, 8)]
-    )
+    sums = [hy.sum([part[k] for part in parts]) for k in range(8)]
+    return sums[:3], whole_gradient(sums[3:])
 
 
 def outside_derivatives(points: Array, body: Cylinder, polarization: Array, order: int) -> Array:
@@ -202,21 +197,16 @@ def outside_derivatives(points: Array, body: Cylinder, polarization: Array, orde
     turn, rho = np.arctan2(points[:, 1], points[:, 0])[:, None], np.hypot(points[:, 0], points[:, 1])
     found = np.zeros((len(points), order * (order + 2)))
     for radius, share in mantles(body):
-        width, upper = _width(radius, body.height / 2, rho, points[:, 2]), np.inf
-        for least, nodes in AROUND:
-            chosen, upper = np.flatnonzero((width >= least) & (width < upper)), least
+        for block, wide, nodes in _parts(radius, body.height / 2, rho, points[:, 2], AROUND):
             u, weights = gauss_legendre(nodes)
-            for start in range(0, len(chosen), TOGETHER):
-                block = chosen[start : start + TOGETHER]
-                wide = width[block, None]
-                end = np.arcsinh(np.pi / wide)
-                given = np.empty((12, len(block), nodes))
-                given[:3] = points[block].T[:, :, None]
-                given[3], given[4], given[5] = turn[block], wide, u * end
-                given[6] = share * radius / FOUR_PI * weights * end
-                given[7:] = np.array([body.height, radius, *polarization])[:, None, None]
-                sums = _outside_kernel(order)(given.reshape(12, -1)).reshape(-1, len(block), nodes).sum(axis=2)
-                found[block] += sums.T
+            end = np.arcsinh(np.pi / wide)
+            given = np.empty((12, len(block), nodes))
+            given[:3] = points[block].T[:, :, None]
+            given[3], given[4], given[5] = turn[block], wide, u * end
+            given[6] = share * radius / FOUR_PI * weights * end
+            given[7:] = np.array([body.height, radius, *polarization])[:, None, None]
+            sums = _outside_kernel(order)(given.reshape(12, -1)).reshape(-1, len(block), nodes).sum(axis=2)
+            found[block] += sums.T
     return found
 
 

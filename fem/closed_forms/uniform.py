@@ -23,7 +23,6 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from ...geometry.common import MU_0, Array, InputError
@@ -31,8 +30,8 @@ from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part, Solid, moved, of_one_shape
 from ..compiled_code import compiled
-from ..harmonics.expansion import MultipoleExpansion, turned_expressions, turned_field, uniform_moments
-from ..harmonics.expressions import FieldExpressions, differentiated
+from ..harmonics.expansion import MultipoleExpansion, turned_field, uniform_moments
+from ..harmonics.expressions import FieldExpressions, differentiated, turned_expressions
 from ..harmonics.solid import FOUR_PI, contracted, entries, tensors, turned_entries
 from .round import BESIDE, outside_derivatives, round_slope, round_tensor, segments_field
 
@@ -46,10 +45,9 @@ class _Corners:
     def __init__(self, position: Sequence[Expression], half_edges: Sequence[Expression]) -> None:
         self.half_edges = half_edges
         self.offset = [{s: position[a] - s * self.half_edges[a] for s in SIGNS} for a in range(3)]
-        square = [{s: d * d for s, d in axis.items()} for axis in self.offset]
-        self.distance: dict[tuple[int, ...], Expression] = {
-            (i, j, k): hy.sqrt(square[0][i] + square[1][j] + square[2][k]) for i, j, k in product(SIGNS, repeat=3)
-        }
+        x, y, z = ({s: d * d for s, d in axis.items()} for axis in self.offset)
+        corners = product(SIGNS, repeat=3)
+        self.distance = {(i, j, k): hy.sqrt(x[i] + y[j] + z[k]) for i, j, k in corners}
         self.inverse = {corner: 1.0 / r for corner, r in self.distance.items()}
 
     def edge(self, first: int, second: int, i: int, j: int) -> tuple[Expression, Expression]:
@@ -58,11 +56,7 @@ class _Corners:
         u is a coordinate across the edge. Both are written with (r1 + r2)² - L² and one reciprocal.
         """
         third = 3 - first - second
-        ends = []
-        for k in SIGNS:
-            key = [0, 0, 0]
-            key[first], key[second], key[third] = i, j, k
-            ends.append(tuple(key))
+        ends = [_corner((first, second, third), i, j, k) for k in SIGNS]
         reach, length = self.distance[ends[0]] + self.distance[ends[1]], 2 * self.half_edges[third]
         gap = reach * reach - length * length
         reciprocal, inverse_ends = 1.0 / (reach * gap), self.inverse[ends[0]] * self.inverse[ends[1]]
@@ -73,18 +67,12 @@ class _Corners:
 
         Σ_k k atan2(v w, u r) is taken as the angle of one product of complex numbers.
         """
-        second, third, parts = (axis + 1) % 3, (axis + 2) % 3, []
+        axes, parts = (axis, (axis + 1) % 3, (axis + 2) % 3), []
         for i, j in product(SIGNS, repeat=2):
-            across, v, ends = self.offset[axis][i], self.offset[second][j], []
-            for k in SIGNS:
-                key = [0, 0, 0]
-                key[axis], key[second], key[third] = i, j, k
-                ends.append((across * self.distance[tuple(key)], v * self.offset[third][k]))
-            (real_before, imaginary_before), (real, imaginary) = ends
-            angle = hy.atan2(
-                imaginary * real_before - real * imaginary_before, real * real_before + imaginary * imaginary_before
-            )
-            parts.append(i * j * angle)
+            across, v, w = (self.offset[a] for a in axes)
+            ends = [(across[i] * self.distance[_corner(axes, i, j, k)], v[j] * w[k]) for k in SIGNS]
+            (real, imaginary), (other, others) = ends
+            parts.append(i * j * hy.atan2(others * real - other * imaginary, other * real + others * imaginary))
         return hy.sum(parts)
 
     def edges(self, first: int, second: int) -> tuple[Expression, Expression, Expression]:
@@ -101,6 +89,11 @@ class _Corners:
             hy.sum([slope * self.offset[first][i] for (i, _), slope in slopes.items()]),
             hy.sum([slope * self.offset[second][j] for (_, j), slope in slopes.items()]),
         )
+
+
+def _corner(axes: Sequence[int], *signs: int) -> tuple[int, ...]:
+    """Signs along x, y and z of those along some axes."""
+    return tuple(sign for _, sign in sorted(zip(axes, signs, strict=True)))
 
 
 Tensor = dict[tuple[int, ...], Expression]
@@ -136,11 +129,11 @@ def cuboid_field(
     if not strength:
         return [zero] * 3, [[zero] * 3 for _ in range(3)]
     second, third = _box_tensors(_Corners(position, [float(half) for half in half_edges]), strength)
-    field = [hy.sum([s * second[_sorted(axis, i)] for axis, s in strength.items()]) for i in range(3)]
-    gradient = [
-        [hy.sum([s * third[_sorted(axis, i, j)] for axis, s in strength.items()]) for j in range(3)] for i in range(3)
-    ]
-    return field, gradient
+
+    def along(tensor: Tensor, *indices: int) -> Expression:
+        return hy.sum([s * tensor[_sorted(axis, *indices)] for axis, s in strength.items()])
+
+    return [along(second, i) for i in range(3)], [[along(third, i, j) for j in range(3)] for i in range(3)]
 
 
 ALL = list(combinations_with_replacement(range(3), 2))  # Entries of T, whose trace is -1 inside
@@ -269,7 +262,6 @@ class UniformField:
 
     @cached_property
     def _weights(self) -> dict[int, Array]:
-        """See `_from_kernel`, by order."""
         return {}
 
     @cached_property
@@ -308,32 +300,25 @@ class UniformField:
 
         Of cylinders and rings 1e-10, but for places in or beside them.
         """
-        entries, close = self._off_the_body(points, 2)
-        field, gradient = tensors(entries)
-        if close.any():
-            body, polarization = self.magnet.body, self.magnet.polarization_in_rotor
-            assert isinstance(body, Cylinder | Sphere)
-            field[close] = round_tensor(body, points[close]) @ polarization
-            gradient[close] = round_slope(body, points[close]) @ polarization
+        field, gradient = self._parts(points, 2)
         return field, gradient
 
     def field(self, points: Array) -> Array:
         """`evaluate`, without the gradient."""
-        field, close = self._off_the_body(points, 1)
-        if close.any():
-            assert isinstance(self.magnet.body, Cylinder | Sphere)
-            field[close] = round_tensor(self.magnet.body, points[close]) @ self.magnet.polarization_in_rotor
-        return field
+        return self._parts(points, 1)[0]
 
-    def _off_the_body(self, points: Array, order: int) -> tuple[Array, NDArray[np.bool_]]:
-        """`derivatives`, 0 at points in a round magnet or so near that its segments do not do, and which are (n,)."""
+    def _parts(self, points: Array, order: int) -> list[Array]:
         body = self.magnet.body
-        if isinstance(body, Box | Part):
-            return self.derivatives(points, order), np.zeros(len(points), bool)
+        if not isinstance(body, Cylinder | Sphere):
+            return tensors(self.derivatives(points, order))
+        # in a round magnet, or nearer than its segments do
         close = np.asarray(body.distance(points) < (0.0 if isinstance(body, Sphere) else BESIDE * body.radius))
-        found = np.zeros((len(points), order * (order + 2)))
-        found[~close] = self.derivatives(points[~close], order)
-        return found, close
+        entries = np.zeros((len(points), order * (order + 2)))
+        entries[~close] = self.derivatives(points[~close], order)
+        found = tensors(entries)
+        for part, rule in zip(found, (round_tensor, round_slope), strict=False) if close.any() else ():
+            part[close] = rule(body, points[close]) @ self.magnet.polarization_in_rotor
+        return found
 
 
 def squared_distance(columns: Array, center: Array) -> Array:

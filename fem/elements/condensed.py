@@ -166,10 +166,10 @@ def solve_open(stiffness: Any, inverse: Any, free_dofs: Any, load: Any, boundary
         return np.where(free, target.FV().NumPy(), 0.0)
 
     shape = (len(free), len(free))
-    full = scipy.sparse.linalg.LinearOperator(
-        shape, matvec=lambda x: multiply(stiffness.mat, x) + np.where(free, boundary.apply(x), 0.0), dtype=float
-    )
-    preconditioner = scipy.sparse.linalg.LinearOperator(shape, matvec=lambda x: multiply(inverse, x), dtype=float)
+    operators = (
+        lambda x: multiply(stiffness.mat, x) + np.where(free, boundary.apply(x), 0.0), lambda x: multiply(inverse, x)
+    )  # fmt: skip
+    full, preconditioner = (scipy.sparse.linalg.LinearOperator(shape, matvec=f, dtype=float) for f in operators)
     # the factor of the ball with the Robin term is nearly the inverse: some ten iterations
     right_hand_side = np.where(free, load.vec.FV().NumPy(), 0.0)
     result, failed = scipy.sparse.linalg.cg(full, right_hand_side, rtol=1e-12, maxiter=100, M=preconditioner)

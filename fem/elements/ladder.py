@@ -108,7 +108,6 @@ def _image_numbers(
 def _images(
     center: Array, coefficients: Coefficients, planes: tuple[int, ...], signs: tuple[int, ...]
 ) -> list[tuple[Array, Coefficients]]:
-    """Centres and coefficients of a body and its mirror images, from the share on the positive side of the planes."""
     found = [(center, coefficients)]
     for plane, sign in zip(planes, signs, strict=True):
         reflected = [(place * meshes.mirror(plane), sign * mirrored_harmonics(part, plane)) for place, part in found]
@@ -296,7 +295,6 @@ def potential_slopes(solution: RotorSolution, points: Array, beside: Array) -> t
 
 
 def _in_mesh(solution: RotorSolution, points: Array) -> Array:
-    """Points (n, 3) in the mesh's coordinates, without regard to mirrors."""
     symmetry, mesh = solution.symmetry, solution.mesh
     return ((points - symmetry.center) @ symmetry.axes - mesh.center) / mesh.unit
 

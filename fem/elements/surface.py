@@ -162,7 +162,6 @@ class Surface:
 
     @cached_property
     def _coarse(self) -> dict[int, tuple[Array, Array, Array]]:
-        """See `coarse`, as far as they are asked for."""
         return {}
 
     def _fewer(self, count: int) -> tuple[Array, Array, Array]:
@@ -195,7 +194,6 @@ class _BoxSurface(Surface):
 
     @staticmethod
     def _order(axis: int) -> list[int]:
-        """The axes along a face, and that across it."""
         return [(axis + 1) % 3, (axis + 2) % 3, axis]
 
     def _faces(self, rules: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, Array]:
@@ -222,7 +220,6 @@ class _BoxSurface(Surface):
         return order, seen, self.half[order[:2]], (self.counts[order[0]], self.counts[order[1]])
 
     def _image(self, axis: int) -> NDArray[np.intp]:
-        """(n,) the nodes' mirror images at the plane across an axis."""
         found = np.empty(len(self.places), int)
         for (across, side), mine in self.numbers.items():
             opposite = across == axis

@@ -38,8 +38,6 @@ ALIKE = 1e-11  # differences of turns, and of places in circumradii, below which
 
 @dataclass(frozen=True)
 class _View:
-    """How bodies of one shape see those of another (or the same) at one of the distances, in the frames of these."""
-
     far: int  # 0: near, else which of `FAR`
     seer: int  # number of the shape
     seen: int
@@ -272,6 +270,5 @@ def _field(places: Array, amounts: Array, points: Array) -> Array:
 
 
 def _times(matrix: Array, values: Array) -> Array:
-    """(k, ...): a matrix (k, l) times values (l, ...)."""
     found = matrix @ values.reshape(len(values), -1)
     return np.asarray(found.reshape(len(matrix), *values.shape[1:]))

@@ -9,13 +9,13 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from ...geometry.common import Array, frozen_array
+from ...geometry.common import Array, freeze
 from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part, Solid
 from . import solid
-from .expressions import FieldExpressions, harmonic_sums, whole_gradient
+from .expressions import FieldExpressions, harmonic_sums, turned_expressions, whole_gradient
 from .interior import Ball, moment
 from .solid import FOUR_PI, Coefficients
 
@@ -89,8 +89,7 @@ class MultipoleExpansion:
     axes: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen_array(self.center, (3,)))
-        object.__setattr__(self, "axes", frozen_array(self.axes, (3, 3)))
+        freeze(self, center=(3,), axes=(3, 3))
 
     @property
     def degree(self) -> int:
@@ -125,10 +124,7 @@ class MultipoleExpansion:
         return sums[:3], whole_gradient(sums[3:])
 
     def derivatives(self, points: Array, order: int) -> Array:
-        """B and its derivatives by place up to `order` - 1, by their `entries` (n, order (order + 2)), T, T/m, ...
-
-        At `points` (n, 3) m, wherever they are: where the series diverges they are large, at the centre not finite.
-        """
+        """B and its derivatives up to `order` - 1, by their `entries` (n, k), at `points` (n, 3) m anywhere."""
         return summed_derivatives([self], points, order)
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
@@ -186,11 +182,6 @@ def _slopes(coefficients: Coefficients, radius: Array | float, order: int) -> li
     size = coefficients.shape[-1] + order
     nothing = [(0, 0)] * (coefficients.ndim - 2)
     return [np.pad(part, [*nothing, *[(0, size - part.shape[-1])] * 2]) for part in found.values()]
-
-
-def turned_expressions(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:
-    """A `vector` along the columns of `axes`, along the outer ones."""
-    return [hy.sum([float(f) * part for f, part in zip(row, vector, strict=True) if f]) for row in axes]
 
 
 def turned_field(axes: Array, field: FieldExpressions) -> FieldExpressions:
@@ -278,12 +269,9 @@ def trimmed_expansions(
 ) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
     """The coefficients that matter, and what they leave out.
 
-    The fields of `expansions` add up, of which `allowed` (n,) T may be left out at `points` (n, 3) m; up to `most`
-    coefficients are fitted.
-
-    The smallest ones are left out first. Those that stay are fitted to the whole field (weighted least squares), and
-    stand in for what is missing: little more than half as many do then. Dipole moments stay as they are.
-    Coefficients are those along each expansion's own axes, where its expressions are written.
+    The fields of `expansions` add up, of which `allowed` (n,) T may be left out at `points` (n, 3) m. The smallest
+    coefficients, along each expansion's own axes, are left out first; up to `most` that stay are fitted to the whole
+    field (weighted least squares): little more than half as many do then. Dipole moments stay as they are.
     """
     parts = np.array(
         [
@@ -333,10 +321,8 @@ def trimmed_expansions(
     kept = np.concatenate([kept, parts[fixed]])
     parts = np.concatenate([kept, parts])
     parts["value"][: len(kept)] *= -1
-    return (
-        [_with(e, kept, k) for k, e in enumerate(expansions)],
-        [_with(e, parts, k) for k, e in enumerate(expansions)],
-    )
+    first, second = ([_with(e, some, k) for k, e in enumerate(expansions)] for some in (kept, parts))
+    return first, second
 
 
 def _fewest(
@@ -374,7 +360,6 @@ def _fitted(fields: Array, total: Array) -> Array | None:
 
 
 def _largest(field: Array) -> float:
-    """The largest size of vectors (n, 3)."""
     return float(np.sqrt(np.einsum("ni,ni->n", field, field).max(initial=0.0)))
 
 
@@ -413,7 +398,7 @@ class FittedExpansions:
     def __init__(self, centers: Array, radii: Array, degree: int, points: Array, allowed: Array) -> None:
         nothing, self.points, self._allowed = np.zeros((degree + 1, degree + 1), complex), points, allowed
         self._empty = [MultipoleExpansion(*one, nothing) for one in zip(centers, radii.tolist(), strict=True)]
-        parts = [(l, m, 1j if part else 1.0) for l, m, part in solid.members(degree) if l]
+        parts = [(l, m, 1j if part else 1.0) for l, m, part in solid.members(degree, 1)]
         degrees = np.tile([part[0] for part in parts], len(centers))
         # the highest degree last, so that the factor without it is a corner of the whole
         order, self._fewer = np.argsort(degrees, kind="stable"), int(np.sum(degrees < degree))
@@ -434,10 +419,8 @@ class FittedExpansions:
         That is the error of one degree less, three or four times their own.
         """
         right = self._columns @ (field / self._allowed[:, None]).ravel()
-        whole, fewer = (
-            scipy.linalg.cho_solve((self._factor[:count, :count], True), right[:count]) / self._size[:count]
-            for count in (len(right), self._fewer)
-        )
+        ends = slice(len(right)), slice(self._fewer)
+        whole, fewer = (scipy.linalg.cho_solve((self._factor[e, e], True), right[e]) / self._size[e] for e in ends)
         step = np.concatenate([whole[: self._fewer] - fewer, whole[self._fewer :]])
         return self._made(whole), self._made(step)
 

@@ -30,6 +30,17 @@ FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
 
 
+def weighted(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
+    """Σ weight · term, where weights of zero cost nothing."""
+    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
+
+
+def turned_expressions(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:
+    """A `vector` along the columns of `axes`, along the outer ones."""
+    exact = np.where(np.abs(axes) < 1e-15, 0.0, axes)  # a quarter turn leaves 6e-17, which would cost operations
+    return [weighted(row, vector) for row in exact]
+
+
 def whole_gradient(entries: Sequence[hy.expression]) -> list[list[hy.expression]]:
     """Symmetric traceless gradient (3 × 3) from its entries in `UPPER`."""
     upper = dict(zip(UPPER, entries, strict=True))

@@ -147,10 +147,8 @@ def from_outer(sums: Sequence[Coefficients], radii: Array, centers: Array, ball:
     l, total = np.arange(degree + 1), np.zeros((degree + 1, degree + 1), complex)
     for each, sizes, ratio in zip(sums, values, radii / ball.radius, strict=True):
         last = len(each) - 1
-        (known, zero), (given, middle) = (
-            solid.both_signs(sizes[: last + degree + 1, : last + degree + 1]),
-            solid.both_signs(each),
-        )
+        known, zero = solid.both_signs(sizes[: last + degree + 1, : last + degree + 1])
+        given, middle = solid.both_signs(each)
         shifts = sliding_window_view(known[:, zero - last : zero + last + degree + 1], (degree + 1, degree + 1))
         part = np.einsum("ab,abij->ij", given[:, middle - last : middle + last + 1], shifts)
         total += ((-1.0) ** l * ratio ** (1.0 - l))[:, None] * part
@@ -233,10 +231,7 @@ def real_weights(coefficients: Coefficients) -> Array:
 @cache
 def _real_values(degree: int) -> Array:
     """(K, n): R_k up to one degree less at the points of `sphere`."""
-    (l, m, part), sizes = real_basis(degree - 1)[0].T, real_basis(degree - 1)[1]
-    known = regular_values(degree - 1, *sphere(degree, MORE)[0].T)
-    values = np.array([known[key] for key in zip(l.tolist(), m.tolist(), strict=True)]) / sizes[l, m][:, None]
-    return np.asarray(np.where(part[:, None], values.imag, values.real))
+    return harmonics(degree - 1, sphere(degree, MORE)[0])[0].T
 
 
 @dataclass(frozen=True)
@@ -323,20 +318,14 @@ class BallField:
         incident = _by_normal_field(np.sum(field * normals, axis=1), self.degree, MORE)
         parts = -gradient_coefficients(incident)
         slopes = gradient_coefficients(parts)[tuple(np.transpose(UPPER))] / ball.radius
-        weights = [
-            np.array([real_weights(one) for one in group]) * kept
-            for group, kept in zip((parts, slopes), self._kept, strict=True)
-        ]
+        groups = zip((parts, slopes), self._kept, strict=True)
+        weights = [np.array([real_weights(one) for one in group]) * kept for group, kept in groups]
         basis = _real_values(self.degree)
-        misses = [_relative_miss(w @ basis[: w.shape[1]] - v, v) for w, v in zip(weights, known, strict=True)]
+        misses = []
+        for weight, values in zip(weights, known, strict=True):
+            missed = np.sum((weight @ basis[: weight.shape[1]] - values) ** 2, axis=0).max()
+            misses.append(float(np.sqrt(missed / (np.mean(np.sum(values**2, axis=0)) or 1.0))))
         return np.concatenate([ball.center, [1 / ball.radius], *(w.ravel() for w in weights)]), max(misses)
-
-
-def _relative_miss(missed: Array, values: Array) -> float:
-    """Largest norm of what is missed (k, n) by the root mean square of the norm of the values (k, n)."""
-    size = float(np.sqrt(np.mean(np.sum(values**2, axis=0))))
-    worst = float(np.sqrt(np.max(np.sum(missed**2, axis=0))))
-    return worst / size if size else worst
 
 
 DENOMINATOR = 1000  # Largest of the entries of `matrices`
@@ -344,18 +333,13 @@ DENOMINATOR = 1000  # Largest of the entries of `matrices`
 
 def harmonics(degree: int, points: Array) -> tuple[Array, Array]:
     """R_k (n, K) and their gradients (n, K, 3) at points (n, 3), up to a degree."""
-    complex_ones = regular_values(degree, *np.ascontiguousarray(points.T))
+    known = regular_values(degree, *np.ascontiguousarray(points.T))
+    known |= {(l, -m): (-1.0) ** m * np.conj(value) for (l, m), value in known.items()}
     zero, sizes = np.zeros(len(points), complex), real_basis(degree)[1]
     values, slopes = [], []
-
-    def known(l: int, m: int) -> NDArray[np.complex128]:
-        if l < 0 or abs(m) > l:
-            return zero
-        return np.asarray((-1.0) ** m * np.conj(complex_ones[l, -m]) if m < 0 else complex_ones[l, m])
-
     for l, m, imaginary in members(degree):
-        upper, lower = known(l - 1, m + 1), known(l - 1, m - 1)
-        parts = known(l, m), (upper - lower) / 2, (upper + lower) / 2j, known(l - 1, m)
+        upper, lower, below = (known.get((l - 1, m + k), zero) for k in (1, -1, 0))
+        parts = known[l, m], (upper - lower) / 2, (upper + lower) / 2j, below
         value, *slope = ((part.imag if imaginary else part.real) / sizes[l, m] for part in parts)
         values.append(value)
         slopes.append(np.stack(slope, axis=1))

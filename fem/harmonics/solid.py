@@ -317,9 +317,9 @@ def turned_entries(values: Array, axes: Array) -> Array:
     return np.concatenate(found, axis=1)
 
 
-def members(degree: int) -> list[Member]:
+def members(degree: int, lowest: int = 0) -> list[Member]:
     """All real harmonics up to a degree, the lowest degrees first."""
-    return [(l, m, part) for l in range(degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
+    return [(l, m, part) for l in range(lowest, degree + 1) for m in range(l + 1) for part in (0, 1)[: 1 + (m > 0)]]
 
 
 def real_terms(coefficients: Coefficients) -> dict[Member, float]:

@@ -8,12 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...geometry.common import Array
-from ..harmonics.solid import (
-    Coefficients,
-    field_sizes,
-    irregular_gradient,
-    irregular_values,
-)
+from ..harmonics.solid import Coefficients, field_sizes, irregular_gradient, irregular_values
 
 
 @dataclass(frozen=True, eq=False)

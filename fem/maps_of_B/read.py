@@ -166,7 +166,6 @@ def _titles(line: str, separator: str | None, below: list[str]) -> list[str]:
 
 
 def _maxwell(lines: list[str]) -> _Table | None:
-    """Maxwell's export of a field, `.fld`; its grid shows whether the coordinates are in m."""
     for number, line in enumerate(lines[:HEADER_LINES], 1):
         if not (found := VECTOR_DATA.fullmatch(line)):
             continue
@@ -244,8 +243,6 @@ LARGEST_FILE = 1_000_000_000
 
 @dataclass(frozen=True)
 class _Source:
-    """What every kind of file has."""
-
     titles: Sequence[str]  # of all columns
     said: Mapping[int, str]  # units by number, whatever the titles say
     # units of length and of B of titles without one, if files of the kind have them

@@ -140,9 +140,8 @@ def _way_out(likely: Sequence[tuple[str, str]], read_as: tuple[str, str]) -> str
             ways += [[form.format(**w, unit=u, read=r, plain=u.replace("µ", "u")) for w, u, r in changed]]
         return ", or ".join(map(" and ".join, ways))
 
-    return (
-        f": probably {said(guess)}. Correct the unit in the file (a title such as {said(title)}), or set {said(key)}."
-    )
+    way = f"Correct the unit in the file (a title such as {said(title)}), or set {said(key)}."
+    return f": probably {said(guess)}. {way}"
 
 
 def _require_no_zeros(field_map: FieldMap, magnets: Sequence[Magnet], radius: float) -> None:
@@ -212,10 +211,8 @@ class GriddedTable:
 
     def _spread(self, points: Array) -> tuple[Array, Array]:
         """Root mean square (n,) of the deviations of B (T) and of its gradient (T/m) at points (n, 3) m."""
-        values = sum(
-            outer_sums(parts, (points - e.center) / e.radius)
-            for e, parts in zip(self.expansions.expansions, self._derivatives, strict=True)
-        )
+        pairs = zip(self.expansions.expansions, self._derivatives, strict=True)
+        values = sum(outer_sums(parts, (points - e.center) / e.radius) for e, parts in pairs)
         squares = np.square(values).reshape(len(points), -1, 9).mean(axis=1)
         return np.sqrt(squares[:, :3].sum(axis=1)), np.sqrt(squares[:, 3:] @ TWICE)
 

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, permutations
+from itertools import combinations
 
 import numpy as np
 import scipy
@@ -66,15 +66,12 @@ def mutual_errors(
             added, unsure = both.total - both.rigid, both.differing(coarse)
             field, gradient = field_at_center(both.own), gradient_at_center(both.own, floater.radius)
             _, force, torque = table.added(place[None], floater.moment * direction[None], field[None], gradient[None])
-            missed = [
-                np.linalg.norm(estimated - true) + CHARGED * np.linalg.norm(step)
-                for estimated, true, step in zip(
-                    (force[0], torque[0]), (added.force, added.torque), (unsure.force, unsure.torque), strict=True
-                )
-            ]
-            arm = floater.radius * np.linalg.norm(added.force)
-            sizes = np.linalg.norm(added.force), max(float(np.linalg.norm(added.torque)), 0.1 * float(arm))
-            worst = np.maximum(worst, np.array(missed) / np.maximum(np.array(sizes), np.finfo(float).tiny))
+            true, step = (np.array([one.force, one.torque]) for one in (added, unsure))
+            missed, steps, sizes = (
+                np.linalg.norm(part, axis=1) for part in (np.concatenate([force, torque]) - true, step, true)
+            )
+            sizes[1] = max(sizes[1], 0.1 * floater.radius * sizes[0])
+            worst = np.maximum(worst, (missed + CHARGED * steps) / np.maximum(sizes, np.finfo(float).tiny))
         errors.append(taken.safety * worst + MEANS * apart)
     return np.array(GAPS) * floater.radius, np.array(errors)
 
@@ -111,10 +108,7 @@ SPARE, LEAST = 1.1, 0.5
 
 
 def mutual_table(
-    magnets: tuple[Magnet, ...],
-    floater: Floater,
-    watch: Watch = unwatched,
-    like: MutualTable | None = None,
+    magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = unwatched, like: MutualTable | None = None
 ) -> MutualTable:
     """Mutual magnetisation of a rotor and a spherical floater.
 
@@ -183,7 +177,6 @@ def _enough_samples(grids: Sequence[ResponseGrid], facing: int) -> float:
 
 
 def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
-    """Points along the edges of one of a `number` of magnets, where it responds to a floater of this `radius`, m."""
     enough = formulas.point_counts(formulas.response_box(magnet.body), (1 + NEAREST) * radius, effort(number).digits)
     x, y, z = enough if number == 1 else np.minimum(enough, MOST).tolist()
     return x, y, z
@@ -260,10 +253,8 @@ def _rotor_fit(
         found = least_squares(alone, beyond, np.zeros(number, bool))
     found[:number] += least_squares(alone, direct, np.zeros(number, bool))
     parts = iter(np.split(found, ends))
-    made = [
-        replace(grid, strengths=np.stack([kind @ next(parts) for _ in range(3)], axis=1))
-        for grid, kind in zip(grids, kinds, strict=True)
-    ]
+    strengths = [np.stack([kind @ next(parts) for _ in range(3)], axis=1) for kind in kinds]
+    made = [replace(grid, strengths=part) for grid, part in zip(grids, strengths, strict=True)]
     coupling = np.zeros((whole.shape[1], whole.shape[1]))
     coupling[a, b] = coupling[b, a] = next(parts)
     return made, coupling
@@ -317,26 +308,23 @@ def mutual_table_beside(
 def sphere_fit(
     grids: Sequence[ResponseGrid], single: bool, images: Array, places: Array, samples: Sequence[Array]
 ) -> tuple[list[ResponseGrid], Array]:
-    """Weights of the points' powers, and of pairs of magnets, that give energy and force of the sphere's response.
+    """`grids` with `degrees`, and weights of pairs, that give the `samples` of `sphere_samples` at `places` (n, 3) m.
 
-    `grids` are those whose `degrees` are sought; `single`: whether each point has a weight of its own, and not its
-    class alone; `images` are the weights of the sphere's images, `samples` what `sphere_samples` gives at `places`
-    (n, 3) m.
+    `single`: whether each point has a weight of its own, and not its class alone; `images`: weights of the sphere's.
     """
     energy, force, energy_size, force_size = samples
 
     def of_points(direction: Array, field: Array, change: Array) -> Array:
         return -np.concatenate([(field @ direction)[..., None], direction @ change], axis=-1)
 
-    pairs, still = list(combinations(range(len(grids)), 2)), np.zeros_like(places)
-    sums = [formulas.pair_sum(grids[a], grids[b], images, effort(len(grids)).charges) for a, b in pairs]
-    derivatives = [one.derivatives(places, still, 1) for one in sums]
+    pairs, number = np.triu_indices(len(grids), 1), effort(len(grids)).charges
+    sums = [formulas.charge_sum(grids[a], grids[b], images, number) for a, b in zip(*pairs, strict=True)]
+    derivatives = [one.derivatives(places, np.zeros_like(places), 1) for one in sums]
     others = [np.column_stack([value, slope[:, :3]]) for value, slope, _ in derivatives]
     right, sizes = np.column_stack([energy, -force]), np.column_stack([energy_size, *[force_size] * 3])
     found, weights = _fitted(grids, single, formulas.POWERS, places, of_points, others, right, sizes, PENALTY)
     coupled = np.zeros((len(grids), len(grids)))
-    for (a, b), weight in zip(pairs, weights, strict=True):
-        coupled[a, b] = coupled[b, a] = weight
+    coupled[pairs] = coupled[pairs[::-1]] = weights
     return [replace(grid, degrees=part) for grid, part in zip(grids, found, strict=True)], coupled
 
 
@@ -348,11 +336,9 @@ def returned_fit(
     places: Array,
     samples: tuple[Array, Array],
 ) -> tuple[list[ResponseGrid], Array]:
-    """Weights of the points' powers, and of pairs, that give V and its slopes.
+    """`grids` with `returned`, and weights of pairs, that give the `samples` of `returned_samples` at `places`.
 
-    `grids` are those whose `returned` are sought; `single` and `images` are as of `sphere_fit`; `inner` (k, 3) m of
-    each magnet are points that respond for the whole of it, `samples` what `returned_samples` gives at `places` (n, 3)
-    m.
+    `single` and `images` are as of `sphere_fit`; `inner` (k, 3) m of each magnet respond for the whole of it.
     """
     field, change = samples
 
@@ -360,9 +346,9 @@ def returned_fit(
         # the energy is -M·V
         return -np.concatenate([field, change.reshape(*change.shape[:-2], 9)], axis=-1)
 
-    pairs, still = list(permutations(range(len(grids)), 2)), np.zeros_like(places)
-    sums = [formulas.mixed_sum(grids[a], inner[b], images, effort(len(grids)).reflected) for a, b in pairs]
-    derivatives = [one.derivatives(places, still) for one in sums]
+    pairs, number = np.nonzero(~np.eye(len(grids), dtype=bool)), effort(len(grids)).reflected
+    sums = [formulas.charge_sum(grids[a], inner[b], images, number) for a, b in zip(*pairs, strict=True)]
+    derivatives = [one.derivatives(places, np.zeros_like(places)) for one in sums]
     others = [-rows(slope[:, 3:], second[:, 3:, :3]) for _, slope, second in derivatives]
     right, each = rows(field, change), (np.linalg.norm(field, axis=1), np.linalg.norm(change, axis=(1, 2)))
     sizes = np.repeat(np.column_stack(each), (3, 9), axis=1)
@@ -370,8 +356,7 @@ def returned_fit(
         grids, single, formulas.RETURNED, places, lambda _, *known: rows(*known), others, right, sizes, 10 * PENALTY
     )
     mixed = np.zeros((len(grids), len(grids)))
-    for (a, b), weight in zip(pairs, weights, strict=True):
-        mixed[a, b] = weight
+    mixed[pairs] = weights
     return [replace(grid, returned=part) for grid, part in zip(grids, found, strict=True)], mixed
 
 

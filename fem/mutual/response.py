@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,23 +78,6 @@ MOMENTS = 10  # degrees at most of a far magnet's moments; where more are needed
 ACROSS = 8  # of a rule in a magnet for what its second permeability adds to its own field
 
 
-class RotorResponse(Protocol):
-    """A rotor that responds to fields."""
-
-    @property
-    def magnets(self) -> tuple[Magnet, ...]:
-        """The bodies."""
-
-    def own_field(self, ball: Ball, degree: int) -> Coefficients:
-        """Coefficients a_lm (T) of the rotor's field alone, its permeability included, about the ball's centre."""
-
-    def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
-        """Response field of the magnets: its coefficients a_lm (T) about the ball's centre.
-
-        `sources` c_lm (T) are in the `ball`; `degree` is the highest of the coefficients.
-        """
-
-
 def isotropic(magnet: Magnet, permeability: float) -> Magnet:
     """The magnet with one recoil permeability."""
     return replace(magnet, recoil_permeability=permeability, transverse_permeability=None)
@@ -112,9 +94,7 @@ class ChargeResponse:
     """
 
     def __init__(self, magnets: tuple[Magnet, ...], count: int, own: int | None = None) -> None:
-        means = [
-            m.recoil_permeability if m.isotropic else float(np.trace(m.permeability_in_rotor)) / 3 for m in magnets
-        ]
+        means = [m.recoil_permeability if m.isotropic else np.trace(m.permeability_in_rotor) / 3 for m in magnets]
         self.magnets, carriers = magnets, magnets
         self.permeable = any(magnet.contrast for magnet in magnets)
         self._shares = np.array([1 / (1 + (mean - 1) / 2) for mean in means])  # c/χ
@@ -150,7 +130,10 @@ class ChargeResponse:
         return found
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
-        """See `RotorResponse`; of each magnet the degrees that its own distance asks for, by moments if it is far."""
+        """Coefficients a_lm (T) of the rotor's field alone, its permeability included, about the ball's centre.
+
+        Of each magnet those degrees that its own distance asks for, by moments if it is far.
+        """
         found, share = np.zeros((degree + 1, degree + 1), complex), -degree * _decay(self.magnets, ball)
         bodies = [magnet.body for magnet in self.magnets]
         centers, radii = np.array([b.center for b in bodies]), np.array([b.circumradius for b in bodies])
@@ -175,7 +158,7 @@ class ChargeResponse:
         return found + interior.from_magnetization(*self._across, ball, degree) if across else found
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
-        """See `RotorResponse`."""
+        """The response a_lm (T), up to a `degree`, about the centre of a `ball` to `sources` c_lm (T) in it."""
         if not self.permeable:
             return np.zeros((degree + 1, degree + 1), complex)
         surface, inside, tensors = self._around(ball, degree)
@@ -185,7 +168,6 @@ class ChargeResponse:
         return surface.of_charges(self.charges.areas * beyond) + inside.of_magnetization(induced)
 
     def _around_ball(self, ball: Ball, degree: int) -> tuple[Surroundings, Surroundings, Array]:
-        """Places of charges and of the first part, for coefficients up to a degree, and the latter's tensors."""
         points, tensors = self.direct([float(magnet.body.distance(ball.center)) for magnet in self.magnets])
         return Surroundings(self.charges.places, ball, degree), Surroundings(points, ball, degree), tensors
 
@@ -272,14 +254,14 @@ class TwoBody:
     terms: int  # of the series
     tail: float  # estimated relative error by the degrees left out, of what the responses add
 
-    def differing(self, rotor: RotorResponse) -> Wrench:
+    def differing(self, rotor: ChargeResponse) -> Wrench:
         """By how much another rotor's response to the rigid dipole adds less: most of what its response differs by."""
         dipole = self.permanent[:3, :3]  # on which a field of the second degree acts at most
         return self.rotor_answer - _wrench(rotor.answer(dipole, self.ball, 2), dipole, self.ball)
 
 
 def two_body(
-    rotor: RotorResponse,
+    rotor: ChargeResponse,
     floater: Floater,
     position: Array,
     direction: Array,
@@ -299,9 +281,8 @@ def two_body(
     degree = degree or enough_degree(rotor.magnets, ball)
     for k, magnet in enumerate(rotor.magnets):
         if sphere_overlap(ball.center, ball.radius, magnet.body) > TOUCHING:
-            raise TwoBodyError(
-                f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
-            )
+            text = f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
+            raise TwoBodyError(text)
     own = rotor.own_field(ball, degree)
     permanent = interior.dipole_sources(floater.moment * np.asarray(direction, float), ball, degree)
     reflected = rotor.answer(permanent, ball, degree)
@@ -331,19 +312,16 @@ def two_body(
 
 
 def two_body_ladder(
-    rotors: Sequence[RotorResponse], floater: Floater, position: Array, direction: Array
+    rotors: Sequence[ChargeResponse], floater: Floater, position: Array, direction: Array
 ) -> tuple[TwoBody, Wrench]:
     """Both bodies with the finest elements, and how far the two finest are apart: an error estimate of the total.
 
     `rotors` have elements of growing degree; `floater`, `position` and `direction` are as of `two_body`.
     """
     coarse, fine = (two_body(rotor, floater, position, direction) for rotor in rotors[-2:])
-    apart = fine.total - coarse.total
-    added = fine.total - fine.rigid
-    return fine, Wrench(
-        np.abs(apart.force) + fine.tail * np.linalg.norm(added.force),
-        np.abs(apart.torque) + fine.tail * np.linalg.norm(added.torque),
-    )
+    apart, added = fine.total - coarse.total, fine.total - fine.rigid
+    pairs = (apart.force, added.force), (apart.torque, added.torque)
+    return fine, Wrench(*(np.abs(step) + fine.tail * np.linalg.norm(whole) for step, whole in pairs))
 
 
 def _wrench(incident: Coefficients, sources: Coefficients, ball: Ball) -> Wrench:
@@ -351,17 +329,15 @@ def _wrench(incident: Coefficients, sources: Coefficients, ball: Ball) -> Wrench
 
 
 def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float], number: int, seed: int) -> Array:
-    """Centres (n, 3) m of floaters beside magnets, where they fit.
+    """Centres (n, 3) m of floaters of a `radius` (m) beside `magnets`, where they fit.
 
-    At `gaps` from a magnet, in floater radii (`radius`, m), in a `number` of random directions for each gap and magnet,
-    by a `seed`.
+    At `gaps` in floater radii, in a `number` of random directions for each gap and magnet, by a `seed`.
     """
     generator, found = np.random.default_rng(seed), []
-    for magnet in magnets:
-        for gap in gaps:
-            directions = generator.normal(size=(number, 3))
-            directions /= np.linalg.norm(directions, axis=1)[:, None]
-            found.append(places_off(magnet.body, directions, (1 + gap) * radius))
+    for magnet, gap in product(magnets, gaps):
+        directions = generator.normal(size=(number, 3))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        found.append(places_off(magnet.body, directions, (1 + gap) * radius))
     return _clear(magnets, np.concatenate(found), (1 + min(gaps)) * radius)
 
 
@@ -383,7 +359,6 @@ def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
 
 
 def _clear(magnets: Sequence[Magnet], places: Array, distance: float) -> Array:
-    """Those of the places (n, 3) m that are no nearer to any magnet than a distance, m."""
     nearest = np.min([magnet.body.distance(places) for magnet in magnets], axis=0)
     return np.asarray(places[nearest >= distance * (1 - 1e-6)])
 
@@ -449,9 +424,8 @@ def returned_samples(
 
     The energy is -M·V of the moment M. A unit moment and the sphere's response to B0 are sources, the rotor responds to
     both, and the sphere to its response to the moment: the forces of the three are the derivatives of V. Field (n, 3) T
-    at the sphere's centre, and (n, 3, 3) T/m: its change as the sphere moves along x, y, z; at `places` (n, 3) m of the
-    centre of `floater`. `grids`, `inner` (k, 3) m and `coupling` are points and weights that respond for `rotor`, see
-    `MutualTable`. `watch` is called with the progress.
+    at the centre of `floater` at `places` (n, 3) m, and (n, 3, 3) T/m: its change as that moves along x, y, z. `grids`,
+    `inner` (k, 3) m and `coupling` respond for `rotor`, see `MutualTable`. `watch` is called with the progress.
     """
     fields, slopes = [], []
 

@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from itertools import permutations, product
+from itertools import product
 from typing import Any, NamedTuple
 
 import heyoka as hy
@@ -28,6 +28,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Solid
 from ..compiled_code import compiled
+from ..harmonics.expressions import turned_expressions
 from ..harmonics.solid import FOUR_PI, Coefficients, factorials, gauss_legendre
 
 # β of the images, and the degree up to which their weights are fitted from 2 on: to 7e-4 of t_l
@@ -169,9 +170,8 @@ def mixed_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any]
     slope = hy.diff_tensors([response_to_charge(a, given, row[8:])], diff_args=given, diff_order=1).gradient
     field = [hy.subs(part, {str(v): value for v, value in zip(given, b, strict=True)}) for part in slope]
     inverse = 1.0 / hy.sum([x * x for x in b])
-    along, pointing, both = (
-        hy.sum([x * y for x, y in zip(u, v, strict=True)]) for u, v in ((b, field), (b, moment), (moment, field))
-    )
+    pairs = (b, field), (b, moment), (moment, field)
+    along, pointing, both = (hy.sum([x * y for x, y in zip(u, v, strict=True)]) for u, v in pairs)
     return share * (row[6] * (inverse * hy.sqrt(inverse) * (3.0 * inverse * along * pointing - both)))
 
 
@@ -199,14 +199,9 @@ class EnergySum:
 
     def expression(self, position: Sequence[Any], moment: Sequence[Any], share: Any) -> hy.expression:
         """The sum (J times share²) at a position (3 expressions, m) of a moment (A m² times `share`)."""
-        place = self._along([x - float(c) for x, c in zip(position, self.origin, strict=True)])
-        pointing = self._along(moment)
+        away = [x - float(c) for x, c in zip(position, self.origin, strict=True)]
+        place, pointing = (turned_expressions(self.axes.T, vector) for vector in (away, moment))
         return hy.sum([self.formula(place, pointing, row, share) for row in self.rows.tolist()])
-
-    def _along(self, vector: Sequence[Any]) -> list[Any]:
-        """Components along the axes of a vector in the rotor's frame; what a turn leaves of a zero costs nothing."""
-        exact = np.where(np.abs(self.axes.T) < 1e-15, 0.0, self.axes.T)
-        return [hy.sum([float(r) * v for r, v in zip(row, vector, strict=True) if r]) for row in exact]
 
     def derivatives(self, places: Array, moments: Array, order: int = 2) -> tuple[Array, Array, Array]:
         """The energy and its first and second derivatives by place (m) and moment (A m²), in this order.
@@ -311,7 +306,6 @@ class ResponseGrid:
             yield turned, slope + (size * inverse)[..., None] * steep
 
     def energy(self) -> EnergySum:
-        """Of all points."""
         same = np.broadcast_to([*self.axis, self.radius], (len(self.points), 4))
         rows = np.concatenate([self.points, self.numbers, same], axis=1)
         return EnergySum(point_energy, rows, self.box.center, self.box.rotation)
@@ -327,18 +321,19 @@ def coupled_sum(points: Array, coupling: Array) -> EnergySum:
 
 
 def charge_sum(
-    formula: Formula, charges: tuple[Array, Array], others: tuple[Array, Array], radius: float, images: Array
+    source: ResponseGrid, others: ResponseGrid | Array, images: Array, number: int, weight: float = 1.0
 ) -> EnergySum:
-    """`pair_energy` or `mixed_energy` of each of one magnet's charges with each of another's charges or points.
+    """Minus `weight` times the energy of the sphere by what the charges of `source` and of `others` do in it together.
 
-    The `formula` is one of both. `charges` and `others` are places (k, 3) m and amounts (k,), whose products are the
-    factors of minus the energy; `radius` (m) is the sphere's and `images` (3,) the weights of its images.
+    Of other points (k, 3) m the energy of the moment by their mean response, T, to the sphere's. `images` are the
+    weights of the sphere's images, and `number` that of charges along an edge of a face.
     """
-    (here, q), (there, p) = charges, others
-    count = len(q) * len(p)
+    (here, q), is_pair = source.charges(number), isinstance(others, ResponseGrid)
+    there, p = others.charges(number) if is_pair else (others, np.full(len(others), 1 / len(others)))
     ends = np.repeat(here, len(there), axis=0), np.tile(there, (len(here), 1))
-    same = np.broadcast_to([1 / radius, *images], (count, 1 + len(images)))
-    return EnergySum(formula, np.concatenate([*ends, -np.outer(q, p).reshape(-1, 1), same], axis=1))
+    factors = -np.outer(weight * q, p).reshape(-1, 1)
+    same = np.broadcast_to([1 / source.radius, *images], (len(factors), 1 + len(images)))
+    return EnergySum(pair_energy if is_pair else mixed_energy, np.concatenate([*ends, factors, same], axis=1))
 
 
 def response_points(box: Box, counts: tuple[int, int, int], hole: float) -> Array:
@@ -397,15 +392,13 @@ class MutualTable:
         inner = [grid.inner(self.inner) for grid in self.grids]
         if self.coupling.any():
             sums.append(coupled_sum(np.concatenate(inner), self.coupling))
-        mixed, pairs = list[EnergySum](), list[EnergySum]()
-        for a, b in permutations(range(len(self.grids)), 2):
-            if self.mixed[a, b]:
-                mixed.append(mixed_sum(self.grids[a], inner[b], self.images, taken.reflected, self.mixed[a, b]))
-            if a < b and self.pairs[a, b]:
-                pairs.append(pair_sum(self.grids[a], self.grids[b], self.images, taken.charges, self.pairs[a, b]))
-        # of one formula in one frame, they cost one call
-        some = [part for part in (mixed, pairs) if part]
-        return sums + [replace(part[0], rows=np.concatenate([one.rows for one in part])) for part in some]
+        kinds = (self.mixed, inner, taken.reflected), (np.triu(self.pairs), self.grids, taken.charges)
+        for weights, others, number in kinds:
+            chosen = zip(*np.nonzero(weights), strict=True)
+            some = [charge_sum(self.grids[a], others[b], self.images, number, weights[a, b]) for a, b in chosen]
+            if some:  # of one formula in one frame, they cost one call
+                sums.append(replace(some[0], rows=np.concatenate([one.rows for one in some])))
+        return sums
 
     def energy(
         self,
@@ -425,16 +418,10 @@ class MutualTable:
         return hy.sum([*parts, *(one.expression(position, whole, share) for one in self._sums)])
 
     def derivatives(self, places: Array, moments: Array) -> tuple[Array, Array, Array]:
-        """Energy (n,) J of moments M without -½ α B0², gradient (n, 6) and second derivatives (n, 6, 6).
-
-        By place (n, 3) m and moment (n, 3) A m², in this order.
-        """
-        number = len(places)
-        total = np.zeros(number), np.zeros((number, 6)), np.zeros((number, 6, 6))
-        for one in self._sums:
-            for whole, part in zip(total, one.derivatives(places, moments), strict=True):
-                whole += part
-        return total
+        """As `EnergySum.derivatives`, of moments M without -½ α B0²."""
+        parts = zip(*(one.derivatives(places, moments) for one in self._sums), strict=True)
+        energy, slope, second = (np.sum(part, axis=0) for part in parts)
+        return energy, slope, second
 
     def added(self, places: Array, moments: Array, field: Array, gradient: Array) -> tuple[Array, Array, Array]:
         """Energy (n,) J, force (n, 3) N and torque (n, 3) N m added by mutual magnetisation.
@@ -459,9 +446,8 @@ class MutualTable:
 
     def __repr__(self) -> str:
         points = sum(len(grid.points) for grid in self.grids)
-        errors = ", ".join(
-            f"{e:.1e} at {g * 1e3:.2g} mm" for g, e in zip(self.gaps, self.errors.max(axis=1), strict=True)
-        )
+        found = zip(self.gaps, self.errors.max(axis=1), strict=True)
+        errors = ", ".join(f"{e:.1e} at {g * 1e3:.2g} mm" for g, e in found)
         return f"MutualTable: {points} points in {len(self.grids)} magnets; relative error {errors} from contact"
 
 
@@ -482,22 +468,3 @@ class StrongerMutual:
         units = np.repeat([1.0, 1 / self.strong], 3)
         square = self.strong**2
         return square * energy, square * slope * units, square * second * np.outer(units, units)
-
-
-def pair_sum(first: ResponseGrid, second: ResponseGrid, images: Array, count: int, weight: float = 1.0) -> EnergySum:
-    """Minus `weight` (J) times the energy of the sphere by what the charges of `first` and `second` do in it together.
-
-    `images` are the weights of `pair_energy`, `count` is of the charges along an edge of a face.
-    """
-    places, amounts = first.charges(count)
-    return charge_sum(pair_energy, (places, weight * amounts), second.charges(count), first.radius, images)
-
-
-def mixed_sum(source: ResponseGrid, points: Array, images: Array, count: int, weight: float = 1.0) -> EnergySum:
-    """Minus `weight` (T) times the energy of the moment by what `points` (k, 3) m respond to the sphere's response.
-
-    That is to the `source`; `images` are the weights of `mixed_energy`, `count` is as for `pair_sum`.
-    """
-    places, amounts = source.charges(count)
-    mean = points, np.full(len(points), 1 / len(points))
-    return charge_sum(mixed_energy, (places, weight * amounts), mean, source.radius, images)

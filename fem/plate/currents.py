@@ -78,9 +78,8 @@ class CurrentSpace:
             weighted, rows = [field * self.root for field in self.fields], list[Array]()
             for part in source_images(self.parity, self.points, new) if images is None else [images]:
                 each = zip(part, weighted, strict=True)
-                rows.append(
-                    np.concatenate([image.reshape(len(image), -1) @ states.T for image, states in each], axis=1)
-                )
+                parts = [image.reshape(len(image), -1) @ states.T for image, states in each]
+                rows.append(np.concatenate(parts, axis=1))
             self._known.update(zip(new, np.concatenate(rows), strict=True))
         ends = np.cumsum([len(field) for field in self.fields])
         whole = np.array([self._known[source] for source in sources]).reshape(len(sources), ends[-1])
@@ -212,7 +211,6 @@ class Residuals:
         return np.asarray(np.linalg.solve(matrix, self.couplings.T.astype(complex)).T)
 
     def _combinations(self, angular_frequency: float) -> ComplexArray:
-        """(m, rows) factors that make the residuals out of the rows."""
         amplitudes = self.amplitudes(angular_frequency)
         return np.concatenate([np.eye(len(amplitudes)), -amplitudes, -1j * angular_frequency * amplitudes], axis=1)
 
@@ -413,9 +411,8 @@ def solve_currents(
     probes = np.concatenate([probe_places(box, fold) for box in boxes])
     while True:
         if ladder.expected() <= HOPEFUL * ladder.allowed or ladder.order + 1 == ladder.highest:
-            space, missed, omegas, residuals = train(
-                EddySpace(ladder.mesh, ladder.order + 1), grid, probes, others, frequencies, SPACE_SHARE * rtol, watch
-            )
+            elements, allowed = EddySpace(ladder.mesh, ladder.order + 1), SPACE_SHARE * rtol
+            space, missed, omegas, residuals = train(elements, grid, probes, others, frequencies, allowed, watch)
             couplings, shift = space.couplings(unit_dipoles(corners)), 2 * np.pi * frequencies[1]
             ladder.take(space_couplings(couplings, space.inductances, shift))
             if ladder.error <= KEPT * ladder.allowed:

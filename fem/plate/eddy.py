@@ -197,10 +197,9 @@ def solve_eddy(
     extent, conductivity = 2 * float(np.abs(space.points).max()), max(space.conductors.conductivity.values())
     solved = max(frequency, RESISTIVE / (2 * np.pi * MU_0 * conductivity * extent**2))
     response = solve_shifted(space, 2j * np.pi * solved, sources)
-    scaled = {
-        number: replace(part, solutions=part.solutions.real + 1j * part.solutions.imag * (frequency / solved))
-        for number, part in response.classes.items()
-    }
+    scaled = {}
+    for number, part in response.classes.items():
+        scaled[number] = replace(part, solutions=part.solutions.real + 1j * part.solutions.imag * (frequency / solved))
     return replace(response, shift=2j * np.pi * frequency, classes=scaled)
 
 

@@ -43,6 +43,7 @@ SHARE = 0.1  # Part of the tolerance for missing states
 # potential left out of the motion, and combinations of dipoles that are, as shares of the largest.
 POSES, FITTED, DIPOLES, SHORTENED, REGULAR = 40, 240, 96, 1e-7, 1e-9
 PROBED, CHECKED = 12, 4  # Poses for errors of these, and of the finite elements
+NOTHING = np.zeros((0, 3))  # Places of dipoles, of which there are none
 
 
 Range = tuple[float, float]  # Lowest and highest height of a conductor's centre on the axis, m
@@ -79,7 +80,6 @@ class AxialPotential:
         return replace(self, coefficients=self.coefficients[: ends[0], : ends[1]])
 
     def _scaled(self, points: Array) -> tuple[Array, Array, Array, Array]:
-        """x and y (n,) m from the axis, and ρ² and z (n,) as the polynomials have them."""
         low, high = self.heights
         x, y = points[:, 0] - self.axis[0], points[:, 1] - self.axis[1]
         return x, y, 2 * (x**2 + y**2) / self.radius**2 - 1, (2 * points[:, 2] - low - high) / (high - low)
@@ -155,7 +155,6 @@ class FloatingModes:
 
     @cached_property
     def _both(self) -> Array:
-        """(k, 2 × states × sources) series of G and of dG/dz."""
         low, high = self.heights
         slopes = np.polynomial.chebyshev.chebder(self.series) * 2 / (high - low)
         slopes = np.concatenate([slopes, np.zeros((1, *slopes.shape[1:]))])
@@ -234,9 +233,8 @@ def floating_modes(
     """
     start, (low, high) = time.perf_counter(), heights
     half, outer = float(over.body.half_edges[2]), float(over.body.half_edges[:2].max())
-    fields = [
-        AxialPotential.of(CoilField(over.coils, share), outer, (low - half, high + half)) for share in over.shares
-    ]
+    bounds, coils = (low - half, high + half), (CoilField(over.coils, share) for share in over.shares)
+    fields = [AxialPotential.of(field, outer, bounds) for field in coils]
     mesh = over.mesh(np.array([0.0, 0.0, low]), np.pi / 2, rule or MeshRule())
     made = modes_along(mesh, [part.shortened(SHORTENED).at for part in fields], heights, over.frequency, rtol, order)
     return replace(made, seconds=time.perf_counter() - start)
@@ -265,9 +263,8 @@ def modes_along(
     band = (0.1 * frequency, 4 * frequency)
     found: list[FloatingModes] = []
     for each in (order - 1, order):
-        space, missed, *_ = train(
-            EddySpace(mesh, each), np.zeros((0, 3)), np.zeros((0, 3)), OtherSources(trained, probes), band, SHARE * rtol
-        )
+        others = OtherSources(trained, probes)
+        space, missed, *_ = train(EddySpace(mesh, each), NOTHING, NOTHING, others, band, SHARE * rtol)
         rates, couplings = _modes(space, space.couplings(everywhere), band[1])
         values = couplings.reshape(degree + 1, len(sources), -1).swapaxes(1, 2)
         found.append(FloatingModes(rates, _series(values), heights, missed, 0.0))
@@ -375,8 +372,8 @@ def free_modes(over: Levitated, room: Room, rtol: float = 1e-3, order: int = 4) 
     counts = enumerate((POSES, PROBED, FITTED))
     trained, probed, fitted = (seen(sampled_poses(over.body, room, count, seed)) for seed, count in counts)
     mesh = over.mesh(np.array([*(low + high)[:2] / 2, low[2]]), 2 * np.pi, MeshRule())
-    band, space, nothing = (0.1 * over.frequency, 4 * over.frequency), EddySpace(mesh, order), np.zeros((0, 3))
-    states, missed, *_ = train(space, nothing, nothing, OtherSources(trained, probed), band, SHARE * rtol)
+    band, space = (0.1 * over.frequency, 4 * over.frequency), EddySpace(mesh, order)
+    states, missed, *_ = train(space, NOTHING, NOTHING, OtherSources(trained, probed), band, SHARE * rtol)
     tests = states.couplings([*fitted, *probed])
     every, wanted = _modes(states, tests, band[1])
     # dipoles as far from each other as can be among the quadrature points and their images

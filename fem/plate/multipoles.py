@@ -15,18 +15,13 @@ import scipy
 
 from ...geometry.common import Array, Watch, freeze, unwatched
 from ..compiled_code import compiled
-from ..harmonics.expressions import FieldExpressions, harmonic_sums
+from ..harmonics.expressions import FieldExpressions, harmonic_sums, weighted
 from ..harmonics.solid import derivative, outer_sums
 
 INDEPENDENT = 1e-10  # Squared part of a multipole that the chosen ones must leave for it to be taken
 NOISE = 1e-11  # Weights below this share of the largest are what symmetry forbids
 # Multipoles at a time, by default; the fit ends where so many steps leave more than this share of the error.
 STEP, PATIENCE, STALLED = 2, 6, 0.95
-
-
-def real_kinds(lowest: int, highest: int) -> list[tuple[int, int, int]]:
-    """Degree, order and part of all multipoles with degrees from the lowest to the highest."""
-    return [(l, m, i) for l in range(lowest, highest + 1) for m in range(l + 1) for i in (0, 1)[: 1 + (m > 0)]]
 
 
 @cache
@@ -45,11 +40,6 @@ def cartesian(order: int) -> Array:
             parts = np.array([value.real, -np.sign(b) * value.imag])[: 1 + (b != 0)]
             found[axes][max(2 * abs(b) - 1, 0) : 2 * abs(b) + 1] -= (-1.0) ** order * parts
     return found
-
-
-def weighted(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
-    """Σ weight · term, where weights of zero cost nothing."""
-    return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,9 +24,10 @@ from ...geometry.common import Array, Watch
 from ...geometry.scene.contents import Plate
 from ...geometry.solids import Solids
 from ..closed_forms.eddy_bodies import ComplexArray
+from ..harmonics.solid import members
 from .currents import STRICT, OtherSources, PlateSolution, grid_counts, probe_places, space_couplings, unit_power
 from .eddy import Source
-from .multipoles import Multipoles, fit_multipoles, real_kinds
+from .multipoles import Multipoles, fit_multipoles
 from .table import ENOUGH, Region, refuse
 
 NEGLIGIBLE = 1e-12  # Snapshot energies below this share of the largest are round-off
@@ -195,10 +196,12 @@ def from_elements(
 
     probes = probe_places(region, plate.body.mirrors)
     grid = region.grid(grid_counts(region, plate.body), plate.body.mirrors)
-    driving, testing = (
-        [np.concatenate(both) for both in zip(space.dipole_couplings(places), space.couplings(more), strict=True)]
-        for places, more in ((grid, others.training), (probes, others.probes))
-    )
+
+    def both(places: Array, more: Sequence[Source]) -> list[Array]:
+        pairs = zip(space.dipole_couplings(places), space.couplings(more), strict=True)
+        return [np.concatenate(pair) for pair in pairs]
+
+    driving, testing = both(grid, others.training), both(probes, others.probes)
     scale = unit_power(np.sum([np.sum(part**2, axis=1) for part in driving], axis=0), len(others.training))
     truth = partial(space_couplings, testing, space.inductances)
     omegas = [2 * np.pi * f for f in (low, low**0.25 * high**0.75, high)]
@@ -291,4 +294,4 @@ def candidates(region: Region, body: Solids, degree: int = DEGREE) -> Multipoles
             lines.append(of_plate[[a]] if a == axis else middle + reach * np.linspace(-1, 1, count) * (count > 1))
         starts = np.array(list(product(*lines))) + center
         centers += [starts + depth * gap * away for depth in DEPTHS]
-    return Multipoles.at(np.concatenate(centers), real_kinds(0, degree), region.gap(body))
+    return Multipoles.at(np.concatenate(centers), members(degree), region.gap(body))

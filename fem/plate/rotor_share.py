@@ -158,7 +158,6 @@ class TurningRotor:
 
 
 def _angles(number: int) -> list[float]:
-    """Of a turn, rad."""
     return [2 * np.pi * k / number for k in range(number)]
 
 

@@ -214,11 +214,9 @@ class PlateTable:
                 f"Input points must lie between {lower} and {upper} mm from the plate's centre, along its axes; "
                 f"instead received ({where}) mm.  Make a table for a larger region."
             )
-        b, gradient = self.multipoles.evaluate(points)
-        return (
-            np.asarray(np.tensordot(b, self.weights, (1, 1)).swapaxes(1, 2)),
-            np.asarray(np.moveaxis(np.tensordot(gradient, self.weights, (1, 1)), -1, 1)),
-        )
+        parts = self.multipoles.evaluate(points)
+        b, slopes = (np.moveaxis(np.tensordot(part, self.weights, (1, 1)), -1, 1) for part in parts)
+        return b, slopes
 
     def in_range(self, points: ArrayLike) -> NDArray[np.bool_]:
         return self.region.contains(points)

@@ -40,7 +40,7 @@ def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> Chan
         whole = bare.transformed(before[0].body, rotor[0], *sizes)
         return ChangedTable(**{part.name: getattr(whole, part.name) for part in fields(RotorTable)}, origin=table)
     simple = {"dipole": lambda m: ((), tuple(uniform_moments(one, 1) for one in m))}.get(table.model, _closed)
-    charged = table.model in ("fem", "surface") and bear_charges(before, Accuracy()) and bear_charges(rotor, Accuracy())
+    charged = _charged(table, before, rotor)
     (minus, less), (plus, more) = ((_with_charges if charged else simple)(m) for m in (before, rotor))
     uniform = plus
     if _numbers(table.uniform) != _numbers(minus):
@@ -49,9 +49,8 @@ def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> Chan
     added = *((part, -1) for part in less), *((part, 1) for part in more)
     parts, known = merged([*((part, 1) for part in table.expansions), *added]), dict(table.doubts) if doubts else {}
     if doubts and charged:
-        known["charges"] = tuple(
-            replace(part, coefficients=STEADY_ERROR * part.coefficients) for part in nonzero((*less, *more))
-        )
+        unsure = nonzero((*less, *more))
+        known["charges"] = tuple(replace(part, coefficients=STEADY_ERROR * part.coefficients) for part in unsure)
         known["charges' tail"] = nonzero(extrapolated_tail(more))
     return ChangedTable(table.model, rotor, uniform, parts, known, table.provenance, table)
 
@@ -59,16 +58,14 @@ def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> Chan
 def follows(table: RotorTable, rotor: Rotor) -> bool:
     """Whether a `changed_table` of permeable magnets is as good as one of their own."""
     before = getattr(table, "origin", table).magnets
-    return bool(magnified(before, rotor)) or (
-        table.model in ("fem", "surface")
-        and len(before) == len(rotor)
-        and bear_charges(before, Accuracy())
-        and bear_charges(rotor, Accuracy())
-    )
+    return bool(magnified(before, rotor)) or (len(before) == len(rotor) and _charged(table, before, rotor))
+
+
+def _charged(table: RotorTable, *rotors: Rotor) -> bool:
+    return table.model in ("fem", "surface") and all(bear_charges(rotor, Accuracy()) for rotor in rotors)
 
 
 def _numbers(rotor: Rotor) -> list[tuple[Any, ...]]:
-    """All that the closed forms of magnets have of them."""
     each = [(m.polarization, m.body.center, m.body.rotation, m.body.shape_numbers) for m in rotor]
     return [(type(m.body), *(part.tolist() for part in parts)) for m, parts in zip(rotor, each, strict=True)]
 
@@ -95,15 +92,10 @@ def magnified(rotor: Rotor, other: Rotor) -> tuple[float, float] | None:
     if not len(rotor) == len(other) == 1:
         return None
     (before,), (after,) = rotor, other
-    bodies = before.body, after.body
-    if type(bodies[0]) is not type(bodies[1]) or isinstance(bodies[0], Part):
+    kinds = [(type(m.body), m.recoil_permeability, m.transverse_permeability) for m in (before, after)]
+    if kinds[0] != kinds[1] or kinds[0][0] is Part:
         return None
-    if (before.recoil_permeability, before.transverse_permeability) != (
-        after.recoil_permeability,
-        after.transverse_permeability,
-    ):
-        return None
-    numbers = [body.shape_numbers for body in bodies]
+    numbers = [before.body.shape_numbers, after.body.shape_numbers]
     size = float(np.linalg.norm(numbers[1]) / np.linalg.norm(numbers[0]))
     strong = float(np.linalg.norm(after.polarization) / (np.linalg.norm(before.polarization) or 1.0))
     alike = [(numbers[0] * size, numbers[1]), (before.polarization * strong, after.polarization)]

@@ -116,8 +116,6 @@ def _bodies(rotor: tuple[Magnet, ...], model: str) -> tuple[Magnet, ...]:
 
 @dataclass(frozen=True)
 class _Requested:
-    """A rotor by its key."""
-
     key: str
     rotor: tuple[Magnet, ...] = field(compare=False)
 

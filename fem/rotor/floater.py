@@ -145,10 +145,7 @@ def polarizability_tensor(floater: Floater) -> Array:
 
 
 def floater_sources(
-    floater: Floater,
-    report: Callable[[str], None] = lambda _: None,
-    degree: int = DEGREE,
-    near: Floater | None = None,
+    floater: Floater, report: Callable[[str], None] = lambda _: None, degree: int = DEGREE, near: Floater | None = None
 ) -> FloaterSources:
     """Sources of a floater of any shape, in its frame.
 
@@ -188,7 +185,6 @@ def remanent_sources(floater: Floater, degree: int) -> FloaterSources:
 
 
 def _joined(magnets: Sequence[Magnet], charges: Sequence[tuple[Array, Array]], degree: int) -> FloaterSources:
-    """Dipoles of uniform polarisations, and charges."""
     dipoles = [(np.zeros((0, 3)), np.zeros((0, 3)))]
     for magnet in magnets:
         points, weights = polynomial_rule(magnet.body, degree)

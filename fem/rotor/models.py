@@ -153,10 +153,9 @@ def part_doubts(rotor: Rotor) -> dict[str, tuple[MultipoleExpansion, ...]]:
     for magnet in rotor:
         body = magnet.body
         if isinstance(body, Part):
-            dipole = uniform_moments(
-                Magnet(Sphere(body.circumradius, body.center, body.rotation), magnet.polarization), 1
-            )
-            share = PART_ERROR * body.volume / Sphere(body.circumradius).volume
+            ball = Sphere(body.circumradius, body.center, body.rotation)
+            dipole = uniform_moments(Magnet(ball, magnet.polarization), 1)
+            share = PART_ERROR * body.volume / ball.volume
             found.append(replace(dipole, coefficients=share * dipole.coefficients))
     return {"part": tuple(found)} if found else {}
 
@@ -223,9 +222,7 @@ def fem_table(
     points, scale = error_points(magnets, clearance)
     cells = [cells_of(piece.body, clearance) for piece in pieces]
     # least distance of the points from the nearest cell's centre, in radii
-    ratios = [
-        float(np.min(np.linalg.norm(points[:, None] - own.centers, axis=2).min(axis=0) / own.radii)) for own in cells
-    ]
+    ratios = [float((np.linalg.norm(points[:, None] - own.centers, axis=2) / own.radii).min()) for own in cells]
     degree = enough_degree(pieces, ratios, accuracy.rtol)
     carriers = carriers_of(magnets)
     closed, unsure = closed_part(cut, magnets, carriers, degree, cells)
@@ -308,12 +305,7 @@ def _guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array
 
 
 def trimmed_table(
-    table: RotorTable,
-    accuracy: Accuracy,
-    looked_at: tuple[Array, Array],
-    least: float,
-    beside: float,
-    most: int = MOST,
+    table: RotorTable, accuracy: Accuracy, looked_at: tuple[Array, Array], least: float, beside: float, most: int = MOST
 ) -> RotorTable:
     """The table without what its other doubts leave room for; that is known, and a doubt of its own.
 
@@ -390,6 +382,5 @@ def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
     """
     if not table.expansions:
         return table
-    return trimmed_table(
-        table, accuracy, error_points(table.magnets, accuracy.clearance(table.magnets)), AT_LEAST, AT_LEAST
-    )
+    points = error_points(table.magnets, accuracy.clearance(table.magnets))
+    return trimmed_table(table, accuracy, points, AT_LEAST, AT_LEAST)

@@ -80,7 +80,6 @@ class NearElements:
         return self._solved[order]
 
     def _climbed(self, points: Array, allowed: float, highest: int) -> tuple[Array, Array, Array, Array, int]:
-        """∇ψ, its slope, the estimated errors of both, and the order."""
         error, steep = np.full(len(points), np.inf), np.full(len(points), np.inf)
         beside = self._off_faces(points)
         first, second = potential_slopes(self._solution(LOWEST), points, beside)

@@ -106,8 +106,7 @@ class RotorTable:
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
-        parts = [part.expressions(position) for part in self._closed_forms]
-        parts += [part.expressions(position) for part in self.expansions]
+        parts = [part.expressions(position) for part in (*self._closed_forms, *self.expansions)]
         return (
             [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],
@@ -141,10 +140,8 @@ class RotorTable:
             lowest = [replace(part, coefficients=part.coefficients[: LOW + 1, : LOW + 1]) for part in self.expansions]
         else:
             balls = [Ball(magnet.body.center, magnet.body.circumradius) for magnet in self.magnets]
-            lowest = [
-                MultipoleExpansion(ball.center, ball.radius, dipole_sources(moment, ball, 1))
-                for ball, moment in zip(balls, replace(self, uniform=()).moments, strict=True)
-            ]
+            each = zip(balls, replace(self, uniform=()).moments, strict=True)
+            lowest = [MultipoleExpansion(b.center, b.radius, dipole_sources(moment, b, 1)) for b, moment in each]
         return replace(self, expansions=tuple(lowest), doubts={})
 
     @cached_property

@@ -113,9 +113,8 @@ def working_points(field: EasyField) -> tuple[WorkingPoint | None, ...]:
 
     Accuracy: `error` is that of the elements (`NearElements`), against closed forms and magpylib in the tests.
     """
-    return tuple(
-        _working_point(field, k) if magnet.polarization.any() else None for k, magnet in enumerate(field.magnets)
-    )
+    polarized = (magnet.polarization.any() for magnet in field.magnets)
+    return tuple(_working_point(field, k) if found else None for k, found in enumerate(polarized))
 
 
 def _working_point(field: EasyField, number: int) -> WorkingPoint:
@@ -145,7 +144,6 @@ def _working_point(field: EasyField, number: int) -> WorkingPoint:
 
 
 def _spread_inside(magnet: Magnet, seed: int) -> Array:
-    """2^PER_BATCH evenly spread points in a magnet."""
     body, wanted, found = magnet.body, 2**PER_BATCH, np.zeros((0, 3))
     draw = scipy.stats.qmc.Sobol(3, rng=np.random.default_rng(seed))
     while len(found) < wanted:

@@ -17,7 +17,7 @@ from ...dynamics.equilibria.perturbed import balanced_directions, shifted_equili
 from ...dynamics.motion.equations import parameters
 from ...dynamics.motion.rates import Rates
 from ...dynamics.motion.state import Scales, polar_angle
-from ...fem.mutual.response import ChargeResponse, RotorResponse, two_body, two_body_ladder
+from ...fem.mutual.response import ChargeResponse, two_body, two_body_ladder
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
 from ...geometry.scene.files import load_scene
@@ -250,7 +250,7 @@ def _on_axis(depths: Array) -> Array:
     return np.stack([0 * depths, 0 * depths, -depths], axis=1)
 
 
-def missed(rotors: Sequence[RotorResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:
+def missed(rotors: Sequence[ChargeResponse], floater: Floater, places: Array, directions: Array) -> xr.Dataset:
     """Force and torque by part at `places` (n, 3) m with moments along `directions` (n, 3); the total's error.
 
     `rotors` are the rotor's response by growing numbers of nodes, the `floater` is a sphere.
@@ -299,14 +299,14 @@ SHIFTED: Columns = {
 ALIKE = 10.0
 
 
-def shifted(rotors: Sequence[RotorResponse], scene: Scene, balance: Balance, stable: Equilibrium) -> xr.Dataset:
+def shifted(rotors: Sequence[ChargeResponse], scene: Scene, balance: Balance, stable: Equilibrium) -> xr.Dataset:
     """What the rigid dipole misses at its `stable` equilibrium by the equations `balance`, and where it really is.
 
     `rotors` are the rotor's response by growing numbers of nodes, two at least.
     """
     place, moment = stable.position, stable.state.moment
 
-    def added(rotor: RotorResponse, position: Array, direction: Array) -> tuple[Array, Array]:
+    def added(rotor: ChargeResponse, position: Array, direction: Array) -> tuple[Array, Array]:
         both = two_body(rotor, scene.floater, position, direction)
         extra = both.total - both.rigid
         return extra.force, extra.torque

@@ -135,12 +135,12 @@ class ElementResponse:
         return self.mesh.magnets
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
-        """See `RotorResponse`."""
+        """See `ChargeResponse`."""
         own = sum(interior_coefficients(UniformField(m).field, ball, degree) for m in self.magnets)
         return own + from_magnetization(*self.remanent_dipoles, ball, degree)
 
     def answer(self, sources: Coefficients, ball: Ball, degree: int) -> Coefficients:
-        """See `RotorResponse`."""
+        """See `ChargeResponse`."""
         return from_magnetization(*self.induced_dipoles(sources, ball), ball, degree)
 
     def induced_dipoles(self, sources: Coefficients, ball: Ball) -> tuple[Array, Array]:
