@@ -113,9 +113,8 @@ def program_digest(*without: str, root: Path = ROOT) -> str:
 def key_of(name: str, *inputs: Any) -> str:
     """SHA-256 of the inputs of a solver, of its number in `FORMATS`, and of the libraries' versions.
 
-    Counted are types, shapes and every bit of dataclasses, arrays, numbers, texts, tuples and mappings; of a path the
-    content of its file. A field of a dataclass that decides nothing has `compare=False`. Raises TypeError: an input of
-    another type.
+    Counted are types, shapes and every bit of dataclasses, but for fields with `compare=False`, arrays, numbers, texts,
+    tuples and mappings; of a path the file's content. Raises TypeError: another input.
     """
     digest = hashlib.sha256(f"{name} {FORMATS[name]} {libraries()}".encode())
     _count(inputs, digest.update)

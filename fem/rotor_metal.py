@@ -299,10 +299,9 @@ def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = B
 
 
 def pieces_of(rotor: Sequence[Magnet], conductors: Sequence[Conductor]) -> Pieces:
-    """The pieces of metal in which currents are modelled.
+    """The pieces of metal in which currents are modelled: magnets are coated, and unlike metals joined by films.
 
-    No current flows from one to another: magnets are coated and glued, and conductors of unlike metal are joined by
-    films.  Conductors that touch and have the same conductivity are one piece.
+    Conductors that touch and have the same conductivity are one piece.
     """
     magnets: Pieces = [((magnet.body,), magnet.conductivity) for magnet in rotor if magnet.conductivity]
     groups = separate_pieces(conductors)
@@ -433,9 +432,6 @@ def losses_key(scene: Scene) -> str:
 
 
 def cached_rotor_losses(scene: Scene, report: Report, watch: Watch = unwatched) -> tuple[RotorLosses, bool]:
-    """The losses in a scene's rotor, from the cache if they are there, and whether they were.
-
-    `report` gets messages, `watch` is a progress callback.  At which frequencies they hold, `check_metal` says.
-    """
+    """Losses in the rotor of a `scene`, and whether they were cached; `report` gets messages, `watch` progress."""
     make = partial(rotor_losses, scene.rotor, scene.conductors, scene.floater.radius, watch=watch)
     return LOSSES.cached(_deciding(scene), make, report)

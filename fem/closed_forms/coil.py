@@ -186,10 +186,7 @@ class Filaments:
         return field, [[hy.sum([slope[i][j] for _, slope in parts]) for j in range(3)] for i in range(3)]
 
     def derivatives(self, points: Array, order: int, currents: Array) -> Array:
-        """B and its derivatives up to `order` - 1, T, T/m, ..., by their `entries` (n, k), at points (n, 3) m.
-
-        `currents` are (coils,) A in each turn.
-        """
+        """B and its derivatives up to `order` - 1 by `entries` (n, k) at `points`, for `currents` (coils,) A a turn."""
         function, found = _compiled_filament(order), np.zeros((len(points), order * (order + 2)))
         for center, radius, turns, owner in zip(self.centers, self.radii, self.turns, self.owners, strict=True):
             given = np.repeat([[radius], [turns * currents[owner]]], len(points), axis=1)
@@ -198,10 +195,10 @@ class Filaments:
 
 
 def coils_field(coils: Sequence[Coil], currents: Array, points: Array) -> tuple[Array, Array]:
-    """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at points (n, 3) m anywhere, for currents (coils,) A in each turn.
+    """B (n, 3) T and ∂B_i/∂x_j (n, 3, 3) T/m at `points` (n, 3) m anywhere, `currents` (coils,) A in `coils`' turns.
 
-    By the closed forms nearer to a winding than it is wide or high, with slopes by differences, to 1e-6 from a few mm
-    off it on; by filaments farther off, to 1e-8 and a hundred times as fast.
+    By closed forms nearer to a winding than it is wide or high, slopes by differences, to 1e-6 from a few mm on; by
+    filaments farther off, to 1e-8.
     """
     found, slopes = np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
     if not coils:

@@ -42,11 +42,7 @@ def polarizability(radius: float, conductivity: float, frequency: ArrayLike) -> 
 
 
 def thin_field_torque(radius: float, conductivity: float) -> float:
-    """(2π/15) σ R⁵, N m s/T²: the torque per B⊥² and relative angular velocity, where the skin depth is large.
-
-    As a vector the torque is this times B × (Ω × B), with Ω the field's angular velocity relative to the sphere.  Its
-    relative error is (ωμ0σR²)²/105: for a floater of NdFeB with R = 6.35 mm 4e-6 at 100 Hz.
-    """
+    """(2π/15) σ R⁵, N m s/T²: torque per B × (Ω × B), Ω the field's relative angular velocity; to (ωμ0σR²)²/105."""
     return 2 * np.pi / 15 * conductivity * radius**5
 
 
@@ -56,10 +52,9 @@ def skin_number(radius: float, conductivity: float, frequency: float) -> float:
 
 
 def sphere_reaction(radius: float, conductivity: float, frequency: float, distance: float) -> complex:
-    """G_rr, T/(A m²), of a sphere at a dipole that points at its centre.
+    """G_rr, T/(A m²), of a sphere of `radius`, `conductivity` at a dipole at `distance`, at a `frequency`; m, S/m, Hz.
 
-    Of each harmonic r^l the part l/(l+1) R^(2l+1) I_(l+3/2)(x)/I_(l-1/2)(x) comes back as r^-(l+1), whose first is α.
-    `radius` and `distance` of the dipole from the centre are in m, `conductivity` in S/m, `frequency` in Hz.
+    Of each harmonic r^l the part l/(l+1) R^(2l+1) I_(l+3/2)(x)/I_(l-1/2)(x) comes back as r^-(l+1), the first by α.
     """
     degrees = np.arange(1, 1 + int(np.ceil(40 / np.log(distance / radius))))
     x = np.sqrt(2j * np.pi * frequency * MU_0 * conductivity) * radius
@@ -69,10 +64,7 @@ def sphere_reaction(radius: float, conductivity: float, frequency: float, distan
 
 
 def tube_reaction(inner: float, outer: float, conductivity: float, frequency: float) -> complex:
-    """G_zz, T/(A m²), of an infinite tube at its axis.
-
-    The radii `inner` and `outer` are in m, `conductivity` is in S/m, `frequency` in Hz.
-    """
+    """G_zz, T/(A m²), at the axis of a tube: radii `inner` and `outer` in m, `conductivity` S/m, `frequency` Hz."""
     k, dk, back = _tube_harmonics(inner, outer, conductivity, lambda k: 2 * np.pi * frequency + 0 * k)
     return complex(MU_0 / (2 * np.pi**2) * np.sum(dk * k**2 * back))
 
@@ -80,11 +72,10 @@ def tube_reaction(inner: float, outer: float, conductivity: float, frequency: fl
 def tube_drag(
     inner: float, outer: float, conductivity: float, speed: float, magnet: tuple[float, float] | None = None
 ) -> float:
-    """Drag on a dipole of 1 A m² along an infinite tube, in which it moves on the axis, N/(A m²)².
+    """Drag on a dipole of 1 A m² along the axis of an infinite tube, N/(A m²)², of `inner`, `outer`, `conductivity`.
 
-    Each harmonic e^{ik(z-vt)} is one of the frequency kv in the tube; a cylinder that is magnetised along the axis has
-    2 I₁(ka)/ka · sin(kh/2)/(kh/2) of the dipole's. `inner`, `outer` and `conductivity` are as of `tube_reaction`,
-    `speed` is in m/s, and `magnet` is radius a and height h of such a cylinder, m; None for a dipole.
+    As `tube_reaction`; each harmonic e^{ik(z-vt)} has the frequency kv. `speed`: m/s; `magnet`: radius a and height h,
+    m, of a cylinder magnetised along the axis: 2 I₁(ka)/ka · sin(kh/2)/(kh/2) of the dipole's; None for a dipole.
     """
     k, dk, back = _tube_harmonics(inner, outer, conductivity, lambda k: k * speed)
     share = np.ones_like(k)

@@ -40,10 +40,7 @@ def parallel(first: Solid, second: Solid) -> bool:
 
 
 def graded_rule(breaks: Array, nodes: int) -> tuple[Array, Array]:
-    """Points and weights on the panels between `breaks`, by x = (15 t - 10 t³ + 3 t⁵)/8 on each.
-
-    t log t at the ends of a panel is integrated to about nodes⁻¹².
-    """
+    """Points and weights on panels between `breaks`, by x = (15 t - 10 t³ + 3 t⁵)/8: t log t at ends to nodes⁻¹²."""
     t, weights = gauss_legendre(nodes)
     place, weight = (15 * t - 10 * t**3 + 3 * t**5) / 8, 1.875 * weights * (1 - t * t) ** 2
     middle, half = (breaks[1:] + breaks[:-1]) / 2, np.diff(breaks) / 2
@@ -86,9 +83,9 @@ def face_rule(box: Box, others: Sequence[Solid], nodes: int) -> tuple[Array, Arr
 
 
 def volume_rule(body: Solid, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
-    """Points (n, 3) m inside a body and weights (n,) m³, graded towards faces and edges.
+    """Points (n, 3) m inside a `body` and weights (n,) m³, graded towards faces and edges, by panels of `nodes`.
 
-    The `others` make the field: where their faces lie across a box, panels end, with so many `nodes` each.
+    They end where faces of the `others`, which make the field, lie across a box.
     """
     if isinstance(body, Box):
         return expansion.box_rule(body, [graded_rule(breaks, nodes) for breaks in panel_breaks(body, others)])
@@ -202,10 +199,10 @@ def uniform_cells(magnet: Magnet, nearest: float) -> list[MultipoleExpansion]:
 
 
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
-    """Coefficients (T) of what a permeability adds, to a few per cent: (μ - 1) H0 / (1 + χ/3), χ the largest of μ - 1.
+    """What a permeability adds, to a few per cent: `induced_moments` over 1 + χ/3, χ the largest of μ - 1.
 
-    `body`, `sources` and `degree` are as of `induced_moments`, where a part, which has no closed form, counts as the
-    cuboid of its volume with the proportions of the box about it.
+    `body`, `sources` and `degree` are as there; a part, without closed form, counts as a cuboid of its box's
+    proportions.
     """
     closed = list(sources)
     for k, (magnet, box) in enumerate((magnet, magnet.box) for magnet in sources):
@@ -225,8 +222,8 @@ def added_by_closed_form(
 ) -> list[Coefficients]:
     """Moments (T) of every cell of every piece that need no elements: (μ - 1) H0 + J - J' of the carriers' H0.
 
-    `cut` are the pieces of every one of `magnets`, with J and permeability; `carriers` have J', and their H0 is split
-    off, see `carrier`. `degree` and `nodes` are as of `induced_moments`; `cells` are of every piece (None: it is one).
+    `cut`: pieces of each of `magnets`; `carriers` have J', see `carriers_of`; `degree`, `nodes`: of `induced_moments`;
+    `cells`: of every piece (None: it is one).
     """
     rests = [whole.polarization - carrier.polarization for whole, carrier in zip(magnets, carriers, strict=True)]
     pieces = [(piece, rest) for whole, rest in zip(cut, rests, strict=True) for piece in whole]
@@ -248,9 +245,9 @@ def closed_part(
     degree: int,
     cells: Sequence[Cells] | None = None,
 ) -> tuple[list[Coefficients], list[Coefficients]]:
-    """`added_by_closed_form` and its error: round-off, but for bodies in contact the step to finer rules.
+    """`added_by_closed_form` and its error: round-off, but for oblique bodies in contact the step to finer rules.
 
-    Parallel boxes may touch. `cut`, `magnets`, `carriers`, `degree` and `cells` are as there.
+    `cut`, `magnets`, `carriers`, `degree` and `cells` are as there.
     """
     if not oblique_contact([magnet.body for magnet in magnets]):
         closed = added_by_closed_form(cut, magnets, carriers, degree, None, cells)

@@ -53,10 +53,7 @@ def round_tensor(body: Cylinder | Sphere, points: Array) -> Array:
 
 
 def round_slope(body: Cylinder | Sphere, points: Array) -> Array:
-    """G (n, 3, 3, 3), ∂H_i/∂x_j = Σ_k G_ijk J_k, 1/m, at points (n, 3) m; else as `round_tensor`.
-
-    Its accuracy is worse by radius over distance from the surface.
-    """
+    """G (n, 3, 3, 3), ∂H_i/∂x_j = Σ_k G_ijk J_k, 1/m; as `round_tensor`, worse by radius over surface's distance."""
     local, turn = body.to_body(points), body.rotation
     slope = _sphere(body.radius, local)[1] if isinstance(body, Sphere) else _of_mantles(body, local, slopes=True)
     return np.asarray(np.einsum("ia,jb,kc,nabc->nijk", turn, turn, turn, slope, optimize=True))
@@ -178,10 +175,9 @@ DIGITS = np.log(1e11)
 def segments_field(
     position: Sequence[Expression], body: Cylinder, polarization: Array
 ) -> tuple[list[Expression], list[list[Expression]]]:
-    """B and its gradient in the body's own axes, to 1e-10 from where the segments do on.
+    """B (3) T and its gradient (3 × 3) T/m in the body's own axes, to 1e-10 from where the segments do on.
 
-    B (3) T and [i][j] = ∂B_i/∂x_j (3 × 3) T/m, symmetric and traceless, at a `position` (three expressions, m, from the
-    centre along the body axes) for a `polarization` (3,) T.
+    At a `position` (three expressions, m, from the centre along the axes of `body`) for a `polarization` (3,) T.
     """
     parts = [_straight_segment(position, row) for row in _segments(body, polarization).tolist()]
     sums = [hy.sum([part[k] for part in parts]) for k in range(8)]

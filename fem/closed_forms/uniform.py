@@ -63,10 +63,7 @@ class _Corners:
         return length * gap * reciprocal, -2.0 * length * inverse_ends * reach * reach * reciprocal
 
     def solid_angle(self, axis: int) -> Expression:
-        """4π T_aa: difference of the solid angles of the two faces across `axis`.
-
-        Σ_k k atan2(v w, u r) is taken as the angle of one product of complex numbers.
-        """
+        """4π T_aa: difference of the solid angles of the faces across `axis`, angles of products of complex numbers."""
         axes, parts = (axis, (axis + 1) % 3, (axis + 2) % 3), []
         for i, j in product(SIGNS, repeat=2):
             across, v, w = (self.offset[a] for a in axes)
@@ -115,14 +112,11 @@ def _box_tensors(corners: _Corners, axes: Collection[int]) -> tuple[Tensor, Tens
 def cuboid_field(
     position: Sequence[Expression], half_edges: Array, polarization: Array
 ) -> tuple[list[Expression], list[list[Expression]]]:
-    """B and its gradient of a uniformly polarised cuboid, in the cuboid's own axes.
+    """B (3) T of a uniformly polarised cuboid in its own axes, and [i][j] = ∂B_i/∂x_j (3 × 3) T/m.
 
-    B (3) T and [i][j] = ∂B_i/∂x_j (3 × 3) T/m, symmetric and traceless, at a `position` (three expressions, m, from the
-    centre along the body axes) for `half_edges` (3,) m and a `polarization` (3,) T, of which only non-zero components
-    cost anything.
-
-    Accuracy: round-off of the largest terms. The terms cancel as the distance grows, so that it is 1e-15 of B beside
-    the cuboid and grows as (distance/size)²: 1e-12 at a hundred sizes.
+    At a `position` (three expressions, m, from the centre) for `half_edges` (3,) m and a `polarization` (3,) T, of
+    which only non-zero components cost anything. Terms cancel with distance: 1e-15 of B beside it, 1e-12 at a hundred
+    sizes.
     """
     strength = {axis: float(p / FOUR_PI) for axis, p in enumerate(polarization) if p}
     zero = hy.expression(0.0)
@@ -150,10 +144,7 @@ def _box_kernel(order: int) -> Any:
 
 
 def _from_kernel(polarization: Array, rotation: Array, order: int) -> Array:
-    """Matrix (k, order (order + 2)) from outputs of `_box_kernel` to `entries` along the rotor's axes, order by order.
-
-    Those of B and its derivatives; see `cuboid_field` for the polarisation (3,) T, along the columns of `rotation`.
-    """
+    """Matrix (k, order (order + 2)) from outputs of `_box_kernel` to `entries` of B and derivatives, outer axes."""
     strength = polarization / FOUR_PI
     field = np.array([[strength[j] if i == k else strength[i] * (j == k) for k in range(3)] for i, j in ALL])
     parts = block_diag(field, *(contracted(degree + 1, strength) for degree in range(2, order + 1)))
@@ -271,7 +262,7 @@ class UniformField:
     def derivatives(self, points: Array, order: int) -> Array:
         """B (T) outside, μ0 H inside, and its derivatives up to `order` - 1, by their `entries` (n, k), at (n, 3) m.
 
-        1e-13 at any distance of cuboids and spheres, outside; of cylinders and rings 1e-9 from 0.01 radii on.
+        1e-13 of cuboids and spheres, outside; of cylinders and rings 1e-9 from 0.01 radii on.
         """
         body, polarization = self.magnet.body, self.magnet.polarization
         if isinstance(body, Sphere):
@@ -296,10 +287,7 @@ class UniformField:
         return found
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
-        """B (n, 3) T outside, μ0 H inside, and its gradient (n, 3, 3) T/m at `points` (n, 3) m; 1e-13 at any distance.
-
-        Of cylinders and rings 1e-10, but for places in or beside them.
-        """
+        """B (n, 3) T outside, μ0 H inside, and its gradient, to 1e-13; off round magnets to 1e-10."""
         field, gradient = self._parts(points, 2)
         return field, gradient
 
@@ -367,10 +355,9 @@ Fields = tuple[Array, Array]  # H and M, each (n, 3) A/m; B = μ0 (H + M)
 
 
 def fields_of_magnets(magnets: Sequence[Magnet], points: Array) -> Fields:
-    """H and M of cuboids at points (n, 3) m off their edges.
+    """H of cuboids' remanent polarisation J at points (n, 3) m off their edges, and M, J/μ0 + (μr - 1) H inside.
 
-    H is that of the remanent polarisation J alone, M = J/μ0 + (μr - 1) H inside. The H of the second part of M is
-    left out: of the order of μr - 1, relative to H (`closed_form_error`). Exact for μr = 1.
+    The H of the second part of M is left out, of the order of μr - 1 (`closed_form_error`).
     """
     h = remanent_field(magnets, points) / MU_0
     magnetization = np.zeros_like(h)
@@ -387,9 +374,9 @@ def closed_form_error(magnets: Sequence[Magnet]) -> float:
 
 
 def fields_of_sphere(moment: Array, center: Array, radius: float, points: Array) -> Fields:
-    """H and M of a sphere magnetised uniformly: a dipole's outside, H = -M/3 inside; exact.
+    """H and M of a uniformly magnetised sphere at `points` (n, 3) m; exact.
 
-    Its `moment` is (3,) A m², `center` and `radius` are in m; at `points` (n, 3) m.
+    Its `moment` is (3,) A m², `center` and `radius` are in m.
     """
     away = points - center
     distance = np.linalg.norm(away, axis=1)[:, None]

@@ -21,10 +21,7 @@ from .solid import FOUR_PI, Coefficients
 
 
 def polynomial_rule(body: Solid, degree: int) -> tuple[Array, Array]:
-    """Points (n, 3) m and weights (n,) m³ that integrate polynomials up to `degree` over a body.
-
-    To round-off, but for a part: as well as curved elements fill it, 1e-8.
-    """
+    """Points (n, 3) m and weights (n,) m³, exact for polynomials up to `degree` in a body; of parts to 1e-8."""
     if isinstance(body, Part):
         return part_rule(body, degree)
     nodes = degree // 2 + 1
@@ -56,10 +53,10 @@ def box_rule(box: Box, rules: Sequence[tuple[Array, Array]]) -> tuple[Array, Arr
 def round_rule(
     body: Cylinder | Sphere, radial: tuple[Array, Array], other: tuple[Array, Array], count: int
 ) -> tuple[Array, Array]:
-    """Points (n, 3) m and weights (n,) m³ in a body of revolution.
+    """Points (n, 3) m and weights (n,) m³ in a body of revolution, `count` places around the axis of `body`.
 
-    The rules (places and weights) are `radial`, of the distance (m) from the axis or from a sphere's centre, and
-    `other`, of the height (m) or of a sphere's cosine of the polar angle; `count` places are around the axis of `body`.
+    Of rules (places and weights) `radial`, of the distance (m) from the axis or from a sphere's centre, and `other`, of
+    the height (m) or of the cosine of a sphere's polar angle.
     """
     (r, wide), (t, tall) = radial, other
     if isinstance(body, Sphere):
@@ -133,9 +130,9 @@ class MultipoleExpansion:
         return field, gradient
 
     def root_mean_square(self, points: Array) -> tuple[Array, Array]:
-        """Sizes (n,) of B (T) and of its gradient (T/m), as a mean over the spheres on which the points lie.
+        """Sizes (n,) of B (T) and of its gradient (T/m): means over the spheres on which the points lie.
 
-        A degree-l part falls as (radius/r)^(l+2), and its gradient is √((l+2)(2l+3)) / r times as large.
+        Of degree l they fall as (radius/r)^(l+2), and the gradient is √((l+2)(2l+3)) / r times as large.
         """
         degree = np.arange(self.degree + 1)
         distance = np.linalg.norm(points - self.center, axis=1)[:, None]
@@ -195,10 +192,9 @@ def turned_field(axes: Array, field: FieldExpressions) -> FieldExpressions:
 def moments_of_magnetization(
     points: Array, weights: Array, magnetization: Array, center: Array, radius: float, degree: int
 ) -> Coefficients:
-    """Coefficients (T) of a magnetisation given at quadrature points, ∫ M · ∇ conj Υ_lm dV: exact volume functionals.
+    """Coefficients (T) ∫ M · ∇ conj Υ_lm dV up to a `degree`: exact functionals of the quadrature.
 
-    At `points` (n, 3) m with `weights` (n,) m³ and the `magnetization` μ0 M (n, 3) T, about the sphere of a `center`
-    and `radius`, m, up to a `degree`.
+    At `points` (n, 3) m with `weights` (n,) m³, of `magnetization` μ0 M (n, 3) T; about a `center` with a `radius`, m.
     """
     weighted = (weights / (FOUR_PI * radius**3))[:, None] * magnetization
     potentials = solid.weighted_sums(degree, (points - center) / radius, weighted)
@@ -208,10 +204,10 @@ def moments_of_magnetization(
 def curvature_moments(
     points: Array, weights: Array, matrix: Array, center: Array, radius: float, degree: int
 ) -> Coefficients:
-    """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm: what a potential in an anisotropic body adds to its faces' moments.
+    """Coefficients (T) ∫ w Σ A_ij ∂_ij conj Υ_lm: what a potential in an anisotropic body adds to its faces'.
 
-    At `points` (n, 3) m with `weights` w (n,) T m⁴ and the symmetric `matrix` A (3, 3), about the sphere of a `center`
-    and `radius`, m, up to a `degree`.
+    At `points` (n, 3) m, `weights` w (n,) T m⁴ and `matrix` A (3, 3) symmetric; else as `moments_of_magnetization`,
+    with `center`, `radius` and `degree`.
     """
     (sums,) = solid.weighted_sums(degree, (points - center) / radius, weights[:, None] / (FOUR_PI * radius**4))
     second = [[solid.regular_derivative(solid.regular_derivative(sums, i), j) for j in range(3)] for i in range(3)]
@@ -219,11 +215,7 @@ def curvature_moments(
 
 
 def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:
-    """Moments up to `degree` of a magnet with exactly its remanent polarisation (μr = 1); degree 1 is the dipole.
-
-    The quadrature of the polynomial ∇Υ_lm is exact, so that the coefficients are good to round-off.  A sphere has none
-    but its dipole.
-    """
+    """Moments up to `degree` of a magnet with its remanent polarisation (μr = 1), to round-off; 1 is the dipole's."""
     body = magnet.body
     degree = min(degree, 1) if isinstance(body, Sphere) else degree
     center, radius = body.center, body.circumradius
@@ -234,10 +226,7 @@ def uniform_moments(magnet: Magnet, degree: int) -> MultipoleExpansion:
 
 
 def without_noise(coefficients: Coefficients, level: float) -> Coefficients:
-    """The coefficients without those whose field at the reference sphere is below `level` of the largest one's.
-
-    What symmetry forbids comes out as round-off; left out, it costs nothing to evaluate.
-    """
+    """Coefficients but those whose field at the sphere is below `level` of the largest one's: what symmetry forbids."""
     field = np.abs(coefficients) * solid.field_sizes(len(coefficients) - 1)
     return np.where(field > level * field.max(initial=0.0), coefficients, 0.0)
 
@@ -414,10 +403,7 @@ class FittedExpansions:
         self._factor = scipy.linalg.cholesky(square, lower=True, overwrite_a=True)
 
     def of(self, field: Array) -> tuple[list[MultipoleExpansion], list[MultipoleExpansion]]:
-        """The expansions of a field (n, 3) T at the points, and what of them the highest degree does.
-
-        That is the error of one degree less, three or four times their own.
-        """
+        """Expansions of a field (n, 3) T, and what the highest degree does: 3 or 4 times their own error."""
         right = self._columns @ (field / self._allowed[:, None]).ravel()
         ends = slice(len(right)), slice(self._fewer)
         whole, fewer = (scipy.linalg.cho_solve((self._factor[e, e], True), right[e]) / self._size[e] for e in ends)

@@ -49,10 +49,9 @@ def whole_gradient(entries: Sequence[hy.expression]) -> list[list[hy.expression]
 
 
 def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], monic: bool = False) -> list[hy.expression]:
-    """Σ weight Re Θ_lm or Im Θ_lm, one expression for each of `sums`.
+    """Σ weight Re Θ_lm or Im Θ_lm, one expression for each of `sums`, at a `position` in the harmonics' units.
 
-    At a `position` (three expressions, in the units of the harmonics); `monic`: harmonics without their factors (-1)^m
-    (2l-1)!!, each with the weight 1.
+    `monic`: harmonics without their factors (-1)^m (2l-1)!!, each with the weight 1.
     """
     x, y, z = position
     inverse = 1.0 / (x * x + y * y + z * z)
@@ -172,9 +171,9 @@ class CompiledField:
 def differentiated(
     known: Mapping[Entry, hy.expression], variables: Sequence[hy.expression], last: int
 ) -> list[hy.expression]:
-    """Derivatives of a harmonic function by their `entries`, of all degrees beyond the known ones.
+    """Derivatives of a harmonic function by their `entries`, from those `known` of one degree up to the `last`.
 
-    From those of one degree (`known`, by their entries) by the `variables` x, y and z, up to the `last` degree.
+    `variables` are x, y and z.
     """
     found: list[hy.expression] = []
     for degree in range(len(next(iter(known))) + 1, last + 1):

@@ -59,10 +59,9 @@ def sphere(degree: int, more: int = 6) -> tuple[Array, Array]:
 
 
 def interior_coefficients(field: Callable[[Array], Array], ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) of a field without sources in a ball, by its normal component on the surface.
+    """Coefficients a_lm (T) of a `field`, of points (n, 3) m, without sources in a `ball`, up to a `degree`.
 
-    The `field` takes points (n, 3) m to B (n, 3) T; up to a `degree` about the centre of `ball`. Aliasing is a part
-    ρ^(degree + 10) of it, ρ the radius over the distance of the centre from the nearest singularity.
+    By its normal component. Aliasing is ρ^(degree + 10) of it, ρ the radius over the nearest singularity's distance.
     """
     normals, _ = sphere(degree)
     return _by_normal_field(np.sum(field(ball.center + ball.radius * normals) * normals, axis=1), degree)
@@ -117,10 +116,7 @@ class Surroundings:
         return np.asarray(total / (FOUR_PI * self._radius**3))
 
     def of_charges(self, charges: Array) -> Coefficients:
-        """Coefficients a_lm (T) of magnetic charges q (n,) T m² at the points.
-
-        (4π radius²)⁻¹ Σ q Θ_lm, exact for these charges.
-        """
+        """Coefficients a_lm (T), (4π radius²)⁻¹ Σ q Θ_lm, of magnetic charges q (n,) T m² at the points."""
         sums = self._values.weighted(charges)[:-1, :-1] / (FOUR_PI * self._radius**2)
         sums[0] = 0.0  # a constant potential
         return np.asarray(sums)
@@ -133,11 +129,10 @@ def from_magnetization(points: Array, moments: Array, ball: Ball, degree: int) -
 
 
 def from_outer(sums: Sequence[Coefficients], radii: Array, centers: Array, ball: Ball, degree: int) -> Coefficients:
-    """Coefficients a_lm (T) of outer expansions about other centres, whose sources lie outside the ball.
+    """Coefficients a_lm (T), up to a `degree`, of outer expansions whose sources lie outside the ball.
 
     (ρ/R)^(1-l) (-1)^l Σ c_l'm' Θ_(l+l')(m+m')(d/ρ), d from their centre to the ball's: Θ_l'm' are derivatives of 1/r.
-    `sums` c_lm (T), `radii` ρ (k,) m and `centers` (k, 3) m are those of k expansions; R is that of `ball`; up to a
-    `degree`.
+    `sums` c_lm (T), `radii` ρ and `centers` (k, 3) m are theirs; R is that of `ball`.
     """
     away, own = (ball.center - centers) / radii[:, None], max(len(each) for each in sums) - 1
     square = np.sum(away**2, axis=1)
@@ -185,10 +180,9 @@ def multipole_force(incident: Coefficients, sources: Coefficients, ball: Ball) -
 
 
 def multipole_torque(incident: Coefficients, sources: Coefficients, ball: Ball) -> Array:
-    """Torque (3,) N m about the centre of a `ball` on `sources` c_lm (T) in an `incident` field a_lm (T): m × B.
+    """Torque m × B (3,) N m about the centre of a `ball` on `sources` c_lm (T) in an `incident` field a_lm (T).
 
-    The degrees above 1 must be induced by the incident field alone: a multipole -t_l conj a_lm of a sphere feels no
-    torque from the field that induces it.
+    Degrees above 1 must be induced by that field alone: a multipole -t_l conj a_lm of a sphere feels no torque from it.
     """
     return np.cross(moment(sources, ball), field_at_center(incident))
 
@@ -363,10 +357,7 @@ def sizes(degree: int) -> Array:
 
 @cache
 def turns(degree: int) -> Array:
-    """(3, K, K) of `matrices`' G for R_k over their `sizes`: antisymmetric, whose squares are integers over four.
-
-    Equal entries are equal to the last bit, so that expressions share what they multiply.
-    """
+    """(3, K, K) of `matrices`' G for R_k over their `sizes`: antisymmetric; equal entries are so to the last bit."""
     unit = sizes(degree)
     found = matrices(degree)[1] * unit / unit[:, None]
     return np.asarray(np.sign(found) * np.sqrt(np.round(4 * found**2)) / 2)
@@ -394,10 +385,7 @@ def matrices(degree: int) -> tuple[Array, Array]:
 
 
 def shifted(coefficients: Array, degree: int, way: int) -> Array:
-    """Those of a field about places at ξ from the centre, (K, N): A_k = Σ P_kn R_n(ξ), n up to degree `way`.
-
-    The field's own coefficients (K,) about the centre are up to a `degree`; A(ξ) = exp(ξ·Dᵀ) A is harmonic in ξ.
-    """
+    """`coefficients` (K,) up to a `degree` at places ξ: (K, N), A_k = Σ P_kn R_n(ξ), n up to degree `way`."""
     ways, solving = _ways(way)
     found = np.zeros((len(coefficients), (way + 1) ** 2))
     power = np.broadcast_to(coefficients, (len(ways), len(coefficients)))
@@ -418,10 +406,9 @@ def _ways(way: int) -> tuple[Array, list[Array]]:
 def field_coefficients(
     evaluate: Callable[[Array], Array], center: Array, reach: float, degree: int, unit: float
 ) -> Array:
-    """Coefficients A (K,) T m of a field, lengths in a unit.
+    """Coefficients A (K,) T m up to a `degree`, lengths in a `unit` (m), of a field `evaluate` of points (n, 3) m.
 
-    `evaluate` takes points (n, 3) m to B (n, 3) T, known in the ball of `center` (3,) m and `reach` (m); up to a
-    `degree`, in a `unit` of lengths, m.
+    It is known in the ball of a `center` (3,) m and a `reach` (m).
     """
     found = real_weights(interior_coefficients(evaluate, Ball(center, reach), degree))
     return np.asarray(found * reach * (unit / reach) ** shells(degree))

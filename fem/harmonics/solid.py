@@ -337,8 +337,7 @@ def real_terms(coefficients: Coefficients) -> dict[Member, float]:
 def field_sizes(degree: int) -> Array:
     """Root mean square of |grad Re Θ_lm| (or Im) over the unit sphere, [l, m], times √2 for m > 0; 0 for m > l.
 
-    The mean of |Θ_lm|² is (l-m)!(l+m)!/(2l+1), and that of |grad f|² is (l+1)(2l+1) times the mean of f² for a
-    harmonic f of degree l. The size of Σ c_lm Θ_lm is the root of Σ |c_lm|² size_lm².
+    The mean of |Θ_lm|² is (l-m)!(l+m)!/(2l+1), that of |grad f|² (l+1)(2l+1) times the mean of f² of a degree l.
     """
     l, m = np.indices((degree + 1, degree + 1))
     return np.where(m <= l, np.sqrt(np.where(m == 0, 1.0, 2.0) * (l + 1.0) * factorials(degree)), 0.0)
@@ -378,10 +377,7 @@ def mirrored_harmonics(coefficients: Coefficients, axis: int) -> Coefficients:
 
 
 def outer_coefficients(amplitudes: Array, keys: Sequence[Member], degree: int) -> Coefficients:
-    """c_lm, up to a degree, of Σ c_lm Θ_lm that is Σ a_k Y_k on the unit sphere.
-
-    `amplitudes` (k,) are the a_k of orthonormal harmonics Y_k, which are named by `keys`.
-    """
+    """c_lm up to a `degree` of Σ a_k Y_k on the unit sphere: `amplitudes` a_k of orthonormal Y_k named by `keys`."""
     result = np.zeros((degree + 1, degree + 1), complex)
     for value, (l, m, part) in zip(amplitudes, keys, strict=True):
         result[l, m] += (2 * l + 1) / FOUR_PI / norm(l, m) * (-1j * value if part else value)

@@ -183,10 +183,7 @@ def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
 
 
 def _inner(grids: Sequence[ResponseGrid], magnets: Sequence[Magnet]) -> int:
-    """Points along each axis of a magnet for what it does as a whole.
-
-    Where the floater fits into a ring's hole, one would be there; two are outside of holes up to 0.65 of the diameter.
-    """
+    """Points along each axis of a magnet for what it does as a whole: of a ring two, as one would be in its hole."""
     near = any(gap_of(*pair) < APART for pair in combinations([magnet.body for magnet in magnets], 2))
     number = effort(len(magnets)).inner if near else 1
     return max(number, 2) if len(grids) > 1 and any(grid.hole for grid in grids) else number
@@ -275,10 +272,9 @@ def _inputs(magnets: tuple[Magnet, ...], floater: Floater) -> tuple[tuple[Magnet
 def cached_mutual_table(
     magnets: tuple[Magnet, ...], floater: Floater, report: Callable[[str], None], watch: Watch = unwatched
 ) -> tuple[MutualTable, bool]:
-    """A mutual table from the cache if it is there, and whether it was.
+    """`mutual_table` of `magnets`, `floater` and `watch` from the cache if it is there, and whether it was.
 
-    A lone magnet responds in its own axes: one table serves it wherever it stands and however it is turned. `magnets`,
-    `floater` and `watch` are as of `mutual_table`; `report` is called with a message where the cache is damaged.
+    A lone magnet has one table, however it lies; `report` is called with a message where the cache is damaged.
     """
     magnets = united(magnets)
     upright = alike(magnets)
@@ -318,7 +314,7 @@ def sphere_fit(
         return -np.concatenate([(field @ direction)[..., None], direction @ change], axis=-1)
 
     pairs, number = np.triu_indices(len(grids), 1), effort(len(grids)).charges
-    sums = [formulas.charge_sum(grids[a], grids[b], images, number) for a, b in zip(*pairs, strict=True)]
+    sums = [formulas.charge_sum(grids[a], grids[b], images, number) for a, b in np.transpose(pairs).tolist()]
     derivatives = [one.derivatives(places, np.zeros_like(places), 1) for one in sums]
     others = [np.column_stack([value, slope[:, :3]]) for value, slope, _ in derivatives]
     right, sizes = np.column_stack([energy, -force]), np.column_stack([energy_size, *[force_size] * 3])
@@ -347,7 +343,7 @@ def returned_fit(
         return -np.concatenate([field, change.reshape(*change.shape[:-2], 9)], axis=-1)
 
     pairs, number = np.nonzero(~np.eye(len(grids), dtype=bool)), effort(len(grids)).reflected
-    sums = [formulas.charge_sum(grids[a], inner[b], images, number) for a, b in zip(*pairs, strict=True)]
+    sums = [formulas.charge_sum(grids[a], inner[b], images, number) for a, b in np.transpose(pairs).tolist()]
     derivatives = [one.derivatives(places, np.zeros_like(places)) for one in sums]
     others = [-rows(slope[:, 3:], second[:, 3:, :3]) for _, slope, second in derivatives]
     right, each = rows(field, change), (np.linalg.norm(field, axis=1), np.linalg.norm(change, axis=(1, 2)))
@@ -420,10 +416,9 @@ def classes(grid: ResponseGrid, mirrored: bool) -> Array:
 
 
 def least_squares(columns: Array, values: Array, small: Array, cost: float = PENALTY) -> Array:
-    """Weights (k,) of columns (n, k) of any sizes that give values (n,).
+    """Weights (k,) of `columns` (n, k) that give `values` (n,); those that are `small` (k,) are kept so,
 
-    By themselves those that are `small` (k,) are hardly determined: they are kept so, at a `cost` by an error of the
-    size of all values.
+    at a `cost` by an error of the size of all values: by themselves they are hardly determined.
     """
     if not small.any() and len(small) <= FEW_WEIGHTS:
         size = np.linalg.norm(columns, axis=0)

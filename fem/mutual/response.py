@@ -182,10 +182,9 @@ class ChargeResponse:
 
 
 def direct_rule(magnets: Sequence[Magnet], nearest: ArrayLike, shares: ArrayLike = 1.0) -> tuple[Array, Array]:
-    """Points (n, 3) m and (μ - 1) dV (n, 3, 3) m³ in magnets, for integrals of fields over them.
+    """Points (n, 3) m and (μ - 1) dV (n, 3, 3) m³ in `magnets`, for integrals of fields over them.
 
-    Of k `magnets`, for fields whose sources are `nearest` (k,) m from each or more, and `shares` (k,) of each magnet's
-    μ - 1; one number for all will do.
+    Their sources are `nearest` (k,) m from each or more; `shares` (k,) are those of each μ - 1 (one for all will do).
     """
     points, tensors = [], []
     each = (np.broadcast_to(part, len(magnets)).tolist() for part in (nearest, shares))
@@ -206,8 +205,7 @@ def closed_dipoles(
 ) -> tuple[Array, Array]:
     """Positions (n, 3) m and μ0 M dV (n, 3) T m³ of the magnetisation χ H0 of the remanence's closed form H0.
 
-    The points are graded towards the edges, where H0 has a logarithm. H0 is that of `magnets`, χ (3, 3) of each are the
-    `susceptibilities`, and `nodes` is of the rule in a magnet, along an axis.
+    By a rule of `nodes` along an axis, graded towards edges. H0 is that of `magnets`, χ (3, 3) are `susceptibilities`.
     """
     bodies = [magnet.body for magnet in magnets]
     points, moments = [np.zeros((0, 3))], [np.zeros((0, 3))]
@@ -314,9 +312,9 @@ def two_body(
 def two_body_ladder(
     rotors: Sequence[ChargeResponse], floater: Floater, position: Array, direction: Array
 ) -> tuple[TwoBody, Wrench]:
-    """Both bodies with the finest elements, and how far the two finest are apart: an error estimate of the total.
+    """Both bodies by the finest of `rotors`, of rising degree, and how far the two finest are apart, as `two_body`.
 
-    `rotors` have elements of growing degree; `floater`, `position` and `direction` are as of `two_body`.
+    `floater`, `position` and `direction` are as there.
     """
     coarse, fine = (two_body(rotor, floater, position, direction) for rotor in rotors[-2:])
     apart, added = fine.total - coarse.total, fine.total - fine.rigid
@@ -342,10 +340,9 @@ def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float
 
 
 def places_facing(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float]) -> Array:
-    """Centres (n, 3) m of floaters before the middles of faces and edges and the corners of magnets, where they fit.
+    """Centres (n, 3) m of floaters before the middles of faces and edges and the corners of `magnets`, where they fit.
 
-    At `gaps` from a magnet, in floater radii (`radius`, m). Beside a lone one of `magnets` none is another's mirror
-    image, and of many only those before the faces' middles are taken.
+    At `gaps` in floater radii (`radius`, m). A lone magnet has no mirror images of them, many only those of faces.
     """
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     if len(magnets) == 1:
@@ -387,10 +384,10 @@ def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Arra
 
 
 def sphere_samples(rotor: ChargeResponse, floater: Floater, places: Array, watch: Watch) -> list[Array]:
-    """The sphere's response, degree by degree, to the rotor's own field.
+    """The response to the own field of `rotor` of a sphere, `floater`, at `places` (n, 3) m of its centre.
 
-    Energy (n,) J and force (n, 3) N of the response of degree 2 and more, and the sizes (n,) of those of the whole, at
-    `places` (n, 3) m of the centre of `floater` beside `rotor`; `watch` is called with the progress.
+    Energy (n,) J and force (n, 3) N of degree 2 and more, and the sizes (n,) of those of the whole; `watch` gets
+    progress.
     """
     rows = []
     for place in watched(places, watch, "induced magnetisation of the floater"):
@@ -451,10 +448,9 @@ def returned_samples(
 def point_response(
     grids: Sequence[ResponseGrid], inner: Array, coupling: Array, sources: Coefficients, ball: Ball
 ) -> Coefficients:
-    """Coefficients a_lm (T) of what the points of magnets, and magnets as a whole, send back to sources in a ball.
+    """Coefficients a_lm (T) of what the points of `grids`, and magnets as a whole, send back to `sources` in a `ball`.
 
-    `sources` c_lm (T) in the `ball` are [k, l, m], as what they send back. `grids` are of the magnets; `inner` (n, 3) m
-    and `coupling` (3n, 3n) A m²/T are for the magnets as a whole.
+    Both are [k, l, m]; `inner` (n, 3) m and `coupling` (3n, 3n) A m²/T are of the magnets as a whole.
     """
     places = np.concatenate([*(grid.places for grid in grids), inner])
     around = Surroundings(places, ball, sources.shape[-1] - 1)

@@ -100,8 +100,8 @@ def image_weights(permeability: float) -> Array:
 def response_to_charge(a: Sequence[Any], b: Sequence[Any], weights: Sequence[Any]) -> hy.expression:
     """Energy of a charge in a sphere's response to another: Σ_{l≥2} (t_l/t) P_l(cos) (ab)^-(l+1).
 
-    `a` and `b` are places of the charges from the sphere's centre, in radii (three expressions each); `weights` are
-    those of `image_weights`, and t = (μr - 1)/(μr + 1).
+    Places `a` and `b` (three expressions each) are from the centre, in radii; `weights` are of `image_weights`, and t =
+    (μr - 1)/(μr + 1).
     """
     square = hy.sum([x * x for x in a]) * hy.sum([x * x for x in b])
     along = hy.sum([x * y for x, y in zip(a, b, strict=True)])
@@ -140,30 +140,28 @@ def point_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any]
 
 
 def coupled_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
-    """Two points that respond together: -b·(C b') of the moment's fields b, b' at them.
+    """Two points that respond together: -b·(C b') of the fields b, b' of a `moment` at a `place` (m).
 
-    For a `place` (m) and `moment` (A m² times `share`, which is in it already); `row` is the points (3 + 3, m) and C
-    (9, A m²/T).
+    The moment, A m² times `share`, has it already; `row` is the points (3 + 3, m) and C (9, A m²/T).
     """
     one, other = (point_field([x - t for x, t in zip(place, p, strict=True)], moment) for p in (row[:3], row[3:6]))
     return -hy.sum([row[6 + 3 * i + j] * (one[i] * other[j]) for i, j in np.ndindex(3, 3)])
 
 
 def pair_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
-    """Two magnets' charges by the sphere's response to one of them.
+    """Two magnets' charges by the sphere's response to one of them, at a `place` (m), whatever the `moment`.
 
-    For a `place` (m), whatever the `moment`, in units by `share`; `row` is places of the charges (3 + 3, m), the
-    energy's factor (J), 1/R (1/m) and the weights of the images (3).
+    In units by `share`; `row`: places of the charges (3 + 3, m), the factor (J), 1/R (1/m) and the images' weights (3).
     """
     a, b = (_scaled(place, p, row[7]) for p in (row[:3], row[3:6]))
     return share * share * (row[6] * response_to_charge(a, b, row[8:]))
 
 
 def mixed_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
-    """The moment in the field of a point that the sphere's response to a charge elsewhere magnetises.
+    """A `moment` in the field of a point that the sphere's response to a charge magnetises, at a `place` (m).
 
-    For a `place` (m) and `moment` (A m² times `share`); `row` is places of charge and point (3 + 3, m), the factor (T),
-    1/R (1/m) and the weights of the images (3).
+    The moment, A m², is times `share`; `row`: places of charge and point (3 + 3, m), the factor (T), 1/R (1/m) and the
+    images' weights (3).
     """
     a, b = (_scaled(place, p, row[7]) for p in (row[:3], row[3:6]))
     given = hy.make_vars("b_x", "b_y", "b_z")
@@ -328,12 +326,15 @@ def charge_sum(
     Of other points (k, 3) m the energy of the moment by their mean response, T, to the sphere's. `images` are the
     weights of the sphere's images, and `number` that of charges along an edge of a face.
     """
-    (here, q), is_pair = source.charges(number), isinstance(others, ResponseGrid)
-    there, p = others.charges(number) if is_pair else (others, np.full(len(others), 1 / len(others)))
+    (here, q), formula = source.charges(number), pair_energy
+    if isinstance(others, ResponseGrid):
+        there, p = others.charges(number)
+    else:
+        there, p, formula = others, np.full(len(others), 1 / len(others)), mixed_energy
     ends = np.repeat(here, len(there), axis=0), np.tile(there, (len(here), 1))
     factors = -np.outer(weight * q, p).reshape(-1, 1)
     same = np.broadcast_to([1 / source.radius, *images], (len(factors), 1 + len(images)))
-    return EnergySum(pair_energy if is_pair else mixed_energy, np.concatenate([*ends, factors, same], axis=1))
+    return EnergySum(formula, np.concatenate([*ends, factors, same], axis=1))
 
 
 def response_points(box: Box, counts: tuple[int, int, int], hole: float) -> Array:
@@ -351,10 +352,10 @@ def response_box(body: Solid) -> Box:
 
 
 def point_counts(box: Box, clearance: float, digits: float) -> tuple[int, int, int]:
-    """Gauss points along each edge of a `box` for fields with sources no nearer than a `clearance` (m) to the faces.
+    """Gauss points along each edge of a `box` for fields of sources a `clearance` (m) off its faces or more.
 
-    `digits` is -ln of the error. It falls as ρ^-2n, ρ the sum of the half axes of the ellipse about the edge that
-    reaches the source.
+    `digits` is -ln of the error, which falls as ρ^-2n, ρ the half axes of the ellipse about the edge through the
+    source.
     """
     z = 1 + clearance / box.half_edges
     nx, ny, nz = (int(n) for n in np.ceil(digits / np.log(z + np.sqrt(z * z - 1))))
@@ -407,11 +408,10 @@ class MutualTable:
         flux: Sequence[hy.expression],
         share: hy.expression | float = 1.0,
     ) -> hy.expression:
-        """The energy U as an expression.
+        """U as an expression, for the floater's centre at a `position` (3 expressions, m), rotor's frame.
 
-        The floater's centre is at `position` (3 expressions, m), rotor's frame; `moment` (A m²) is the rigid one and
-        `flux` (T) the rotor's field B0, both times `share`, which lets the energy come in units of its own, J times
-        share²: it is one over their root.
+        `moment` (A m²) is the rigid one and `flux` (T) the rotor's field B0, both times `share`, one over the root of a
+        unit of energy: the energy comes in J times share².
         """
         whole = [m + self.polarizability * b for m, b in zip(moment, flux, strict=True)]
         parts = [-0.5 * self.polarizability * hy.sum([b * b for b in flux])]
@@ -424,10 +424,10 @@ class MutualTable:
         return energy, slope, second
 
     def added(self, places: Array, moments: Array, field: Array, gradient: Array) -> tuple[Array, Array, Array]:
-        """Energy (n,) J, force (n, 3) N and torque (n, 3) N m added by mutual magnetisation.
+        """Energy (n,) J, force (n, 3) N and torque (n, 3) N m added by mutual magnetisation at `places` (n, 3) m.
 
-        At `places` (n, 3) m of the floater's centre with rigid `moments` (n, 3) A m², rotor's frame, where the rotor's
-        B0 is `field` (n, 3) T and ∂B0_i/∂x_j `gradient` (n, 3, 3) T/m.
+        With rigid `moments` (n, 3) A m², rotor's frame, where its B0 is `field` (n, 3) T and ∂B0_i/∂x_j `gradient` (n,
+        3, 3).
         """
         alpha = self.polarizability
         energy, slope, _ = self.derivatives(places, moments + alpha * field)

@@ -52,9 +52,8 @@ def resolve_plate_model(
 ) -> PlateChoice:
     """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` is called with what is worked out.
 
-    `auto` (to `rtol`) is none where a perfect conductor's image would not matter, an infinite slab where a bound or
-    else a coarse solution says that the edges are too far to matter, and otherwise the reduced network of the finite
-    elements.
+    `auto` as `model` is, to `rtol`, none where a perfect conductor's image would not matter, a slab where the edges do
+    not by a bound or a coarse solution, and otherwise the reduced network of the finite elements.
     """
     if (plate := scene.plate) is None:
         return PlateChoice("none", "the scene has no plate")
@@ -102,12 +101,11 @@ def plate_around(
     rtol: float,
     region: Region | None = None,
 ) -> PlateAround:
-    """The plate's table for a floater about a place, to be made.
+    """The plate's table for a floater about a `place` (3,) m, in the frame turning with the rotor, to be made.
 
-    Raises InputError: the plate leaves the floater no room. `model`: "slab", or "reduced" for the network of the finite
-    elements; `table`: the rotor's field; `place`: (3,) m, in the frame that turns with the rotor; `radius`,
-    `frequency`: of the floater, m, and of the rotor, Hz; `rtol`: relative accuracy; `region`: in the frame of the
-    plate, where the floater may be, left out, near the place, all the way down.
+    `model`: "slab", or "reduced" for the elements' network; `table`: the rotor's field; `radius` (m) of the floater and
+    `frequency` (Hz) of the rotor; `rtol`: relative accuracy; `region`: where the floater may be, plate's frame; left
+    out, near the place, all the way down. Raises InputError: the plate leaves the floater no room.
     """
     if model == "slab" and plate.lowering and abs(plate.box.rotation[2, np.argmin(plate.box.size)]) < PLUMB:
         plate = replace(plate, lowering=None)  # an infinite slab that moves along itself stays where it is
@@ -123,12 +121,11 @@ def plate_around(
 
 
 def reachable_region(plate: Plate, center: ArrayLike, half_edges: ArrayLike, radius: float = 0.0) -> Region:
-    """Where a floater can come to in the plate's frame, during all of its lowering.
+    """Where a floater can come to in the frame of `plate`, during all of its lowering.
 
-    The box about `center` and its image under the lowering are united; what is nearer to the plate than the floater's
-    radius is cut off. Raises InputError: the centre is not farther than the radius from the plate's face, all the way.
-    `center`, `half_edges`: (3,) m, box along the laboratory's axes, where the floater may be; `radius`: of the floater,
-    m.
+    The box about `center` with `half_edges` (3,) m along the laboratory's axes and its image under the lowering are
+    united; what is nearer than `radius` (m) to the plate is cut off. Raises InputError: the centre is not farther off,
+    all the way.
     """
     center = np.asarray(center, float)
     ends = plate.box.to_body(np.array([center, center - plate.way * DOWN]))
@@ -159,11 +156,11 @@ def _cut(lower: Array, upper: Array, axis: int, middle: float, clear: float, abo
 
 
 def wider_region(plate: Plate, region: Region, radius: float, seen: Array) -> Region:
-    """The region of a table for a floater that left another one at `seen` (3,) m, in the frame of the plate.
+    """The region of a table for a floater that left `region` at `seen` (3,) m, in the frame of `plate`.
 
-    Bounds that it crossed are moved out by so much that a fall from far off to the face needs few tables; along the
-    face all, as a floater that turns with the rotor comes to the others next.  Nearer to the face than the floater's
-    radius (m) it has touched it. Raises AccuracyError: the region would be too wide for its distance from the plate.
+    Bounds that it crossed move out so far that a fall from far off needs few tables; along the face all, as a turning
+    floater comes to the others next, but none nearer to the face than its `radius` (m). Raises AccuracyError: too wide
+    for its distance from the plate.
     """
     half, size = plate.box.half_edges, region.upper - region.lower
     facing = int(np.argmax(np.abs(region.center) - half))
@@ -203,8 +200,7 @@ def rotor_nearby(
 def _size(radius: float, place: ArrayLike, gap: float = np.inf) -> float:
     """Of a scene, by its floater's radius, place and `gap` to the plate, m: a power of two, so that neighbours share.
 
-    A small floater far from its rotor moves as far as another, and a far one no farther; near a plate it is looked at
-    half way to it at most, as tables grow with their width over that distance.
+    A small floater far from its rotor moves as far as another; near a plate it is looked at half way to it at most.
     """
     ratios = radius / USUAL[0], float(np.linalg.norm(place)) / USUAL[1], 1.0
     return float(2 ** min(np.round(np.log2(sorted(ratios)[1])), np.floor(np.log2(gap / 2 / REACH))))

@@ -70,10 +70,7 @@ class CurrentSpace:
     cells: int
 
     def couplings(self, sources: Sequence[Source], images: Array | None = None) -> list[Array]:
-        """b (sources, states) of each parity class; of a source that is still there they are remembered.
-
-        `images` are what `source_images` gives of all sources, where that is known.
-        """
+        """b (sources, states) of each class, remembered; `images` as of `source_images`, where they are known."""
         if new := [source for source in sources if images is not None or source not in self._known]:
             weighted, rows = [field * self.root for field in self.fields], list[Array]()
             for part in source_images(self.parity, self.points, new) if images is None else [images]:
@@ -101,10 +98,7 @@ class CurrentSpace:
 def space_couplings(
     b: Sequence[Array], inductances: Sequence[Array], shift: complex, others: Sequence[Array] | None = None
 ) -> ComplexArray:
-    """(sources, others) -s b (1 + sL)⁻¹ oᵀ, summed over classes; o is b where it is left out.
-
-    `b`, `others`: couplings of sources; `inductances`: L; `shift`: s is iω or real, rad/s.
-    """
+    """(sources, others) -s b (1 + sL)⁻¹ oᵀ of couplings `b` and o of `others` (b), L `inductances`, `shift` s rad/s."""
     rows = zip(b, inductances, others or b, strict=True)
     return np.asarray(-shift * sum(d @ np.linalg.solve(np.eye(len(one)) + shift * one, o.T) for d, one, o in rows))
 
@@ -233,8 +227,8 @@ def class_basis(
 ) -> ClassBasis:
     """A basis in which no source's residual is larger than `allowed`, relative to what the source drives.
 
-    `sources`: (m, width) without gradients, of about unit power each; `solve`: fields e and their potentials T e for
-    rows, at the shift; `angular_frequencies`: at which residuals are looked at, rad/s.
+    `sources`: (m, width) without gradients, of unit power; `solve`: fields e and potentials T e for rows, at the shift;
+    `angular_frequencies`: at which residuals are looked at, rad/s.
     """
     energies, vectors = np.linalg.eigh(sources @ sources.T)
     kept = np.cumsum(np.maximum(energies, 0.0)) > MODE_SHARE * allowed
@@ -258,10 +252,10 @@ def class_basis(
 
 
 def worst_error(angular_frequencies: Array, residuals: ComplexArray, couplings: ComplexArray, places: int) -> float:
-    """Largest relative error of a dipole's own tensor, and of another source's field at the dipoles' places, if any.
+    """Largest relative error of a dipole's own tensor, and of another source's field at the dipoles, if any.
 
-    Of sources of which dipoles at so many `places` come first, at `angular_frequencies` (k,) rad/s: from products
-    `residuals` (k, sources, sources), whose norms bound the errors of fields, and `couplings` of the same shape.
+    At `angular_frequencies` (k,), from products `residuals` and `couplings` (k, sources, sources); `places`: of the
+    dipoles.
     """
     n, omega = places, angular_frequencies[:, None]
     sizes = np.einsum("kii->ki", residuals).real
@@ -391,13 +385,11 @@ def solve_currents(
     others: OtherSources | None = None,
     watch: Watch = unwatched,
 ) -> PlateSolution:
-    """Currents for dipoles in `boxes` and for `others`, at all frequencies between the two (Hz).
+    """Currents for dipoles in `boxes` and for `others`, at all `frequencies` between the two (Hz).
 
-    An order that is expected to do is not solved for the sake of its error alone: the currents are trained on it at
-    once, and its error follows from their network. Raises ValueError: a box touches the plate; AccuracyError: the mesh
-    is too coarse for `rtol`. `boxes`: in the plate's frame; `rtol`: relative accuracy of reaction tensors that a table
-    shall have; `rule`: mesh, left out, the one that has been found to need the least work for `rtol`; `others`: more
-    sources whose currents are held; `watch`: progress callback.
+    An order that is expected to do is trained at once, and its error follows from the network. `plate`, `boxes`: in its
+    frame; `rtol`: of reaction tensors; `rule`: of the mesh; left out, what needs the least work; `watch`: progress
+    callback. Raises ValueError: a box touches the plate; AccuracyError: the mesh is too coarse.
     """
     start = time.perf_counter()
     others = others or OtherSources()

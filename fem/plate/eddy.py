@@ -182,12 +182,11 @@ class EddyResponse:
 def solve_eddy(
     conductors: ConductorMesh, order: int, frequency: float, sources: Sequence[Source], space: EddySpace | None = None
 ) -> EddyResponse:
-    """Eddy currents of all `sources` at `frequency` (Hz) in `conductors`, or on a `space` on their mesh that is there.
+    """Eddy currents of all `sources` at `frequency` (Hz) in `conductors`, with an `order`, or on a known `space`.
 
-    Any frequency from 0 up is safe: the gauge needs no parameter, and below ωμ0σL² = 1e-2 the resistive limit is used,
-    exact to 1e-8.  At high frequency the mesh must resolve the skin depth: `plate_reaction` sees to it. Raises
-    ValueError: frequency negative or not finite, order below 1, or no sources; TooLargeError: the memory does not hold
-    the system.
+    Any frequency from 0 up is safe: below ωμ0σL² = 1e-2 the resistive limit is used, exact to 1e-8; at high ones the
+    mesh must resolve the skin depth. Raises ValueError: frequency negative or not finite, order below 1, or no sources;
+    TooLargeError: the memory does not hold the system.
     """
     if not (np.isfinite(frequency) and frequency >= 0):
         raise ValueError(f"Input frequency_hz must be finite and not negative; instead received {frequency!r}.")
@@ -204,9 +203,9 @@ def solve_eddy(
 
 
 def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -> EddyResponse:
-    """Eddy currents of all `sources` on `space` where iω is `shift`, rad/s: a real one for fields that grow as e^{st}.
+    """Eddy currents of `sources` on `space` where iω is `shift`, rad/s: real for growing fields.
 
-    Raises TooLargeError: the memory does not hold the system.
+    Raises TooLargeError.
     """
     system = ShiftedSystem(space, shift)
     images = space.class_images(sources)
@@ -225,10 +224,10 @@ def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -
 def current_density(
     response: EddyResponse, applied: ComplexArray, amplitudes: ArrayLike, points: ArrayLike
 ) -> ComplexArray:
-    """J = -iωσ(A_s + A) (n, 3), A/m², at points (n, 3), m; zero in air. Raises ValueError: a point outside the mesh.
+    """J = -iωσ(A_s + A) (n, 3), A/m², at `points` (n, 3), m; zero in air.
 
-    `applied`: (n, 3) T m, potential A_s of the sources with their amplitudes at the same points; `amplitudes`: of the
-    sources that `response` was solved for.
+    `applied`: (n, 3) T m, A_s of the sources with their `amplitudes` there; `response`: to unit ones. Raises
+    ValueError: a point outside the mesh.
     """
     points, space = np.asarray(points, float).reshape(-1, 3), response.space
     mirrors = list(space.parity.mirrors)
@@ -379,12 +378,11 @@ def plate_reaction(
     rule: MeshRule | None = None,
     refinements: int = 3,
 ) -> PlateReaction:
-    """Reaction tensors of `plate` at `positions` (n, 3), m, and `frequency`, Hz, phasors e^{+iωt}.
+    """Reaction tensors of `plate` at `positions` (n, 3), m, laboratory frame, and `frequency`, Hz, phasors e^{+iωt}.
 
-    Raises ValueError: a position inside the plate, a size, a conductivity or a frequency out of range; AccuracyError:
-    `rtol` not reached after all refinements of the mesh, or with `MOST_UNKNOWNS`. `plate`: its body may have any pose;
-    it is solved in its own frame; `positions`: laboratory frame, outside the plate; `rtol`: estimated relative error
-    asked of every own tensor; `rule`: first mesh; `refinements`: how often the mesh may be refined.
+    `rtol`: estimated relative error asked of every own tensor; `rule`: first mesh; `refinements`: how often it may be
+    refined. Raises ValueError: an argument out of range; AccuracyError: `rtol` not reached after all refinements, or
+    with `MOST_UNKNOWNS`.
     """
     places = np.asarray(positions, float).reshape(-1, 3)
     if frequency == 0:

@@ -176,10 +176,9 @@ class FloatingModes:
     def passing(self, way: Array, speed: float) -> tuple[Array, Array]:
         """Currents x (n, states), √J, that a steady way past the sources leaves, and the fluxes there.
 
-        Exact for fluxes that change steadily from place to place.  With G and its derivative along the way (n, 2,
+        Exact for fluxes that change steadily from place to place. With G and its derivative along the way (n, 2,
         states, sources), √J/A, x G' is the drag, and x by the difference of two sources' G the force along what parts
-        them. `way`: (n,) m, places as of `heights`, at equal distances; there are no currents at the first; `speed`:
-        m/s; the first source has 1 A.
+        them. `way`: (n,) m as `heights`, evenly, without currents at first; `speed`: m/s; the first source has 1 A.
         """
         fluxes = np.array([self.flux(place) for place in way])
         lasts = self.rates * (way[1] - way[0]) / speed
@@ -189,10 +188,10 @@ class FloatingModes:
         return np.array(own), fluxes
 
     def mean_force(self, height: float, amplitudes: Array, frequencies: Array) -> float:
-        """Force (N) upwards at rest, in the mean of a period.
+        """Force (N) upwards at rest, at a `height` (m), in the mean of a period.
 
-        `height`: of the centre, m, within `heights`; `amplitudes`: (sources,) complex, of the currents' e^{iωt}, A;
-        `frequencies`: (sources,) of the currents, Hz; sources of different ones do not act together in the mean.
+        `amplitudes`: (sources,) complex, of the currents' e^{iωt}, A; `frequencies`: (sources,) Hz; unlike ones do not
+        act together.
         """
         flux, slope = self.flux(height)
         total = 0.0
@@ -249,10 +248,9 @@ def modes_along(
     order: int,
     degree: int = DEGREE,
 ) -> FloatingModes:
-    """Modes of a conductor that moves along an axis beside any sources.
+    """Modes of a conductor of a `mesh` that moves along an axis beside any `sources`, at each height in its frame.
 
-    `mesh`: of the conductor; `sources`: at each height (m) of the conductor, in its frame; `heights`, `frequency`,
-    `rtol`, `order`: as of `floating_modes`; `degree`: of the series of G.
+    `heights`, `frequency`, `rtol`, `order`: as of `floating_modes`; `degree`: of the series of G.
     """
     start, (low, high) = time.perf_counter(), heights
     training = round(TRAINED * degree / DEGREE)
@@ -317,9 +315,9 @@ class FreeModes:
         return np.asarray(self.moments.reshape(len(self.rates), -1) @ local.reshape(self.sources, -1).T)
 
     def mean_force(self, place: Array, rotation: Array, amplitudes: Array, frequency: float) -> Array:
-        """Force (3,) N at rest in the mean of a period, of currents e^{iωt} of one frequency (Hz).
+        """Force (3,) N at rest, at a `place` with a `rotation`, in the mean of a period, of currents e^{iωt}.
 
-        `place`, `rotation`: of the conductor; `amplitudes`: (sources,) complex, A; `frequency`: Hz.
+        `amplitudes`: (sources,) complex, A; `frequency`: Hz.
         """
         _, slopes = self.fields(place + self.places @ rotation.T)
         rate = 2j * np.pi * frequency
@@ -346,10 +344,9 @@ def sampled_poses(body: Solid, room: Room, count: int, seed: int) -> list[tuple[
 
 
 def free_modes(over: Levitated, room: Room, rtol: float = 1e-3, order: int = 4) -> FreeModes:
-    """Modes of a conductor in any pose over coils.
+    """Modes of a conductor in any pose over coils; `over`, `rtol`, `order` are as of `floating_modes`.
 
-    `room`: lowest and highest (3,) m of its centre, and a height (m) above all windings under which no point of it
-    comes; `over`, `rtol`, `order`: as of `floating_modes`.
+    `room`: lowest and highest (3,) m of its centre, and the height (m) above all windings that it keeps above.
     """
     start, ((low, high), floor), around = time.perf_counter(), room, over.body.circumradius
     potentials, owners, coils = list[AxialPotential](), list[int](), over.coils
@@ -405,10 +402,7 @@ FREE = TableKind("floating-free", FreeModes, "Modes of a conductor in any pose o
 def cached_floating_modes(
     over: Levitated, region: Range | Room, rtol: float, report: Report
 ) -> tuple[FloatingModes | FreeModes, bool]:
-    """`floating_modes` or `free_modes`, by what the region is, from the cache if they are there, and whether they were.
-
-    `over`, `region`, `rtol`: as of these; `report`: gets messages.
-    """
+    """`floating_modes` or `free_modes` of `over`, a `region` and `rtol`, cached, and whether; messages to `report`."""
     windings = [(coil.center, coil.radius, coil.width, coil.height, coil.turns) for coil in over.coils]
     shares = [list(map(float, share)) for share in over.shares]
     inputs = (over.body.shape_numbers, over.conductivity, windings, shares, region, over.frequency, rtol)

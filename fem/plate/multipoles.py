@@ -68,11 +68,11 @@ class Multipoles:
         return np.asarray((-1.0) ** m * scipy.special.factorial2(2 * (degree + order) - 1))
 
     def derivatives(self, position: Sequence[hy.expression], order: int) -> list[list[hy.expression]]:
-        """Derivatives of each harmonic f by scaled lengths over its factor, as heyoka expressions of a position (m).
+        """Derivatives of each harmonic f by scaled lengths over its factor, as heyoka expressions of a `position` (m).
 
-        With n = `order`, (-∂z)ⁿ f and then real and imaginary part of (-1)ᵇ (-∂z)ⁿ⁻ᵇ (∂x + i∂y)ᵇ f for b = 1 … n: sums
-        of two monic harmonics of degree l + n, as (∂x ± i∂y) Θ_lm = ±Θ_(l+1)(m±1).  Their factors, and those by which x
-        and y come from x ± iy, are left to those who sum many of them: in Taylor's method every product costs.
+        With n = `order`, (-∂z)ⁿ f, then both parts of (-1)ᵇ (-∂z)ⁿ⁻ᵇ (∂x + i∂y)ᵇ f for b = 1 … n: sums of two monic
+        harmonics, as (∂x ± i∂y) Θ_lm = ±Θ_(l+1)(m±1). Factors are left to those who sum many: in Taylor's method every
+        product costs.
         """
         found: dict[int, list[hy.expression]] = {}
         for center in np.unique(self.centers, axis=0):

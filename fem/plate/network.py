@@ -149,10 +149,7 @@ def coupling_error(found: ComplexArray, truth: ComplexArray, places: int) -> flo
 
 
 def tensor_error(values: Array, error: Array, rates: Array, omega: float) -> float:
-    """Largest relative error of reaction tensors at `omega`, rad/s, from an `error` of field functions (states, n, 3).
-
-    `values` of these and `rates`, 1/s, are those of the states.
-    """
+    """Error of tensors at `omega`, rad/s, by an `error` of `values` (states, n, 3) and the `rates`, 1/s."""
     weight = 1 / (rates + 1j * omega)
     exact, found = (np.einsum("ina,i,inb->nab", b, weight, b, optimize=True) for b in (values, values - error))
     return float(np.max(np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))))
@@ -177,11 +174,10 @@ def from_elements(
     others: OtherSources,
     space_error: float,
 ) -> Reduction:
-    """Networks of `plate` for a region within the boxes and frequencies (Hz) within those of a `solution`.
+    """Networks of `plate` for a `region` and `frequencies` (Hz) within those of a `solution`, and `others`: the rotor.
 
-    Raises AccuracyError: (the reduction) all of the solution's states do not suffice. `rtol`: relative accuracy of
-    reaction tensors (Frobenius norm) and of the fields of `others`; `others`: more sources whose currents the networks
-    shall hold: the rotor's; `space_error`: what the solution's states miss of these, relative.
+    `rtol`: relative accuracy of reaction tensors (Frobenius norm) and of the others' fields; `space_error`: what the
+    solution's states miss of these. Raises AccuracyError: (the reduction) all of the states do not suffice.
     """
     space, (low, high) = solution.space, frequencies
     # Classes of the plate's mirrors that do not mirror the region are mixed by every source: they share their states.
@@ -246,10 +242,7 @@ def from_elements(
 def _functions(
     signals: Callable[[Array], Array], network: PassiveNetwork, rtol: float, watch: Watch
 ) -> tuple[Multipoles, Array, float]:
-    """`PassiveNetwork.field_functions` from the fields on the region's surface, which determine those within.
-
-    `signals` are those of three unit dipoles at each of some places.
-    """
+    """`PassiveNetwork.field_functions` from fields on the region's surface, by the `signals` of unit dipoles."""
     region, rates = network.region, network.rates
     extent = region.upper - region.lower
     x, y, z = np.clip(np.ceil(13 * np.sqrt(extent / extent.max())), 6, 13).astype(int)  # more along the longer edges
@@ -272,9 +265,9 @@ def _functions(
 
 
 def candidates(region: Region, body: Solids, degree: int = DEGREE) -> Multipoles:
-    """Multipoles up to a `degree` to choose from, for a `region` beside a plate's `body`, in its frame.
+    """Multipoles up to a `degree` to choose from, for a `region` beside a plate's `body`, behind each of its surfaces.
 
-    They lie behind its surface, of several bodies behind each one's. Raises ValueError: the region touches the plate.
+    Raises ValueError: the region touches the plate.
     """
     centers = []
     for center, half in body.blocks:

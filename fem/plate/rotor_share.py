@@ -87,10 +87,10 @@ class RotorSource:
 
 
 def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> list[Source]:
-    """The parts of a rotor's table that reach the plate, in the rotor's frame.
+    """The parts of a rotor's `table` that reach the `plate`, in the rotor's frame.
 
-    `left_out`: degrees whose field at the plate is below this share of the rotor's are dropped. Raises InputError: the
-    plate comes so near that an expansion does not converge in it.
+    `left_out`: degrees below this share of its field there are dropped. Raises InputError: an expansion does not
+    converge.
     """
     parts: list[Source] = []
     moments = list(table.expansions)
@@ -174,11 +174,10 @@ def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
 
 
 def rotor_share(network: PassiveNetwork, rotor: TurningRotor, tolerance: float, watch: Watch = unwatched) -> RotorShare:
-    """Signals of a rotor for the pose and the way of its plate.
+    """Signals of a `rotor` for the pose and the way of its plate, of a `network` of what stands for that.
 
-    Raises AccuracyError: the tolerance is not met with the most terms. `network`: of a plate of the same size and
-    conductivity, or of what stands for it; `tolerance`: for the estimated error; harmonics and depths are added until
-    it is met; `watch`: progress callback.
+    Harmonics and depths are added until `tolerance` is met; `watch`: progress callback. Raises AccuracyError: the most
+    do not.
     """
     distance, cached = rotor.plate.way, dict[tuple[float, float], Array]()
 
@@ -249,10 +248,10 @@ def _left_out(sizes: Array) -> Array:
 
 
 def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:
-    """The share without its highest harmonics, as many as the floater may miss.
+    """The `share` without its highest harmonics, as many as the floater may miss; `table` is of its network.
 
-    `table`: of the same network; `allowed`: sum over the harmonics left out of their part of the field of the rotor's
-    currents, or of its gradient, it is added to the share's error.
+    `allowed`: sum over these of their part of the field of the rotor's currents, or its gradient; the share's error
+    adds it.
     """
     # Largest part that each harmonic has in field or gradient, at any place, depth and frequency.
     functions, slopes = table.field_functions(table.region.grid(POINTS))

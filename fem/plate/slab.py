@@ -97,20 +97,18 @@ def wave_numbers(height: Array, aperture: float = np.pi / 4) -> tuple[Array, Arr
 
 
 def reaction_tensor(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> ComplexArray:
-    """G (..., 3, 3), T/(A m²): B = G m at a dipole `height` (m) over the face of a `slab`, phasors e^{+iωt}.
+    """G (..., 3, 3), T/(A m²): B = G m at a dipole `height` (m) over the face of a `slab`; see `mutual_tensor`.
 
-    Heights and frequencies (Hz) are broadcast.  Relative error below 1e-12 from 0 to beyond 1 MHz; G = 0 at 0 Hz.
-    Raises ValueError: height not positive, or frequency negative.
+    Heights and each `frequency` (Hz) are broadcast. Relative error below 1e-12 from 0 to beyond 1 MHz; G = 0 at 0 Hz.
     """
     places = np.asarray(height, float)[..., None] * [0.0, 0.0, 1.0]
     return mutual_tensor(slab, places, places, frequency)
 
 
 def drag_and_lift(slab: Slab, height: float, speed: float) -> tuple[float, float]:
-    """Drag on and lift of a vertical dipole of 1 A m² over a `slab` that moves, N/(A m²)².
+    """Drag on and lift of a vertical dipole of 1 A m², `height` (m) over a `slab` with a `speed` (m/s), N/(A m²)².
 
-    Each wave of the dipole's field comes back at the frequency kₓv/2π (J. R. Reitz, J. Appl. Phys. 41, 2067 (1970)).
-    `height`: of the dipole over the face, m; `speed`: m/s.
+    Each wave of its field comes back at the frequency kₓv/2π (J. R. Reitz, J. Appl. Phys. 41, 2067 (1970)).
     """
     k, dk = wave_numbers(np.asarray(height))
     along = np.cos((np.arange(4 * ANGLES) + 0.5) * np.pi / (2 * ANGLES))
@@ -161,9 +159,9 @@ def corners(region: Region, frame: SlabFrame) -> Array:
 
 
 def rotor_reach(plate: Plate, rotor: RotorTable, frame: SlabFrame) -> Array:
-    """Corners (n, 3) m of the rotor's magnets at many angles, and both ends of the plate's way, in cylinder's frame.
+    """Corners (n, 3) m of the rotor's magnets at many angles and both ends of the plate's way, in `frame`.
 
-    Raises InputError: they are not all on the region's side of the slab.
+    Of `plate` and `rotor`. Raises InputError: they are not all on the region's side of the slab.
     """
     own = np.concatenate([magnet.box.corners for magnet in rotor.magnets])
     turns = [rotation_matrix((0.0, 0.0, angle)) for angle in np.linspace(0.0, 360.0, ANGLES, endpoint=False)]
@@ -201,11 +199,10 @@ def slab_modes(slab: Slab, wave_numbers: Array, count: int) -> SlabModes:
 
 
 def modes_needed(slab: Slab, wave_number: float, frequency: float, tolerance: float) -> int:
-    """Number of modes that leave out less than a tolerance of the reflection.
+    """Number of modes of a `slab` that leave out less than a `tolerance` of the reflection, at most 1.
 
     What N modes leave out is 4 k κ² t³ / (3 π⁴ N³), κ² = ωμ0σ, of a reflection near 1, and 16 (kt)³ / (3 π⁴ N³) of one
-    in the limit of slow changes; in between the sum is enough. `slab`: its thickness t and conductivity σ;
-    `wave_number`, `frequency`: the highest, 1/m and Hz; `tolerance`: of the reflection, whose largest value is 1.
+    in the limit of slow changes; between them the sum. `wave_number` (1/m) and `frequency` (Hz): the highest.
     """
     kt, squared = wave_number * slab.thickness, 2 * np.pi * frequency * MU_0 * slab.conductivity * slab.thickness**2
     return int(np.ceil(np.cbrt(4 * kt * (squared + 4 * kt * kt) / (3 * np.pi**4 * tolerance)))) + 4
@@ -214,8 +211,8 @@ def modes_needed(slab: Slab, wave_number: float, frequency: float, tolerance: fl
 def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: ArrayLike) -> ComplexArray:
     """G (..., 3, 3), T/(A m²): reaction B = G m of a `slab` at `points` (..., 3) to a dipole m at `source` (..., 3), m.
 
-    The face is z = 0.  Shapes broadcast, with `frequency` (Hz) against the leading ones.  Relative error below
-    1e-11 up to a lateral distance of about 20 (z+z'); farther off, the oscillation takes more and more nodes.
+    The face is z = 0; `frequency` (Hz) is broadcast against leading shapes. Relative error below 1e-11 up to a lateral
+    distance of 20 (z+z'); farther off, the oscillation takes ever more nodes.
     """
     points, source = np.broadcast_arrays(np.asarray(points, float), np.asarray(source, float))
     offset = points - source
@@ -242,9 +239,8 @@ def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: A
 def edge_error(plate: Plate, place: Array) -> float:
     """Estimated relative error of an infinite slab's reaction for a plate with edges, at most 1.
 
-    It goes with the share of the source's squared potential that lies beyond the edges at the far face, for a
-    source at `place` (3,) m.  Summed over the dipole's directions that falls as 1/r⁴, whose integral over the plane is
-    π/depth².
+    It goes with the share of the squared potential of a source at `place` (3,) m that lies beyond them at the far face:
+    summed over a dipole's directions it falls as 1/r⁴, whose integral over the plane is π/depth².
     """
     body, normal = plate.box.to_body(place), int(np.argmin(plate.box.size))
     depth = abs(float(body[normal])) + plate.box.half_edges[normal]
@@ -261,10 +257,10 @@ def edge_error(plate: Plate, place: Array) -> float:
 
 
 def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
-    """Relative error of an infinite slab's reaction at `places` (n, 3) m, for a plate with edges.
+    """Relative error of an infinite slab's reaction at `places` (n, 3) m, for a `plate` with edges.
 
-    The first place's own tensor at a low frequency and, of a rotor that turns, at `frequency` (Hz), where also the
-    field there of dipoles at the others.
+    Of the first place's tensor at a low frequency and, of a rotor that turns, at `frequency` (Hz), with fields of the
+    others.
     """
     body = plate.box.to_body(places)
     changes = []
@@ -281,8 +277,8 @@ def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
 def cached_edge_error(plate: Plate, places: Array, frequency: float, report: Report) -> float:
     """`measured_edge_error` of `plate`, cached; `report` is called where it is computed.
 
-    At places rounded in the plate's frame and frequencies to a quarter of an octave, so that neighbours in a sweep
-    share it, also where the plate is moved: by that it errs by 6 % at most.
+    `places` are rounded in the plate's frame and `frequency` to a quarter of an octave, so that neighbours in a sweep
+    share it: by that it errs by 6 % at most.
     """
     step = min(NEIGHBOURS, 2.0 ** np.floor(np.log2(OF_DISTANCE * float(plate.body.distance(places[0])))))
     body = np.round(plate.box.to_body(places) / step) * step

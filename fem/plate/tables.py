@@ -74,11 +74,10 @@ class PlateAround:
     def tables(
         self, solve: Callable[..., currents.PlateSolution] = currents.solve_currents, watch: Watch = unwatched
     ) -> Both:
-        """Both, by `solve` for the finite elements; `cached_currents` has them from the cache.
+        """Both, by `solve` for the finite elements; `cached_currents` has them from the cache; `watch` gets progress.
 
-        Raises InputError: the plate is too near to the rotor, or, as a slab, not beside all of it and the region with
-        one of its two largest faces; ValueError: region in the plate, or a parameter out of range; AccuracyError:
-        `rtol` not reached.
+        Raises InputError: the plate is too near to the rotor or, as a slab, not beside all of it; ValueError: a
+        parameter out of range; AccuracyError: `rtol` not reached.
         """
         conductor = "this plate, taken as an infinite slab, and this place of the floater" if self.slab else CONDUCTOR
         network, table = _reduced_table(self._reduction(solve, watch), self.rtol, conductor, watch)
@@ -130,8 +129,8 @@ class PlateAround:
     def changed_shares(self, known: Both, others: Sequence[tuple[Plate, RotorTable]], report: Report) -> Array:
         """Series (k, 2H+1, states) √J in the angle of k `others`, rotors and poses of a plate that has not gone down.
 
-        Of the network and harmonics of what was made, `known`, from the cache if they are there; `report` gets
-        messages. Raises ComputationError: the network comes out otherwise than when the table was made.
+        Of the network and harmonics `known`, cached; `report` gets messages. Raises ComputationError: the network comes
+        out otherwise.
         """
         more = tuple((plate.body, rotor.uniform, rotor.expansions) for plate, rotor in others)
         return CHANGED.cached((self.key, more), lambda: (self._changed(known, others, report), 0.0), report)[0][0]

@@ -84,11 +84,10 @@ def wave_moment(source: Source, vectors: ComplexArray, shift: ComplexArray) -> C
 def cylinder_moments(
     sources: Sequence[Source], origin: Array, axes: Array, wave_numbers: Array, orders: int, directions: int
 ) -> ComplexArray:
-    """∫ M·∇[J_m(kρ) e^{imφ} e^{-kz}] dV (sources, n, orders), A m, for m = 0 … orders - 1.
+    """∫ M·∇[J_m(kρ) e^{imφ} e^{-kz}] dV (sources, n, orders), A m, of `sources`, for m = 0 … `orders` - 1.
 
-    `origin`, `axes`: (3,) m and (3, 3) of the cylinder's frame, columns are its axes, the last is the cylinder's;
-    `wave_numbers`: (n,) k, 1/m; `directions`: number of equidistant α, the sum over them confuses the orders m and
-    directions - m.
+    `origin` (3,) m and `axes` (3, 3) by columns are of the cylinder, `wave_numbers` (n,) k, 1/m; `directions`: number
+    of equidistant α, which confuses the orders m and directions - m.
     """
     angle = 2 * np.pi * np.arange(directions) / directions
     local: ComplexArray = np.stack([1j * np.cos(angle), 1j * np.sin(angle), -np.ones(directions) + 0j], axis=1)
@@ -144,12 +143,11 @@ def _slab_waves(frame: SlabFrame, near: Array, far: Array, frequency: float, tol
 def from_slab(
     plate: Plate, region: Region, frequencies: tuple[float, float], rtol: float, others: OtherSources, far: Array
 ) -> networks.Reduction:
-    """Networks of the slab that stands for `plate`, for dipoles in `region` and `others`.
+    """Networks of the slab that stands for `plate`, for dipoles in `region` and `others`: the rotor.
 
-    Raises InputError: the region is not over one of the plate's two largest faces; ValueError: frequencies not 0 <
-    lowest < highest, or rtol not between 0 and 1. `frequencies`: lowest and highest, Hz; `rtol`: relative accuracy of
-    reaction tensors and of the others' fields; `others`: more sources whose currents the networks shall hold: the
-    rotor's; `far`: (n, 3) m, how far these reach, in the frame of the cylinder.
+    `frequencies`: lowest and highest, Hz; `rtol`: relative accuracy of reaction tensors and of the others' fields;
+    `far`: (n, 3) m, how far these reach, in the cylinder's frame. Raises InputError: the region is not over one of the
+    two largest faces; ValueError: frequencies or rtol out of range.
     """
     start = time.perf_counter()
     low, high = networks.checked_ranges(frequencies, rtol)

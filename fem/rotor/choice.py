@@ -36,9 +36,8 @@ def resolve_model(
 ) -> tuple[str, str]:
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
 
-    `auto` is the cheapest of dipole, moments and closed form that meets the accuracy; where permeability matters,
-    finite elements, or charges on the surfaces of `MANY` compact magnets, of two of which one is round, or where no
-    more than `ROUGH` is asked. `rotor`, `model`, `rtol` and `nearest` are as of `rotor_table`. Raises ValueError:
+    `auto` is the cheapest of dipole, moments and closed form that meets the accuracy, else charges on the surfaces
+    where these are quicker, else finite elements. `rotor`, `rtol` and `nearest` are as there. Raises ValueError:
     unknown model, or rtol not between 0 and 1.
     """
     if model in MODELS:
@@ -133,10 +132,9 @@ def cached_rotor_table(
     nearest: float | None = None,
     watch: Watch = unwatched,
 ) -> tuple[RotorTable, bool]:
-    """A rotor table from the cache if it is there, and whether it was.
+    """`rotor_table` of `rotor`, `model`, `rtol`, `nearest`, `watch` from the cache if there, and whether it was.
 
-    A lone magnet has one, wherever it is in the rotor. `rotor`, `model`, `rtol`, `nearest` and `watch` are as of
-    `rotor_table`; `report` is called with a message where the cache is damaged.
+    A lone magnet has one, wherever it is; `report` is called with a message where the cache is damaged.
     """
     rotor = _bodies(rotor, model)
     lone = alike(rotor)

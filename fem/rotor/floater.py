@@ -134,8 +134,8 @@ NODES, HIGHEST_PERMEABILITY = 10, 2.0
 def polarizability_tensor(floater: Floater) -> Array:
     """(3, 3) A m²/T: the moment that a uniform field induces in a floater, along its own axes.
 
-    Exact for a sphere; of cuboids, cylinders and rings of μr up to 2 by charges on their surfaces, to 1e-4; of any
-    other body that of the sphere of its magnets' volume.
+    Exact for a sphere; of other shapes with μr up to 2 by charges, to 1e-4; else that of the sphere of its magnets'
+    volume.
     """
     permeable = [magnet for magnet in floater.magnets if magnet.contrast]
     known = all(map(bears_charges, permeable)) and floater.recoil_permeability <= HIGHEST_PERMEABILITY
@@ -256,10 +256,9 @@ TOGETHER = 200_000  # points at which a field is looked at at once
 
 
 def slopes_of(sources: FloaterSources, field: DerivedField, position: Array, axes: Array) -> tuple[Array, Array]:
-    """Force and torque about the centre (n, 6), N and N m, and their derivatives (n, 6, 6).
+    """Force and torque about the centre (n, 6), N and N m, and derivatives (n, 6, 6) by place (m) and a small turn.
 
-    The latter by a change of place, m, and by a small turn about the field's axes. The `sources` are the floater's, the
-    `field` the rotor's; `position` and `axes` are as of `force_and_torque`.
+    About the field's axes; `sources`, `position` and `axes` are as of `force_and_torque`, `field` is the rotor's.
     """
     count = len(sources.places) + len(sources.corners)
     pieces = np.array_split(np.arange(len(position)), max(1, len(position) * count // TOGETHER))

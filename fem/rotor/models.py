@@ -62,11 +62,10 @@ class Accuracy:
 
 
 def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
-    """Points (n, 3) m at which errors are looked at, and the scale (n,) of B (T) there.
+    """Points (n, 3) m at which errors are looked at, from `clearance` on outwards, and the scale (n,) of B (T) there.
 
-    They lie at a distance `clearance` from the magnets and farther out. The scale is that of the magnets' dipoles with
-    their permeability, which is right to a few per cent, but at least a third of its median at like distances and
-    a share of what it would be without signs, where fields cancel; 1 T if nothing is magnetised.
+    That is of the magnets' dipoles with their permeability, right to a few per cent, but at least a third of its median
+    at like distances, and a share of what it would be without signs; 1 T if nothing is magnetised.
     """
     size = max(float(np.linalg.norm(m.box.corners - magnets[0].box.center, axis=1).max()) for m in magnets)
     points = [points_around(magnets, clearance + f * size, FARTHER if f else NEAR) for f in OFFSETS]
@@ -77,10 +76,7 @@ def error_points(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, 
 
 
 def points_around(magnets: tuple[Magnet, ...], offset: float, number: int = FARTHER) -> Array:
-    """Points (n, 3) m at a distance `offset` (m) from the nearest of the `magnets`' faces.
-
-    In `number` directions, of each of up to `FEW` magnets, and in fewer of more.
-    """
+    """Points (n, 3) m at an `offset` (m) from the faces of `magnets`, in `number` directions of each, fewer of many."""
     directions = even_directions(max(number * FEW // max(len(magnets), FEW), LEAST_NUMBER))
     points = np.concatenate([places_off(magnet.body, directions, offset) for magnet in magnets])
     outside = np.all([magnet.body.distance(points) >= offset * (1 - 1e-6) for magnet in magnets], axis=0)
@@ -88,10 +84,7 @@ def points_around(magnets: tuple[Magnet, ...], offset: float, number: int = FART
 
 
 def typical_field(magnets: tuple[Magnet, ...], points: Array, share: float = CANCELLED) -> Array:
-    """B (n,) T to which errors at points (n, 3) m, all about as far away, are relative: see `error_points`.
-
-    `share` is the least, of the field of all magnets without their signs.
-    """
+    """B (n,) T to which errors of `magnets` at `points` as far off are relative; `share`: of it without signs."""
     fields = [uniform_moments(magnet, 1).evaluate(points)[0] for magnet in _carriers(magnets)]
     field = np.linalg.norm(sum(fields), axis=1)
     least = np.maximum(np.median(field) / 3, share * sum(np.linalg.norm(one, axis=1) for one in fields))
@@ -178,11 +171,7 @@ def neglected_permeability(rotor: Rotor, accuracy: Accuracy) -> tuple[MultipoleE
 
 
 def _cut(rotor: Rotor, accuracy: Accuracy) -> tuple[Rotor, ...]:
-    """Pieces whose series converge as near as is asked, or as `NEAREST` of an edge: nearer by they say too much.
-
-    Their number grows with the cube of edge by distance: for a floater of 1 mm below a cube of 10 mm it was 2000, of
-    which each keeps some 10 kB and takes tenths of a second.
-    """
+    """Pieces whose series converge as near as is asked, or as `NEAREST_OF_MODEL`: nearer by, thousands."""
     edge = min(float(magnet.box.size.min()) for magnet in rotor)
     return cut_magnets(rotor, max(accuracy.clearance(rotor), NEAREST_OF_MODEL * edge))
 
@@ -375,11 +364,7 @@ AT_LEAST = 0.5
 
 
 def shortened_table(table: RotorTable, accuracy: Accuracy) -> RotorTable:
-    """The same field within `accuracy.rtol` from `accuracy.nearest` off the magnets' faces on.
-
-    What is left out is known and a doubt of the new table, which still says how wrong it is, nearer too.  A table
-    without expansions stays as it is.
-    """
+    """The same field within `accuracy`, from its `nearest` on; what is left out is a known doubt of it."""
     if not table.expansions:
         return table
     points = error_points(table.magnets, accuracy.clearance(table.magnets))

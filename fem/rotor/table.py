@@ -106,7 +106,8 @@ class RotorTable:
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
-        parts = [part.expressions(position) for part in (*self._closed_forms, *self.expansions)]
+        parts = [part.expressions(position) for part in self._closed_forms]
+        parts += [part.expressions(position) for part in self.expansions]
         return (
             [hy.sum([b[i] for b, _ in parts]) for i in range(3)],
             [[hy.sum([g[i][j] for _, g in parts]) for j in range(3)] for i in range(3)],

@@ -91,10 +91,9 @@ class EasyField:
         return values.reshape(steps, steps), u, v, up
 
     def of_floater(self, number: int, points: Array, turn_deg: float) -> Array:
-        """μ0 H · e (n,) T of the floater alone.
+        """μ0 H · e (n,) T of the floater as a dipole, turned about the rotor's axis by `turn_deg`;
 
-        It is turned about the rotor's axis by `turn_deg`; a dipole, to which nothing responds. `number` and `points`
-        are as of `at`.
+        `number` and `points` are as of `at`.
         """
         if self.floater is None:
             return np.zeros(len(points))
@@ -109,10 +108,7 @@ def easy_axis(magnet: Magnet) -> Array:
 
 
 def working_points(field: EasyField) -> tuple[WorkingPoint | None, ...]:
-    """The working point of every magnet; None for those without polarisation.
-
-    Accuracy: `error` is that of the elements (`NearElements`), against closed forms and magpylib in the tests.
-    """
+    """The working point of every magnet, its `error` that of the elements; None for those without polarisation."""
     polarized = (magnet.polarization.any() for magnet in field.magnets)
     return tuple(_working_point(field, k) if found else None for k, found in enumerate(polarized))
 
