@@ -187,10 +187,10 @@ class TableKind(Generic[Table]):
     def cached(self, inputs: tuple[Any, ...], make: Callable[[], Table], report: Report) -> tuple[Table, bool]:
         """The table of some inputs, from the cache if it is there, and whether it was.
 
-        A damaged entry, or one that was kept under another key, is reported, computed anew and replaced; a cache that
-        cannot be written is reported and does no harm.  While one process makes a table, others that need the same one
-        wait for it.  All tables in its folder together keep `cache_limit` and `most`; what was not used for the longest
-        time makes room. Raises InputError: SPINLEV_CACHE_GB is no positive number; NotKeptError: inside `kept_only`.
+        A damaged entry, or one of another key, is reported, made anew and replaced; a cache that cannot be written is
+        reported. While one process makes a table, others that need it wait. What was not used for the longest time
+        makes room for `cache_limit` and `most`. Raises InputError: SPINLEV_CACHE_GB is no positive number;
+        NotKeptError: inside `kept_only`.
         """
         key, limit = self.key(*inputs), min(self.most or 2**63, cache_limit())
         path = cache_folder() / (self.name if self.most else "") / f"{self.name}-{key}.nc"
@@ -226,10 +226,9 @@ def write_checked(dataset: xr.Dataset, path: str | Path) -> None:
 
 
 def read_checked(path: str | Path, file_format: str | None = None) -> xr.Dataset:
-    """Read a dataset that is as it was written.
+    """Read a dataset that is as it was written; `file_format` None is any, also of files that others have written.
 
-    `file_format`: that it must have; None for any, and for files that others have written or changed. Raises
-    TableFileError: the file is missing, no file, too large, damaged, no netCDF, or not of this format.
+    Raises TableFileError: the file is missing, no file, too large, damaged, no netCDF, or not of this format.
     """
     try:
         whole = sealed(Path(path))
@@ -358,10 +357,9 @@ def alone(path: Path, report: Report) -> Iterator[None]:
 
 @contextmanager
 def owned(folder: Path) -> Iterator[None]:
-    """Be the only process that computes into a folder while the block lasts.
+    """Be the only process that computes into a folder while the block lasts, without locks where there are none.
 
-    The system frees the lock of a process that has ended, however it did. Where there are no locks the block runs
-    without. Raises InputError: another process is at work there; OSError: the folder cannot be made or written.
+    Raises InputError: another process is at work there; OSError: the folder cannot be made or written.
     """
     is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)

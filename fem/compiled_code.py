@@ -36,10 +36,9 @@ _functions: OrderedDict[Path, tuple[Any, int]] = OrderedDict()
 
 
 def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any) -> Compiled:
-    """What a compiler makes of its arguments, from the cache if it is there.
+    """What a `compiler`, `heyoka.cfunc` or `taylor_adaptive`, makes of its arguments, cached.
 
     Damaged code is thrown away without a word and compiled anew; a cache that cannot be written does no harm.
-    `compiler`: `heyoka.cfunc` or `heyoka.taylor_adaptive`; `arguments`, `options`: the compiler's.
     """
     return compiled_later(compiler, lambda: arguments, arguments, **options)
 
@@ -82,8 +81,8 @@ def compiled_later(
 def one_thread() -> Iterator[None]:
     """Let heyoka evaluate in this thread alone; others wait busily for small work: 1.6 times the time of a search.
 
-    Where the environment says that a process has one thread, as the command line does, the others do not come back:
-    each time they do they wake, and wait for a quarter of a command's processor time.
+    Where the environment says that a process has one thread they do not come back: waking them takes a quarter of a
+    command's processor time.
     """
     import heyoka as hy
 

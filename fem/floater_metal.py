@@ -108,10 +108,9 @@ def _computed(pieces: Pieces, floater: Floater) -> CurrentShape:
 
 
 def loss_and_delay(pieces: Pieces) -> tuple[Array, Array, Array, Array]:
-    """K (8, 8) of conducting pieces about the origin, with elements of the last of `ORDERS` and one less, and L, twice.
+    """K (8, 8) of insulated pieces about the origin, by elements of the last of `ORDERS` and of one less, and L, twice.
 
-    By conductivity in m⁵ to m⁷, and by μ0 and conductivity squared in m⁷ to m⁹; the second L is a coarser one.
-    The pieces are insulated from each other. Raises MeshError.
+    By conductivity in m⁵ to m⁷, by μ0 and its square in m⁷ to m⁹; the second L is coarser. Raises MeshError.
     """
     losses, points, flows, squares = np.zeros((8, 8)), list[Array](), list[Array](), list[Array]()
     units, meshes = [body.volume ** (1 / 3) for body, _ in pieces], [mesh_metal([body]) for body, _ in pieces]
@@ -207,8 +206,7 @@ def round_part(matrix: Array) -> Array:
 def _modes(strength: Array, delay: Array) -> tuple[Array, Array]:
     """Delays (n,) and tensors (n, 3, 3) whose sum is `strength` (3, 3) and, each times its delay, `delay` (3, 3).
 
-    Both are symmetric and positive, so that the same three vectors make them: of `delay` v = τ `strength` v the
-    `strength` v. They need not be across each other. Equal delays are one.
+    Both are symmetric and positive: of `delay` v = τ `strength` v the `strength` v make them. Equal delays are one.
     """
     straight = all(np.abs(t - np.diag(np.diag(t))).max() < ALIKE * np.trace(t) / 3 for t in (strength, delay))
     if straight:

@@ -318,8 +318,7 @@ def rotor_losses(
     """Dissipation in `rotor` and `conductors` for a floater whose centre is at least `nearest` (m) from every face.
 
     It is fitted in so many `directions` of each octant; `watch` is a progress callback. Raises ValueError: nothing
-    conducts; InputError: a ring conducts into whose hole the floater fits; TooLargeError: the memory does not hold the
-    finite elements.
+    conducts; InputError: the floater fits into a ring; TooLargeError: the memory does not hold the elements.
     """
     start, pieces = time.perf_counter(), pieces_of(rotor, conductors)
     if not pieces:
@@ -370,7 +369,7 @@ def places_around(bodies: Sequence[Solid], distance: float, seed: int = 0, direc
 
 
 def _error(table: RotorLosses, metals: Sequence[Metal], places: Array) -> float:
-    """Largest error of D over its size, displacements by the distance of a centimetre and turns alike."""
+    """Largest relative error of D, displacements by a centimetre's distance and turns alike."""
     unit = np.repeat([1.0, 1e-2], 3)  # 1 cm: about a place's distance from the currents
     worst = 0.0
     generator = np.random.default_rng(2)
@@ -383,10 +382,10 @@ def _error(table: RotorLosses, metals: Sequence[Metal], places: Array) -> float:
 
 
 def check_metal(pieces: Pieces, frequency: float, nearest: float) -> None:
-    """Refuse pieces of metal whose losses a table cannot hold: too fast ones, and those around the floater.
+    """Refuse `pieces` of metal whose losses a table cannot hold: too fast ones, and those around the floater.
 
-    Raises InputError: with the skin depth, and the conductivity or frequency up to which it would do. `frequency`: of
-    the rotor, Hz; `nearest`: how near the floater's centre comes to a face, m.
+    `frequency`: of the rotor, Hz; `nearest`: how near the floater's centre comes to a face, m. Raises InputError: with
+    the skin depth, and up to what it would do.
     """
     refuse_wide_holes(pieces, nearest)
     for bodies, conductivity in pieces:

@@ -50,8 +50,8 @@ def memory_need(space: ngsolve.FESpace, free: ngsolve.BitArray) -> tuple[float, 
 def require_memory(space: ngsolve.FESpace, free: ngsolve.BitArray, way_out: str) -> None:
     """Refuse a system that the free memory does not hold, before anything of it is made.
 
-    Raises TooLargeError: it says how much is needed, how much there is, and `way_out`. `space`, `free`: NGSolve space,
-    and its unknowns that are solved for; `way_out`: what the user can do.
+    `space`, `free`: NGSolve space, and its unknowns that are solved for; `way_out`: what the user can do, for the
+    message of the TooLargeError.
     """
     need, there = PEAK * sum(memory_need(space, free)), free_memory()
     if need > there:
@@ -126,10 +126,9 @@ Number = TypeVar("Number", np.float64, np.complex128)
 
 
 def solve_condensed(form: ngsolve.BilinearForm, inverse: ngsolve.BaseMatrix, loads: NDArray[Number]) -> NDArray[Number]:
-    """Solutions (n, unknowns), inner unknowns included.
+    """Solutions (n, unknowns), inner ones included, of `loads` (n, unknowns), real or complex as the `form` is.
 
-    `form`: assembled with `condense=True`; `inverse`: of its matrix on the free coupling unknowns; `loads`: (n,
-    unknowns), real or complex as the form is.
+    `form`: assembled with `condense=True`; `inverse`: of its matrix on the free coupling unknowns.
     """
     right, solution = ngsolve.GridFunction(form.space), ngsolve.GridFunction(form.space)
     condensed = right.vec.CreateVector()
@@ -149,11 +148,10 @@ class ConvergenceError(ComputationError):
 
 
 def solve_open(stiffness: Any, inverse: Any, free_dofs: Any, load: Any, boundary: OpenBoundary) -> Any:
-    """The potential, an NGSolve function.
+    """The potential, an NGSolve function, of `load` and `stiffness`, condensed and with the Robin term alone.
 
-    Raises ConvergenceError: the iteration for the open boundary stalls. `stiffness`, `load`: condensed forms, without
-    what harmonics beyond the Robin term do at the boundary; `inverse`: of the stiffness on the free unknowns;
-    `free_dofs`: the unknowns that are not zero, without those that are condensed; `boundary`: of open space.
+    `inverse`: of the stiffness on `free_dofs`, the unknowns that are neither zero nor condensed; `boundary`: of open
+    space. Raises ConvergenceError: the iteration for that stalls.
     """
     potential = ng.GridFunction(stiffness.space)
     load.vec.data += stiffness.harmonic_extension_trans * load.vec

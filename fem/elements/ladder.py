@@ -34,11 +34,10 @@ def trace_moments(solution: Solution) -> Coefficients:
 
 
 def reaction_moments(solution: Solution, degree: int) -> Array:
-    """Coefficients (n, degree + 1, degree + 1) in T of -(μ - 1) ∇ψ in every magnet.
+    """Coefficients (n, degree + 1, degree + 1) in T of -(μ - 1) ∇ψ in every magnet, about centres, in circumradii.
 
-    About the magnets' centres, with radii their circumradii. Because the harmonics Υ_lm have no Laplacian, ∫ ∇ψ·∇Υ dV
-    over a magnet equals the integral of ψ ∂Υ/∂n over its faces. The error is of the order of (μ - 1)² times the square
-    of the error of ∇ψ/(μ - 1).
+    As the harmonics Υ_lm have no Laplacian, ∫ ∇ψ·∇Υ dV over a magnet is the integral of ψ ∂Υ/∂n over its faces. The
+    error is of the order of (μ - 1)² times the square of the error of ∇ψ/(μ - 1).
     """
     mesh, signs = solution.system.mesh, solution.signs
     centers = np.array([(magnet.box.center - mesh.center) / mesh.unit for magnet in mesh.magnets])
@@ -73,8 +72,8 @@ def _share(solution: Solution, k: int) -> tuple[Array, Array, Array]:
 def reaction_dipoles(solution: Solution, number: int) -> tuple[Array, Array, Array]:
     """-(μ - 1) ∇ψ of a magnet's share on the meshed side of the planes, and of those that are its images.
 
-    Integration points (n, 3) m and weights (n,) m³ in the mirrors' frame, and values (n, 3) T there; nothing where the
-    magnet has no share but that of an image.
+    Points (n, 3) m, weights (n,) m³ in the mirrors' frame, and values (n, 3) T; nothing where it has only an image's
+    share.
     """
     mesh = solution.system.mesh
     parts = []
@@ -180,13 +179,11 @@ def solve_rotor(
 ) -> RotorSolution:
     """Solve for every parity part of the polarisation and add up; gaps too narrow for elements are closed.
 
-    Raises ConvergenceError: the iteration for the open boundary stalls; MeshError: no mesh of the magnets fits
-    together. `magnets`, `refinement`: the rotor, and how fine; `formulation`: "split" or "direct", see
-    `magnetostatics`; `degree`: of the moments in `split`, where they are those of -(μ - 1) ∇ψ, in `direct` it is the
-    boundary's; `pieces`: of every magnet, each with its own expansion, by default the magnets; `use_symmetry`: whether
-    to mesh only one side of the mirror planes; `carriers`: in `split`, the magnets with μr = 1 whose closed form is
-    split off, each in the place of one of the magnets, by default the magnets' own remanence; `cells`: of every piece,
-    each with its own expansion, by default one.
+    `magnets`, `refinement`: the rotor, and how fine; `formulation`: "split" or "direct", see `magnetostatics`;
+    `degree`: in `split`, of the moments of -(μ - 1) ∇ψ; `pieces`: of every magnet, each with its own expansion;
+    `use_symmetry`: whether mirror planes are used; `carriers`: in `split`, the magnets with μr = 1 whose closed form is
+    split off, by default the magnets' own remanence; `cells`: of every piece, each with its own expansion. Raises
+    ConvergenceError: the open boundary's iteration stalls; MeshError: no mesh fits together.
     """
     cut = pieces or [(magnet,) for magnet in magnets]
     shifts = closing_shifts(magnets)
@@ -231,10 +228,9 @@ def solve_rotor(
 def _meshed_system(
     bodies: list[Magnet], refinement: Refinement, planes: tuple[int, ...], edges_of: list[Solid]
 ) -> tuple[meshes.MagnetMesh, System, int]:
-    """Mesh, matrix, layers at the edges: where the mesher fails or they do not match, smaller elements, else fewer.
+    """Mesh, matrix, layers at the edges: where mesher or layers fail, smaller elements, else fewer layers.
 
-    Two elements that touch edges of magnets near each other may be refined otherwise on the face between them; in
-    another mesh of nearly the same size they are mostly not there.
+    Elements at edges near each other may be refined otherwise on either side; in other meshes they mostly are not.
     """
     requested = refinement.mesh
     reason = MeshError("The mesh of the magnets does not fit together; change their positions slightly.")
@@ -259,12 +255,11 @@ def in_ball(solution: RotorSolution, points: Array) -> NDArray[np.bool_]:
 
 
 def potential_slopes(solution: RotorSolution, points: Array, beside: Array) -> tuple[Array, Array]:
-    """∇ψ (n, 3) T and its slope ∂_i ∂_j ψ (n, 3, 3) T/m in the ball of the elements, rotor's frame.
+    """∇ψ (n, 3) T and its slope ∂_i ∂_j ψ (n, 3, 3) T/m at `points` in the ball of the elements, rotor's frame.
 
-    ∇ψ converges as h^p, its slope one order slower. Next to a face, nearer than some 1e-4 of an element, the mesh may
-    find a point on the wrong side: where the material is not that of the place `beside`, ∇ψ is continued from there by
-    its slope. `solution`: of the rotor; `points`: (n, 3) m in the ball; `beside`: (n, 3) m, for each point a place
-    farther from the face on the same side.
+    ∇ψ converges as h^p, its slope one order slower. Next to a face the mesh may find a point on the wrong side: where
+    the material is not that of the place `beside`, farther from the face on the same side, ∇ψ of the `solution` is
+    continued from there by its slope.
     """
     mesh, planes, axes = solution.mesh, solution.symmetry.planes, solution.symmetry.axes
     places, others = _in_mesh(solution, points), _in_mesh(solution, beside)
@@ -328,12 +323,10 @@ def refined(
     settings: meshes.MeshSettings,
     watch: Watch = unwatched,
 ) -> tuple[RotorSolution, int, dict[str, list[MultipoleExpansion]]]:
-    """The solution at the first order whose error is below the target.
+    """The solution at the first order whose error is below the `target`, the order, and two estimates of its error.
 
-    With its order, and the two estimates of its error, to be added, as fields. `solve`: solution at an order; `points`,
-    `scale`: where (n, 3) m the error is looked at, and the field (n,) T to which it is relative; `settings`: of the
-    mesh, as given to `refinement_of`; `watch`: called with the progress, as far as the rate of convergence foretells
-    it.
+    These are fields, to be added. `solve`: solution at an order; `points` (n, 3) m and `scale` (n,) T: where the error
+    is looked at, and to what it is relative; `settings`: of `refinement_of`; `watch`: called with the progress.
     """
     first, *others = LAYERS
     coarse, before, old = solve(first), np.inf, list[Coefficients]()

@@ -70,12 +70,11 @@ def assemble(mesh: MagnetMesh, order: int) -> System:
 def stiffness_of(
     mesh: Any, permeability: Mapping[str, Array], ball_radius: float, order: int, way_out: str
 ) -> tuple[Any, Any]:
-    """The space H1 and ∫ ∇v·μ∇ψ on it, condensed, with the Robin term of the sphere `outer`.
+    """The space H1 and ∫ ∇v·μ∇ψ on it, condensed, with the Robin term of the sphere `outer` of a `mesh`.
 
-    Raises MeshError: layers of elements do not match; TooLargeError: the memory does not hold the system. `mesh`: of
-    NGSolve, with the boundary `outer`; `permeability`: (3, 3) μ/μ0 by the name of a region, 1 in the others;
-    `ball_radius`: of that sphere, in the unit of the mesh; `order`: of the elements; `way_out`: what to do where memory
-    is short, for the message.
+    `permeability`: (3, 3) μ/μ0 by the name of a region, 1 in others; `ball_radius`: in the mesh's unit; `order`: of the
+    elements; `way_out`: for the message where memory is short. Raises MeshError: layers of elements do not match;
+    TooLargeError.
     """
     space = ng.H1(mesh, order=order)
     require_memory(space, space.FreeDofs(True), way_out)
@@ -105,13 +104,12 @@ def solve(
     signs: tuple[int, ...] = (),
     rest: Array | None = None,
 ) -> Solution:
-    """Solve for the potential.
+    """Solve for the potential of a `system` from `assemble`.
 
-    Raises ConvergenceError: the iteration for the open boundary stalls. `system`: made by `assemble`; `formulation`:
-    what of the remanence is solved for, see above; `sources`: magnets whose remanent polarisation acts, in `direct`
-    those of the mesh; `boundary_degree`: harmonics up to this degree see an exactly open outer boundary; `signs`:
-    parity of the potential (+1 or -1) at each of the mesh's planes; `rest`: in `split`, J' (n, 3) T of each of the
-    mesh's magnets, by default none.
+    `sources`: magnets whose remanence acts, by a `formulation`, see above; in `direct` those of the mesh;
+    `boundary_degree`: up to which harmonics see an exactly open boundary; `signs`: parity (+1 or -1) at each of the
+    mesh's planes; `rest`: in `split`, J' (n, 3) T of each of the mesh's magnets; by default none. Raises
+    ConvergenceError: the open boundary's iteration stalls.
     """
     mesh, space = system.mesh, system.space
     boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, boundary_degree, system.order, mesh.planes, signs)
@@ -160,8 +158,7 @@ def coulomb_field(magnet: Magnet, points: Array) -> Array:
 def magnet_dipoles(mesh: MagnetMesh, formulation: Formulation = "split") -> Array:
     """∫ M dV (n, 3), T m³, of every magnet, M as above: whole (`direct`) or correction (`split`).
 
-    The error falls as the square of that of ∇ψ: about h² with elements of size h at the edges, where ∇ψ is logarithmic.
-    Raises ValueError: the mesh holds other elements than tetrahedra (hp_layers must be 0).
+    The error falls as the square of that of ∇ψ, about as h². Raises ValueError: elements other than tetrahedra.
     """
     import skfem
     from skfem.helpers import dot, grad, mul

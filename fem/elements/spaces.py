@@ -135,10 +135,7 @@ def region_edges(mesh: ngsolve.Mesh, region: ngsolve.Region) -> NDArray[np.bool_
 
 
 def tree_edges(edges: IntArray, shrunk: NDArray[np.bool_]) -> IntArray:
-    """Numbers of the edges of a spanning tree of the graph in which all `shrunk` edges have length zero.
-
-    `edges`: (n, 2) vertex numbers; `shrunk`: (n,) which edges join their ends to one vertex.
-    """
+    """Numbers of the `edges` (n, 2) of a spanning tree of the graph in which all `shrunk` ones (n,) have no length."""
     vertices = int(edges.max()) + 1
     joined = scipy.sparse.coo_matrix((np.ones(int(shrunk.sum())), edges[shrunk].T), shape=(vertices, vertices))
     count, label = scipy.sparse.csgraph.connected_components(joined, directed=False)

@@ -52,10 +52,7 @@ WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near
 
 @cache
 def graded(count: int) -> tuple[Array, Array]:
-    """Places x (n,) = sin(π/2 sin(π/2 u)), -1 to 1, at Gauss's u, and weights (n,) of an integral over x.
-
-    Up to `FEW` are at sin(π/2 u).
-    """
+    """Places x (n,) = sin(π/2 sin(π/2 u)) at Gauss's u, or up to `FEW` sin(π/2 u), and weights of ∫ dx."""
     u, weights = gauss_legendre(count)
     if count <= FEW:
         return np.sin(np.pi / 2 * u), weights * np.pi / 2 * np.cos(np.pi / 2 * u)
@@ -90,8 +87,8 @@ def _about(place: Array, scale: Array, half: float, count: int) -> tuple[Array, 
 def face_rows(places: Array, normals: Array, halves: Array, counts: tuple[int, int]) -> Array:
     """n·h (T) at places off the plane of a rectangle by the charges (T) at its n × m nodes: weights (t, n m).
 
-    `places`, `normals`: (t, 3), along the rectangle's edges and its normal, from its middle; `halves`: (2,) half edges;
-    `counts`: n and m, nodes along the edges.
+    `places`, `normals`: (t, 3), along its edges and normal, from its middle; `halves`: (2,) half edges; `counts`: n and
+    m.
     """
     (first, second), result = counts, np.empty((len(places), *counts))
     step = max(1, ROWS // ((first + FINE) * (second + FINE) * second))

@@ -127,7 +127,7 @@ class Column:
     def known_unit(self, reading: MapReading, usual: str | None = None) -> str:
         """Its unit, a key of `UNITS`: that which the scene names, else its own, else the `usual` one of such files.
 
-        Raises FieldMapError: no unit, or one that is none of length or of B.
+        Raises FieldMapError: none, or one that is none of length or of B.
         """
         kind = "length" if self.name in AXES else "field"
         if (said := getattr(reading, f"{kind}_unit") or self.unit or usual) is None:
@@ -170,10 +170,9 @@ def column_of(title: str) -> Column | None:
 
 
 def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = False) -> dict[int, Column]:
-    """Columns of a map by number, also those that are one but for what `reading.columns` says.
+    """Columns of a map among `titles` by number, also those that are one but for what `reading.columns` says.
 
-    `x_index` is none beside `x_mm`. `titles`: of all columns; `reading`: of the scene; `vectors`: whether a column can
-    hold all components.
+    `x_index` is none beside `x_mm`; `vectors`: whether a column can hold all components.
     """
     found: dict[int, Column] = {}
     for k, title in enumerate(titles):
@@ -187,10 +186,10 @@ def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = Fa
 
 
 def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) -> dict[int, Column]:
-    """The columns of a map among `titles` by number: each quantity once, of several those that `reading.columns` gives.
+    """The columns of a map among `titles`: each quantity once, of several those that `reading.columns` gives.
 
-    `vectors`: as of `known_columns`. Raises FieldMapError: two columns for one quantity, or none that has what
-    `reading.columns` says.
+    `vectors`: as of `known_columns`. Raises FieldMapError: two columns for one quantity, or none of what `reading`
+    says.
     """
     known = known_columns(titles, reading, vectors)
     if reading.columns and any(c.is_field for c in known.values()):

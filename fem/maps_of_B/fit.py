@@ -96,15 +96,13 @@ class HarmonicFit:
 def fit_harmonics(
     basis: HarmonicBasis, points: Array, field: Array, errors: Array, generator: np.random.Generator
 ) -> HarmonicFit:
-    """Fit the harmonics of `basis` to a field.
+    """Fit the harmonics of `basis` to a `field` (n, 3) T, NaN where not observed, at `points` (n, 3) m.
 
-    The unknowns are fields on the sources' spheres, of which none is expected to be much larger than the dipole's own:
-    that expectation (a ridge) decides where the data do not, and keeps the normal equations regular. The degree is the
-    one that predicts held-out observations best (cross-validation); the fit is then made with all of them. How the fits
-    without one group differ gives the error (jackknife; B. Efron, The Jackknife, SIAM 1982, ch. 3), whatever the
-    distribution of the noise; what the expectation alone decides is added to it. `points`: (n, 3) m; `field`: (n, 3) T,
-    NaN where a component was not observed; `errors`: (n, 3) standard errors, T; only their ratios matter; `generator`:
-    chooses the groups.
+    Unknowns are fields on the sources' spheres, of which none is expected to be much larger than the dipole's own: that
+    expectation (a ridge) decides where the data do not. The degree is the one that predicts held-out observations best
+    (cross-validation). How the fits without one group differ gives the error (jackknife; B. Efron, The Jackknife, SIAM
+    1982, ch. 3), whatever the noise; what the expectation alone decides is added. `errors`: (n, 3) standard errors, T,
+    of which ratios matter; `generator`: chooses the groups.
     """
     groups = generator.permutation(len(points)) % GROUPS
     parts = np.array([_normal_matrix(basis, points, field, errors, groups == k) for k in range(GROUPS)])

@@ -58,10 +58,9 @@ class _Comparison:
 def require_plausible(field_map: FieldMap, magnets: Sequence[Magnet], radius: float) -> None:
     """Refuse a `field_map` that contradicts the magnets.
 
-    The stronger half of `SUBSET` points outside the spheres of `radius` (m) about the magnets is compared with the
-    field of the remanent polarisation. Raises FieldMapError: B larger or smaller by more than a factor of two than that
-    of the magnets, along other directions, or exactly zero where they have a field; or no point outside. Where another
-    unit would explain it, it is named.
+    The stronger half of `SUBSET` points farther than `radius` (m) from `magnets` is compared with the field of their
+    remanence. Raises FieldMapError: B larger or smaller by more than a factor of two, along other directions, or
+    exactly zero; or no point outside. Where another unit would explain it, it is named.
     """
     if not any(magnet.polarization.any() for magnet in magnets):
         return
@@ -328,8 +327,8 @@ def _left_out(
 ) -> tuple[MultipoleExpansion, ...]:
     """What may follow a series that was cut at the basis' end, as fields of the size that is to be doubted.
 
-    A cut series goes on falling as its last eight degrees did, or is level; and it is as large as held-out residuals
-    near the sources say, `EDGE_SAFETY` times, since a grid does not hit the worst places.
+    It falls as its last eight degrees did, or is level, and is `EDGE_SAFETY` times as large as held-out residuals near
+    the sources.
     """
     if fit.degree < basis.degree:
         return ()
@@ -366,9 +365,8 @@ def _region(field_map: FieldMap, centers: Array, radii: Array) -> Array:
 def map_table(path: Path | None, magnets: Sequence[Magnet], reading: MapReading | None = None) -> GriddedTable:
     """Table of the map at `path`, read as `reading` says, in the rotor's frame; sources lie in spheres about `magnets`.
 
-    What the map holds inside those spheres is left out. The magnets' shapes and places say where sources can be; their
-    strength, whether the map is theirs. Raises FieldMapError: no map, a file that is none, one that contradicts the
-    magnets, or too few values outside the spheres.
+    What the map holds inside these is left out. Raises FieldMapError: no map, a file that is none, one that contradicts
+    the magnets, or too few values outside the spheres.
     """
     if path is None:
         raise FieldMapError("Input rotor.field_map must name a file for the model map; instead it is missing.")

@@ -47,10 +47,10 @@ CHARGED = 1.0  # error of the finer charges by what the coarser ones differ from
 def mutual_errors(
     table: MutualTable, coarse: ChargeResponse, rotor: ChargeResponse, floater: Floater, watch: Watch
 ) -> tuple[Array, Array]:
-    """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque found at poses with these gaps.
+    """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque of `table` found at poses there.
 
-    `table` and `floater` are compared with both bodies; `coarse` and `rotor` have two numbers of nodes, which tell the
-    table's error and their own, of the response to the moment alone. `watch` is called with the progress.
+    `coarse` and `rotor`, with two numbers of nodes, tell their own error, of the response to the moment of `floater`
+    alone. `watch` is called with the progress.
     """
     generator = np.random.default_rng(4)
     apart = max(float(np.ptp(np.linalg.eigvalsh(m.permeability_in_rotor))) for m in rotor.magnets)
@@ -110,11 +110,11 @@ SPARE, LEAST = 1.1, 0.5
 def mutual_table(
     magnets: tuple[Magnet, ...], floater: Floater, watch: Watch = unwatched, like: MutualTable | None = None
 ) -> MutualTable:
-    """Mutual magnetisation of a rotor and a spherical floater.
+    """Mutual magnetisation of `magnets` and a spherical `floater`, whose radius, remanence and permeability count.
 
-    Of the `floater` radius, remanence and recoil permeability count. `watch` is called with the progress. The `magnets`
-    respond at as many points as those of a table they are `like`; left out, at as many as the accuracy needs.
-    Raises InputError: a magnet's permeability has other axes than its body, or it is a part from a file.
+    They respond at as many points as those of a table they are `like`; left out, at as many as the accuracy needs.
+    `watch` is called with the progress. Raises InputError: a permeability has other axes than its body, or a part from
+    a file.
     """
     started, magnets, grids = time.perf_counter(), united(magnets), list[ResponseGrid]()
     for k, magnet in enumerate(magnets):
@@ -214,8 +214,8 @@ def _rotor_fit(
 ) -> tuple[list[ResponseGrid], Array]:
     """Strengths λ and coupling that give the products of dipoles' fields with the responses to them.
 
-    `direct`, by points of one weight for a class, which mirrors keep; what is `beyond` by these and the coupling.
-    Places are (p, 3) m, the products (3 p, 3 p) J.
+    `direct`, by points of one weight for a class; what is `beyond` by these and the coupling. At places (p, 3) m, (3 p,
+    3 p) J.
     """
     size = 1 / np.sqrt(np.diag(direct))
     first, second = np.triu_indices(len(direct))
@@ -369,8 +369,8 @@ def _fitted(
 ) -> tuple[list[Array], Array]:
     """Weights of the points' powers (n, powers, 2) of each grid, and those (k,) of what `others` (k, m, rows) do.
 
-    `of_points` makes of the direction (3,) of a magnet's remanence and of what `ResponseGrid.fields` gives at `places`
-    (m, 3) m what each point does (n, m, rows). `right` (m, rows) is what they shall do, and counts by `sizes`.
+    `of_points` makes of the direction (3,) of a remanence and of what `ResponseGrid.fields` gives at `places` (m, 3) m
+    what each point does (n, m, rows); `right` (m, rows) is what they shall do, and counts by `sizes`.
     """
     small, kinds, blocks = list[Array](), list[tuple[Array, int]](), list[Array]()
     for grid in grids:
@@ -428,10 +428,7 @@ def least_squares(columns: Array, values: Array, small: Array, cost: float = PEN
 
 
 def _held(square: Array, right: Array, values: int, small: Array, cost: float = PENALTY) -> Array:
-    """`least_squares` by the normal equations (k, k) and (k,) of so many `values`.
-
-    Of the former the upper triangle counts; they are overwritten, columns first.
-    """
+    """`least_squares` by the normal equations (k, k), whose upper triangle counts and which go, of so many `values`."""
     size = np.sqrt(np.diag(square))
     size[size == 0] = 1.0
     square /= size

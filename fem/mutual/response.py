@@ -39,8 +39,7 @@ MOST_RETURNED = 24  # degrees of the rotor's response to the sphere's
 def singular_ratio(magnets: Sequence[Magnet], ball: Ball) -> float:
     """Radius over the distance of the centre from where the field of a magnet cannot be continued; at most 1.
 
-    The field continues analytically across a face, so that edges alone bound the convergence of its expansion, and the
-    centre of a sphere or the axis of a cylinder, but not of a ring from its hole.
+    Across faces it can: edges bound it, and the centre of a sphere or the axis of a cylinder, but not of a ring.
     """
     nearest = np.inf
     for body in (magnet.body for magnet in magnets):
@@ -266,14 +265,12 @@ def two_body(
     degree: int | None = None,
     rtol: float = 1e-11,
 ) -> TwoBody:
-    """Magnetostatics of both bodies for one pose.
+    """Magnetostatics of `rotor` and `floater` for one pose.
 
-    The floater's centre is at `position` (3,) m, rotor's frame, and its remanent polarisation along `direction` (3,);
-    its radius, remanence and recoil permeability count. `degree` is the highest about its centre; None: from the
-    distance of the nearest edge. The series ends at `rtol` of its first term. Raises TwoBodyError: the bodies overlap,
-    or the series does not converge.
-
-    Accuracy: that of the rotor's response (see `two_body_ladder`) and `tail`.
+    The floater's centre is at `position` (3,) m, rotor's frame, its remanence along `direction` (3,); radius, remanence
+    and permeability count. `degree` is the highest about its centre (None: by the nearest edge); the series ends at
+    `rtol` of its first term. Raises TwoBodyError: the bodies overlap, or it does not converge. Accuracy: that of the
+    rotor's response and `tail`.
     """
     ball = Ball(np.asarray(position, float), floater.radius)
     degree = degree or enough_degree(rotor.magnets, ball)

@@ -28,10 +28,9 @@ class ChangedTable(RotorTable):
 def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> ChangedTable:
     """The field of magnets that differ from a table's: a smooth function of their numbers, for differences.
 
-    A lone magnet that is moved, turned, magnified or polarised more has the table's own field, transformed. What else
-    changes is added to the table by closed forms, or of permeable magnets by charges on their surfaces, as many in both
-    cases; permeable magnets that have none, as parts of STEP files, change as if they were of μr = 1. A table that was
-    itself changed is taken as it was made. With its `doubts` only where they are asked for.
+    A lone `rotor` that is moved, turned, magnified or polarised more has the `table`'s own field, transformed. What
+    else changes is added by closed forms, or by as many charges on surfaces; permeable magnets without these change as
+    if of μr = 1. A changed table is taken as it was made; `doubts` only where asked for.
     """
     table = getattr(table, "origin", table)
     before = table.magnets

@@ -46,10 +46,7 @@ BESIDE_EACH_OTHER, NEARER = 16, 0.9
 
 
 def without_charges(magnets: Rotor, accuracy: Accuracy, points: Array) -> str:
-    """Why charges on their surfaces do not describe the magnets; empty where they do.
-
-    At `points` (n, 3) m, as of `error_points`, their table is to hold with an `accuracy`.
-    """
+    """Why charges on their surfaces do not describe `magnets` to an `accuracy` at `points`; empty where they do."""
     permeable = [magnet for magnet in magnets if magnet.contrast]
     if any(isinstance(magnet.body, Part) for magnet in magnets):  # nor has it a closed form, where μr = 1
         return "one is a part from a STEP file"
@@ -96,8 +93,7 @@ def _fitted_beside(
 ) -> tuple[FittedExpansions, float]:
     """Expansions all over one of the `surfaces`' magnets, as many as its `charges` (n,) T need, and their error.
 
-    They are fitted to the field at the clearance from the magnet, and so are as exact outside. The error is found at
-    other places, in units of what the highest degree does.
+    They are fitted at the clearance; the error is found at other places, in units of what the highest degree does.
     """
     magnet, clearance = surfaces.magnets[number], accuracy.clearance(magnets)
     enough = DENSER * magnet.body.area / (SPACINGS[-1] * clearance) ** 2
@@ -155,11 +151,10 @@ def _ratios(magnets: Sequence[Magnet], points: Array) -> list[float]:
 def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) -> RotorTable:
     """Field of magnets of one recoil permeability each: closed forms, and expansions of the charges on their surfaces.
 
-    Nodes are added until the estimated error meets the accuracy. If no number of `NODES` that memory allows does so, as
-    where faces that nearly touch lie across each other, the last table is returned with an `AccuracyWarning`. The
-    `magnets` are cuboids, cylinders, rings and spheres, m and T in the rotor's frame; `accuracy` is what is asked for;
-    `watch` is called with the progress. Raises InputError: a magnet has two permeabilities, is a part from a file, or
-    is far too large; or round ones touch.
+    Nodes are added until the estimated error meets `accuracy`; if none of `NODES` that memory allows do, as where faces
+    that nearly touch lie across each other, with an `AccuracyWarning`. `magnets` are cuboids, cylinders, rings and
+    spheres in the rotor's frame; `watch` is called with the progress. Raises InputError: one has two permeabilities, is
+    a part from a file, or far too large; or round ones touch.
     """
     start = time.perf_counter()
     points, scale = models.error_points(magnets, accuracy.clearance(magnets))

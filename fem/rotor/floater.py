@@ -105,10 +105,7 @@ class FloaterSources:
         return self.error * np.transpose([b + reach * slope, slope])
 
     def unsure(self, table: FieldTable, position: Array, axes: Array) -> tuple[Array, Array]:
-        """Errors of force (n,) N and torque (n,) N m by those that a `table` states.
-
-        `position` (n, 3) m and `axes` (n, 3, 3) are as of `force_and_torque`.
-        """
+        """Errors of force (n,) N and torque (n,) N m by a `table`'s own; `position`, `axes`: of `force_and_torque`."""
         strengths, arms = (np.linalg.norm(part, axis=1) for part in (self.moments, self.places))
         charges, ends = np.abs(self.charges), np.linalg.norm(self.corners, axis=1)
         forces, torques = np.zeros(len(position)), np.zeros(len(position))
@@ -147,13 +144,12 @@ def polarizability_tensor(floater: Floater) -> Array:
 def floater_sources(
     floater: Floater, report: Callable[[str], None] = lambda _: None, degree: int = DEGREE, near: Floater | None = None
 ) -> FloaterSources:
-    """Sources of a floater of any shape, in its frame.
+    """Sources of a `floater` of any shape, in its frame; a sphere is one dipole.
 
-    Exact for μr = 1 up to a `degree` of the rotor's field over the body; with a permeability to 1e-5 of the field
-    beside the floater, to 1e-3 with a part from a STEP file, which is then its `error`. That is by charges on its
-    surfaces or by finite elements, which are kept in the user's cache. A sphere is one dipole. `report` is called with
-    a message where the cache is damaged. `near` is a floater of nearly the same numbers, whose table is taken: the
-    sources are smooth functions of them.
+    Exact for μr = 1 up to a `degree` of the rotor's field over the body; else to 1e-5 of the field beside it, with a
+    part from a STEP file to 1e-3, its `error` then, by charges on its surfaces or finite elements, which are cached.
+    `report` is called with a message where that is damaged. `near`: a floater of nearly the same numbers, whose table
+    is taken: the sources are smooth functions of them.
     """
     if floater.is_sphere:
         return FloaterSources.dipole(floater.dipole)
@@ -206,11 +202,10 @@ def _charges(expansion: MultipoleExpansion, radius: float) -> tuple[Array, Array
 
 
 def force_and_torque(sources: FloaterSources, table: FieldTable, position: Array, axes: Array) -> tuple[Array, Array]:
-    """Force (n, 3) N and torque (n, 3) N m about the centre in the rotor's field.
+    """Force (n, 3) N and torque (n, 3) N m about the centre of the floater's `sources` in the rotor's `table`.
 
-    The `sources` are the floater's, the `table` the rotor's; `position` (n, 3) m of the centre is in the rotor's frame,
-    and the columns of `axes` (n, 3, 3) are the body's axes, the third that of its remanence. Raises RangeError: part of
-    the floater is where the table does not know the field, such as in a magnet.
+    `position` (n, 3) m is in the rotor's frame, and the columns of `axes` (n, 3, 3) are the body's, the third that of
+    its remanence. Raises RangeError: part of it is where the table does not know the field.
     """
     force, torque = np.zeros((len(position), 3)), np.zeros((len(position), 3))
     for k, (place, turn) in enumerate(zip(position, axes, strict=True)):
@@ -225,10 +220,10 @@ def force_and_torque(sources: FloaterSources, table: FieldTable, position: Array
 
 
 def shares(floater: Floater, sources: FloaterSources, highest: int) -> Array:
-    """(`highest` + 1,) of each degree of multipoles in the force of a dipole one radius off a floater.
+    """(`highest` + 1,) of each degree of multipoles in the force of a dipole one radius off a `floater`.
 
-    By that of its magnets' moments taken together, the mean over directions: what is left out with a degree. The part
-    of degree 1 is what the floater's dipole misses. `sources` are the dipoles and charges in place of the floater.
+    By that of its magnets' moments together, the mean over directions; of degree 1, what the dipole misses of
+    `sources`.
     """
     radius, degrees = floater.radius, multipole_degrees(highest + 1)
     own = np.zeros(len(degrees))

@@ -198,11 +198,11 @@ def fem_table(
     settings: MeshSettings | None = None,
     watch: Watch = unwatched,
 ) -> RotorTable:
-    """Field of magnets with recoil permeability: closed form of the remanence, and expansions of what is added to it.
+    """Field of permeable magnets: closed form of the remanence, and expansions of what is added to it.
 
-    Orders from 2 to 8 are tried until the estimated error meets the accuracy. If none does, the last table is returned
-    with an `AccuracyWarning`; its error estimate says how far it is off. The `magnets` are in the rotor's frame;
-    `accuracy` is by default 3e-6 from 0.8 edges on; `settings` are of the mesh; `watch` is called with the progress.
+    Orders from 2 to 8 are tried until the estimated error meets `accuracy`, by default 3e-6 from 0.8 edges on; if none
+    does, with an `AccuracyWarning`. `magnets` are in the rotor's frame; `settings` are of the mesh; `watch` gets the
+    progress.
     """
     accuracy, settings, start = accuracy or Accuracy(), settings or MeshSettings(), time.perf_counter()
     clearance = accuracy.clearance(magnets)
@@ -255,10 +255,7 @@ def fem_table(
 
 
 def moment_error(magnets: Rotor, points: Array, scale: Array) -> float:
-    """What leaving out the permeability does to B by the moments alone, the largest over the points.
-
-    At `points` (n, 3) m, by a `scale` (n,) T; those of the `magnets` that are from STEP files are left out.
-    """
+    """What leaving out the permeability does to B at `points` by `magnets`' moments alone, over `scale`, at most."""
     missing = np.zeros((len(points), 3))
     for magnet in magnets:
         if magnet.contrast and not isinstance(magnet.body, Part):
@@ -296,10 +293,10 @@ def _guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array
 def trimmed_table(
     table: RotorTable, accuracy: Accuracy, looked_at: tuple[Array, Array], least: float, beside: float, most: int = MOST
 ) -> RotorTable:
-    """The table without what its other doubts leave room for; that is known, and a doubt of its own.
+    """The `table` without what its other doubts leave room for to `accuracy`; that is known, and a doubt of its own.
 
-    It is `looked_at` at `error_points`. `least` is the share of the tolerance that may be left out even if the table
-    itself does not meet it, `beside` that of `BESIDE` next to edges; `most` is that of `trimmed_expansions`.
+    It is `looked_at` at `error_points`. `least` and `beside` are shares of the tolerance that may be left out in any
+    case, and next to edges; `most` is that of `trimmed_expansions`.
     """
     clearance, (points, scale) = accuracy.clearance(table.magnets), looked_at
     rest = table.absolute_error(points)[0]
@@ -338,7 +335,7 @@ def nonzero(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansio
 
 
 def extrapolated_tail(expansions: Sequence[MultipoleExpansion], ratio: float = CONVERGENCE) -> list[MultipoleExpansion]:
-    """What lies beyond the highest degree: the last two degrees, continued as a geometric series.
+    """What lies beyond the highest degree: the last two, continued as a geometric series.
 
     `ratio` is the least distance from a centre, in radii; beyond `CONVERGENCE` it counts as that.
     """

@@ -141,12 +141,11 @@ def near_field(
     highest: int = HIGHEST,
     elements: NearElements | None = None,
 ) -> NearField:
-    """B, H and M anywhere but on the edges of magnets; on a face, those just outside.
+    """B, H and M at `points` (n, 3) m anywhere but on the edges of magnets; on a face, those just outside.
 
-    At `points` (n, 3) m; `rtol` is the error of B asked for, relative to the largest remanence, by the last step of the
-    elements' order; an order above the `highest` is not taken even if `error` is larger then. `elements` are those of
-    these `magnets`, if some are solved already. Raises InputError: a point lies on an edge, where the field is
-    infinite.
+    `rtol` is the error of B asked for, relative to the largest remanence, by the last step of the elements' order, at
+    most the `highest`. `elements` are those of the `magnets`, if some are solved already. Raises InputError: a point on
+    an edge.
     """
     places = np.asarray(points, float).reshape(-1, 3)
     refuse_edges(magnets, places)
@@ -237,10 +236,7 @@ class CompleteTable(RotorTable):
 
     @keeps_shape
     def evaluate(self, places: Array) -> tuple[Array, Array]:
-        """B (..., 3) T and ∂B_i/∂x_j (..., 3, 3) T/m at points (..., 3) m in the rotor's frame, in magnets, too.
-
-        Raises InputError: a point lies on an edge of a magnet.
-        """
+        """`RotorTable.evaluate`, in magnets, too. Raises InputError: a point lies on an edge of a magnet."""
         if self._all_reached(places):
             refuse_edges(self.magnets, places)
             return super().evaluate(places)
@@ -259,10 +255,7 @@ class CompleteTable(RotorTable):
         return bool(self.in_range(places).all() and (self._slow_series(places) == 1).all())
 
     def _slow_series(self, points: Array) -> Array:
-        """Factor (n,) on the stated errors near the magnets: what series leave out grows there as 1/(q² - 1).
-
-        q is the distance from a centre in radii of the ball about the sources; tables count on at least `CONVERGENCE`.
-        """
+        """Factor (n,) on the stated errors near the magnets: what series leave out grows there as 1/(q² - 1)."""
         factor = np.ones(len(points))
         clear = Accuracy().clearance(self.magnets)
         beside = np.min([magnet.body.distance(points) for magnet in self.magnets], axis=0) < clear

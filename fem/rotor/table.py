@@ -35,10 +35,7 @@ class RangeError(InputError):
 
 
 def keeps_shape(method: Callable[[Any, Array], Found]) -> Callable[[Any, ArrayLike], Found]:
-    """A method of points (n, 3) that takes points of any shape (..., 3) and gives what it finds in that shape.
-
-    Raises InputError for points of another shape.
-    """
+    """A method of points (n, 3) for points (..., 3), with what it finds in that shape. Raises InputError: another."""
 
     @wraps(method)
     def at(table: Any, points: ArrayLike) -> Found:
@@ -131,10 +128,7 @@ class RotorTable:
 
     @cached_property
     def rough(self) -> "RotorTable":
-        """The field for a search's first steps: where it has very many moments, those of low degree alone.
-
-        Of expansions about very many places the dipole of each magnet.
-        """
+        """The field for a search's first steps: of very many moments those of low degree, of places the dipoles."""
         if len(self.expansions) <= MANY_PLACES:
             if sum(np.count_nonzero(part.coefficients) for part in self.expansions) <= FEW:
                 return self
@@ -205,10 +199,9 @@ class RotorTable:
 
     @keeps_shape
     def absolute_error(self, points: Array) -> tuple[Array, Array]:
-        """Estimated errors (...,) of B (T) and of its gradient (T/m).
+        """Estimated errors (...,) of B (T) and of its gradient (T/m): the size of each doubt's field.
 
-        The size of each doubt's field there and, but for `KNOWN` ones and those of pieces, a share of its root mean
-        square on spheres about the expansions' centres, because the doubt's own zeros are not those of the error.
+        But for `KNOWN` ones and pieces with a share of its root mean square on spheres: its zeros are not the error's.
         """
         error_b, error_g = np.zeros(len(points)), np.zeros(len(points))
         for cause, doubts in self.doubts.items():
@@ -226,8 +219,7 @@ class RotorTable:
     def left_out(self, points: ArrayLike) -> Array:
         """What a simple model leaves out, as far as it is known: (n, 2, 4, 3) at points (n, 3) m.
 
-        For each of `LEFT_OUT` B (T), to first order, and the three rows of its gradient (T/m); zeros where the model
-        has it.
+        For each of `LEFT_OUT` B (T), to first order, and the three rows of its gradient (T/m).
         """
         points = np.asarray(points, float).reshape(-1, 3)
         found = np.zeros((len(points), len(LEFT_OUT), 4, 3))
@@ -256,9 +248,9 @@ class RotorTable:
         return replace(found, expansions=quiet(found.expansions), doubts=doubts)
 
     def transformed(self, before: Solid, after: Magnet, size: float = 1.0, strength: float = 1.0) -> "RotorTable":
-        """The field of a lone magnet from that of one with the body `before`.
+        """The field of a lone magnet from that of one with the body `before`: as it, but for its pose.
 
-        It is like that but for its pose, `size` times as large, and polarised `strength` times as much.
+        `after` is `size` times as large, and polarised `strength` times as much.
         """
         body = after.body
         turn = body.rotation @ before.rotation.T
@@ -314,10 +306,9 @@ def errors_of_sum(errors: Pair, part: Pair, whole: Pair) -> Pair:
 
 
 def _off_center(doubt: MultipoleExpansion, points: Array) -> Array:
-    """The points (n, 3) m, those near a doubt's centre moved out to `DEEP` of the sphere that holds its sources.
+    """Points (n, 3) m, those near a doubt's centre moved out to `DEEP` of the sphere of its sources.
 
-    In there, as in the hole of a ring, its series diverges and says no more than that nothing is known: a tenth of the
-    radius says so, and the centre itself would be divided by.
+    In there its series diverges and says no more than that nothing is known: a tenth of the radius says so.
     """
     offset = points - doubt.center
     distance = np.linalg.norm(offset, axis=1)
