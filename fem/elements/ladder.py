@@ -76,7 +76,7 @@ def reaction_dipoles(solution: Solution, number: int) -> tuple[Array, Array, Arr
     share.
     """
     mesh = solution.system.mesh
-    parts = []
+    parts = [(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))]
     for k, magnet in enumerate(mesh.magnets):
         owners = [flipped for owner, flipped in _image_numbers(mesh.magnets, k, mesh.planes) if owner == number]
         if f"magnet{k}" not in mesh.mesh.GetMaterials() or not magnet.contrast or not owners:
@@ -86,8 +86,6 @@ def reaction_dipoles(solution: Solution, number: int) -> tuple[Array, Array, Arr
             flips = np.prod([np.ones(3), *(meshes.mirror(plane) for plane in flipped)], axis=0)
             signs = [sign for plane, sign in zip(mesh.planes, solution.signs, strict=True) if plane in flipped]
             parts.append((points * flips, weights, float(np.prod([1.0, *signs])) * values * flips))
-    if not parts:
-        return np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3))
     points, weights, values = (np.concatenate(column) for column in zip(*parts, strict=True))
     return points, weights, values
 
@@ -336,13 +334,11 @@ def refined(
         field = sum(e.evaluate(points)[0] for e in fine.expansions(new))
         size = float(np.max(np.linalg.norm(field, axis=1) / scale))
         # geometric: what is left is rate/(1 - rate) of the last step; the one before, scaled, stands for its direction
-        rate = FIRST_RATE
-        if np.isfinite(before):
-            contrast = strongest(fine.mesh.magnets)
-            fastest = FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG
-            if fine.layers < refinement_of(order, settings, contrast).mesh.hp_layers:
-                fastest = FIRST_RATE  # where layers at the edges lack, orders converge slowly later on
-            rate = min(max(size / before, fastest) if before else 0.0, SLOWEST_RATE)
+        contrast = strongest(fine.mesh.magnets)
+        fastest = FASTEST_RATE if contrast < STRONG else FASTEST_RATE_STRONG
+        if order == others[0] or fine.layers < refinement_of(order, settings, contrast).mesh.hp_layers:
+            fastest = FIRST_RATE  # where layers at the edges lack, orders converge slowly later on
+        rate = min(max(size / before, fastest) if before else 0.0, SLOWEST_RATE)
         factor = SAFETY * rate / (1 - rate)
         earlier = [size / before * d for d in old] if old and before else new
         if 2 * factor * size <= target:

@@ -18,6 +18,7 @@ O. D. Kellogg, Foundations of Potential Theory (1929), ch. VI; P. R. Johnston an
 from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -53,11 +54,10 @@ WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near
 @cache
 def graded(count: int) -> tuple[Array, Array]:
     """Places x (n,) = sin(π/2 sin(π/2 u)) at Gauss's u, or up to `FEW` sin(π/2 u), and weights of ∫ dx."""
-    u, weights = gauss_legendre(count)
-    if count <= FEW:
-        return np.sin(np.pi / 2 * u), weights * np.pi / 2 * np.cos(np.pi / 2 * u)
-    inner = np.pi / 2 * np.sin(np.pi / 2 * u)
-    return np.sin(inner), weights * (np.pi / 2) ** 2 * np.cos(inner) * np.cos(np.pi / 2 * u)
+    x, weights = gauss_legendre(count)
+    for _ in range(1 if count <= FEW else 2):
+        x, weights = np.sin(np.pi / 2 * x), weights * np.pi / 2 * np.cos(np.pi / 2 * x)
+    return x, weights
 
 
 @cache
@@ -151,23 +151,19 @@ class Surface:
         """K (n, n) of the body alone."""
         raise NotImplementedError
 
-    def coarse(self, far: int) -> tuple[Array, Array, Array]:
-        """Places and normals (k, 3) that stand for all from `far` on, 1 or 2, and nodes' values (n, k) by theirs."""
-        if far not in self._coarse:
-            self._coarse[far] = self._fewer(min(COARSE[far - 1], max(self.count // 3, 1) + 2 - far))
-        return self._coarse[far]
-
     @cached_property
-    def _coarse(self) -> dict[int, tuple[Array, Array, Array]]:
-        return {}
+    def seen(self) -> list[tuple[Array, Array, Any]]:
+        """Places and normals (k, 3) for near and at two distances, and nodes' values (n, k) by theirs (None: all)."""
+        counts = [min(most, max(self.count // 3, 1) + 1 - far) for far, most in enumerate(COARSE)]
+        return [(self.places, self.normals, None), *map(self._fewer, counts)]
 
     def _fewer(self, count: int) -> tuple[Array, Array, Array]:
-        """One of `coarse`, with so many places along an edge."""
+        """One of `seen`, with so many places along an edge."""
         raise NotImplementedError
 
     def rows_nearby(self, places: Array, normals: Array) -> Array:
-        """n·h (T) of the charges at places outside the body or on it, (t, n)."""
-        raise NotImplementedError
+        """n·h (T) of the charges at places outside the body or on it, (t, n); by the nodes' own rule."""
+        return far_rows(places, normals, self.places, self.areas)
 
     def refined(self, charges: Array) -> tuple[Array, Array]:
         """More places (k, 3), for high moments, and what is there (k,) of the charges (n,) T by their areas."""
@@ -196,18 +192,15 @@ class _BoxSurface(Surface):
     def _faces(self, rules: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, Array]:
         """Places and normals (n, 3) and areas (n,) on all faces, of `rules` along the axes in half edges."""
         places, normals, areas = [], [], []
-        for axis in range(3):
+        for axis, side in product(range(3), (-1.0, 1.0)):
             first, second, _ = self._order(axis)
             (x, wide), (y, tall) = rules[first], rules[second]
-            pair = np.empty((2, len(x), len(y), 3))
-            pair[0, ..., axis], pair[1, ..., axis] = -self.half[axis], self.half[axis]
-            pair[..., first], pair[..., second] = self.half[first] * x[:, None], self.half[second] * y
-            across = np.zeros_like(pair)
-            across[0, ..., axis], across[1, ..., axis] = -1.0, 1.0
-            area = (self.half[first] * self.half[second] * np.outer(wide, tall)).ravel()
-            places.append(pair.reshape(-1, 3))
-            normals.append(across.reshape(-1, 3))
-            areas += [area, area]
+            face = np.empty((len(x), len(y), 3))
+            face[..., axis] = side * self.half[axis]
+            face[..., first], face[..., second] = self.half[first] * x[:, None], self.half[second] * y
+            places.append(face.reshape(-1, 3))
+            normals.append(np.broadcast_to(side * np.eye(3)[axis], places[-1].shape))
+            areas.append((self.half[first] * self.half[second] * np.outer(wide, tall)).ravel())
         return np.concatenate(places), np.concatenate(normals), np.concatenate(areas)
 
     def _face(self, axis: int, side: int, places: Array) -> tuple[list[int], Array, Array, tuple[int, int]]:
@@ -312,8 +305,8 @@ class _RoundSurface(Surface):
         return few.places, few.normals, np.kron(along, _around(np.pi * np.arange(2 * self.count) / self.count, count))
 
     def rows_nearby(self, places: Array, normals: Array) -> Array:
-        """As of `Surface`: the nodes' own rule, and the charges' own jump on flat faces that touch."""
-        result = far_rows(places, normals, self.places, self.areas)
+        """The nodes' own rule, and the charges' own jump on flat faces that touch."""
+        result = super().rows_nearby(places, normals)
         radius = np.hypot(places[:, 0], places[:, 1])
         around, size = _around(np.arctan2(places[:, 1], places[:, 0]), self.count), 2 * self.count**2
         for number, (middle, way, normal) in enumerate(self.lines):
@@ -340,9 +333,9 @@ class _RoundSurface(Surface):
 
     def _modes(self, line: tuple[Array, Array, Array]) -> Array:
         """(targets, n, orders): n·h at the section's nodes by cos mφ times the polynomials of one line's nodes."""
-        middle, way, normal = line
-        half, count, result = float(np.linalg.norm(way)), self.count, []
-        unit, (x, weights) = way / half, graded(count + FINE)
+        (middle, way, normal), count, result = line, self.count, []
+        half, (x, weights) = float(np.linalg.norm(way)), graded(count + FINE)
+        unit, (u, v) = way / half, gauss_legendre(count + 2 * FINE)
         for place, own in zip(self.section, self.section_normals, strict=True):
             along, off = float((place - middle) @ unit), abs(float((place - middle) @ normal))
             if off > INSET * half:
@@ -354,7 +347,6 @@ class _RoundSurface(Surface):
             sources = middle + s[:, None] * unit
             gap = np.maximum(np.linalg.norm(place - sources, axis=1), ROUND_OFF * half)
             scale = np.minimum(gap / np.sqrt(place[0] * np.maximum(sources[:, 0], ROUND_OFF * half)), WIDEST)
-            u, v = gauss_legendre(count + 2 * FINE)
             top = np.arcsinh(np.pi / scale)[:, None] / 2
             angle, step = scale[:, None] * np.sinh(top * (1 + u)), top * v * scale[:, None] * np.cosh(top * (1 + u))
             r, square = sources[:, :1], gap[:, None] ** 2 + 4 * place[0] * sources[:, :1] * np.sin(angle / 2) ** 2

@@ -106,15 +106,10 @@ class SurfaceCharges:
             for number, pose in enumerate(np.round(poses / ALIKE).astype(int)):
                 ways.setdefault(pose.tobytes(), []).append(number)
             pairs, one = [(targets[way], sources[way]) for way in ways.values()], [way[0] for way in ways.values()]
-            places, normals, _ = self._few(far, seer)
+            places, normals, _ = self._surfaces[seer].seen[far]
             turn = turned[one].swapaxes(1, 2)
             found.append(_View(far, seer, seen, pairs, away[one][:, None] + places @ turn, normals @ turn))
         return found
-
-    def _few(self, far: int, shape: int) -> tuple[Array, Array, Array | None]:
-        """Places and normals of a shape that do at a distance, and the nodes' values by those; None: they are all."""
-        surface = self._surfaces[shape]
-        return surface.coarse(far) if far else (surface.places, surface.normals, None)
 
     @cached_property
     def _rows(self) -> list[list[Array]]:
@@ -125,7 +120,7 @@ class SurfaceCharges:
             other = [view.seer != view.seen or targets[0] != sources[0] for targets, sources in view.pairs]
             places, normals = (some[other].reshape(-1, 3) for some in (view.places, view.normals))
             if view.far:
-                sources = self._few(view.far, view.seen)[0]
+                sources = surface.seen[view.far][0]
                 rows = far_rows(places, normals, sources, np.ones(len(sources)))
             else:
                 rows = np.empty((len(places), len(surface.places)))
@@ -149,7 +144,7 @@ class SurfaceCharges:
             for matrix, (targets, sources) in zip(ways, view.pairs, strict=True):
                 there[:, targets] += _times(matrix, given[view.far, view.seen][:, sources])
         for (far, seer), there in seen.items():
-            share = self._few(far, seer)[2]
+            share = self._surfaces[seer].seen[far][2]
             found[self._of[seer]] += there if share is None else _times(share, there)
         return found
 
@@ -164,7 +159,7 @@ class SurfaceCharges:
         given = {(0, shape): columns[of] for shape, of in enumerate(self._of)}
         for far, shape in {(view.far, view.seen) for view in self._views if view.far}:
             amounts = self._surfaces[shape].areas[:, None, None] * given[0, shape]
-            given[far, shape] = _times(self._surfaces[shape].coarse(far)[2].T, amounts)
+            given[far, shape] = _times(self._surfaces[shape].seen[far][2].T, amounts)
         return self._applied(self._rows, given).reshape(charges.shape)
 
     def refined(self, number: int, charges: Array) -> tuple[Array, Array]:
@@ -197,8 +192,7 @@ class SurfaceCharges:
         share = 1 / (1 + self.contrast / 2)[:, None]
         found = share * right
         for _ in range(TURNS):
-            before = found
-            found = share * (right + self.contrast[:, None] * self.normal_field(before))
+            before, found = found, share * (right + self.contrast[:, None] * self.normal_field(found))
             if np.abs(found - before).max() <= SOLVED * np.abs(found).max():
                 return np.asarray(found)
         return np.stack([self.solved(column) for column in right.T], axis=1)
@@ -221,16 +215,15 @@ class SurfaceCharges:
         """Of (1 + χ/2) - χ K, for many right-hand sides, or where the iteration of `solved` does not converge."""
         whole = np.zeros((len(self.places),) * 2, order="F")  # which is factorised in its place
         for view, ways in zip(self._views, self._rows, strict=True):
-            left, right = (self._few(view.far, shape)[2] for shape in (view.seer, view.seen))
+            left, right = (self._surfaces[shape].seen[view.far][2] for shape in (view.seer, view.seen))
             for rows, pairs in zip(ways, view.pairs, strict=True):
-                if left is not None and right is not None:
+                if view.far:
                     rows = left @ rows @ (right.T * self._surfaces[view.seen].areas)
                 for target, source in zip(*pairs, strict=True):
                     whole[np.ix_(self._of[view.seer][:, target], self._of[view.seen][:, source])] = rows
         whole *= -self.contrast[:, None]
         whole[np.diag_indices_from(whole)] += 1 + self.contrast / 2
-        factors, pivots = scipy.linalg.lu_factor(whole, overwrite_a=True)
-        return factors, pivots
+        return scipy.linalg.lu_factor(whole, overwrite_a=True)  # type: ignore[no-any-return]
 
     def polarizability(self) -> Array:
         """(3, 3) A m²/T: the moment of all magnets together that a uniform field induces, ∫ x σ dS/μ0 of a unit one."""
