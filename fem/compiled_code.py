@@ -162,9 +162,7 @@ def _read(path: Path) -> tuple[Any, int]:
     import heyoka as hy
 
     try:
-        content = unsealed(path, mine=True)  # a folder that was open once may have something left of others
-        if content is None:
-            return None, 0
+        content = unsealed(path, mine=True) or b""  # a folder that was open once may have something left of others
         name, kind, state = zlib.decompress(content).split(b"\n", 2)
         if name.decode() != path.name:
             return None, 0

@@ -47,8 +47,7 @@ DIPOLE, QUADRUPOLE = 2 / 21, 2 / 45  # L/(μ0σR² K) of a ball, of a uniform fi
 # (5, 3, 3) gradients without trace, symmetric, of unit size and across each other
 GRADIENTS = np.zeros((5, 3, 3))
 GRADIENTS[0], GRADIENTS[1] = np.diag([1.0, -1.0, 0.0]) / 2**0.5, np.diag([-1.0, -1.0, 2.0]) / 6**0.5
-for _k, (_i, _j) in enumerate(((0, 1), (0, 2), (1, 2)), 2):
-    GRADIENTS[_k, _i, _j] = GRADIENTS[_k, _j, _i] = 2**-0.5
+GRADIENTS[[2, 3, 4], [0, 0, 1], [1, 2, 2]] = GRADIENTS[[2, 3, 4], [1, 2, 2], [0, 0, 1]] = 2**-0.5
 THINNEST = 1e-2  # thickness over size below which a mesh may take long
 Pieces = Sequence[tuple[Solid, float]]  # bodies with their conductivities by the floater's
 

@@ -149,32 +149,26 @@ def of_motion(position: Array, moment: Array) -> Potentials:
     return potentials
 
 
-@dataclass(frozen=True, eq=False)
-class CurrentPatterns:
-    """Patterns of current in several pieces of metal."""
-
-    metals: tuple[Metal, ...]  # the pieces
-    patterns: tuple[Array, ...]  # (points, 3, k) of w_k σ dV at the integration points of each
-
-    @property
-    def count(self) -> int:
-        return int(self.patterns[0].shape[2])
-
-    def fields(self, positions: Array, watch: Watch = unwatched) -> Array:
-        """c_k (k, n, 3) at positions (n, 3) m, √W s/(A m²); `watch` is a progress callback."""
-        found = []
-        for start in watched(range(0, len(positions), TOGETHER), watch, "their fields"):
-            sources = of_places(positions[start : start + TOGETHER])
-            pairs = zip(self.metals, self.patterns, strict=True)
-            parts = [flat(pattern).T @ flat(sources(metal.places)) for metal, pattern in pairs]
-            found.append(np.sum(parts, axis=0).reshape(self.count, -1, 3))
-        return np.concatenate(found, axis=1)
+def pattern_fields(
+    metals: Sequence[Metal], patterns: Sequence[Array], positions: Array, watch: Watch = unwatched
+) -> Array:
+    """c_k (k, n, 3) of `patterns` in `metals` at `positions` (n, 3) m, √W s/(A m²); `watch` gets the progress."""
+    found = []
+    for start in watched(range(0, len(positions), TOGETHER), watch, "their fields"):
+        sources = of_places(positions[start : start + TOGETHER])
+        pairs = zip(metals, patterns, strict=True)
+        parts = [flat(pattern).T @ flat(sources(metal.places)) for metal, pattern in pairs]
+        found.append(np.sum(parts, axis=0).reshape(patterns[0].shape[2], -1, 3))
+    return np.concatenate(found, axis=1)
 
 
 def current_patterns(
     metals: Sequence[Metal], positions: Array, left_out: float, watch: Watch = unwatched
-) -> CurrentPatterns:
-    """Patterns that dipoles at `positions` (n, 3) m drive in `metals`, but for `left_out` of any loss; for `watch`."""
+) -> list[Array]:
+    """Patterns w_k σ dV (points, 3, k) that dipoles at `positions` (n, 3) m drive in each of `metals`.
+
+    But for `left_out` of any loss; `watch` is a progress callback.
+    """
     grams, loads, blocks = [], [], range(0, len(positions), TOGETHER)
     for metal in metals:
         parts = [metal.loads(of_places(positions[k : k + TOGETHER])) for k in watched(blocks, watch, "patterns")]
@@ -195,7 +189,7 @@ def current_patterns(
             part = of_places(positions[start : start + TOGETHER])(metal.places)
             fields += part @ mix[3 * start : 3 * (start + TOGETHER)]
         patterns.append(metal.weights[:, None, None] * fields)
-    return CurrentPatterns(tuple(metals), tuple(patterns))
+    return patterns
 
 
 BALL_DEGREE = 3
@@ -283,18 +277,13 @@ LOSSES = TableKind("rotor-losses", RotorLosses, "Dissipation in a rotor's metal:
 
 def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = BALL_DEGREE) -> RotorLosses:
     """Table for pieces of metal (bodies, S/m) as balls: beside a cube right to a fifth, and to a half in contact."""
-    centers, kinds, weights = [], [], []
-    for bodies, conductivity in pieces:
-        for body in bodies:
-            radius = CUBE * body.volume ** (1 / 3)
-            for l, m, part in members(degree, 1):
-                centers.append(body.center)
-                kinds.append((l, m, part))
-                # strength of the field of one harmonic Θ_lm with lengths in metres, √W s/(A m²)
-                loss = conductivity * l / ((l + 1) * (2 * l + 3)) * radius ** (2 * l + 3)
-                harmonic = norm(l, m) / factorials(l)[l, m] / (1.0 if m == 0 else 2.0)  # both signs of m stand in one
-                weights.append(np.sqrt(loss) * MU_0 / (2 * l + 1) * harmonic)
-    multipoles = Multipoles(np.array(centers), np.array(kinds, float), 1.0)
+    bodies, weights = [(body, sigma) for some, sigma in pieces for body in some], []
+    for (body, sigma), (l, m, _) in product(bodies, members(degree, 1)):
+        # strength of the field of one harmonic Θ_lm with lengths in metres, √W s/(A m²)
+        loss = sigma * l / ((l + 1) * (2 * l + 3)) * (CUBE * body.volume ** (1 / 3)) ** (2 * l + 3)
+        harmonic = norm(l, m) / factorials(l)[l, m] / (1.0 if m == 0 else 2.0)  # both signs of m stand in one
+        weights.append(np.sqrt(loss) * MU_0 / (2 * l + 1) * harmonic)
+    multipoles = Multipoles.at([body.center for body, _ in bodies], members(degree, 1), 1.0)
     return RotorLosses(multipoles, np.diag(weights), np.zeros(1), np.full(1, 0.5))
 
 
@@ -324,18 +313,17 @@ def rotor_losses(
     if not pieces:
         raise ValueError("Input rotor must have a conductivity; instead neither magnets nor conductors have one.")
     refuse_wide_holes(pieces, nearest)
-    bodies: list[Solid] = [magnet.body for magnet in rotor] + [conductor.body for conductor in conductors]
-    around = partial(places_around, bodies, directions=directions)
+    around = partial(places_around, [part.body for part in (*rotor, *conductors)], directions=directions)
     metals = [metal_of(group, conductivity, ORDER) for group, conductivity in pieces]
-    found = current_patterns(metals, around(nearest), LEFT_OUT, watch)
+    patterns = current_patterns(metals, around(nearest), LEFT_OUT, watch)
     places = np.concatenate([around(share * nearest) for share in SHELLS])
-    values = found.fields(places, watch)
+    values = pattern_fields(metals, patterns, places, watch)
     scale = 1 / np.linalg.norm(values, axis=(0, 2))
     # multipoles about the middles of parts of the bodies so compact that their expansions converge
     boxes = [Magnet(Box(b.size, b.center, b.rotation), np.zeros(3)) for group, _ in pieces for b in group]
     centers = [part.box.center for parts in cut_magnets(boxes, nearest) for part in parts]
     choice = Multipoles.at(centers, members(DEGREE, 1), nearest)
-    fit = fit_multipoles(choice, places, values, np.ones(found.count), scale, FIT, lambda _: True)
+    fit = fit_multipoles(choice, places, values, np.ones(len(values)), scale, FIT, lambda _: True)
     finer = [metal_of(group, conductivity, ORDER + 1) for group, conductivity in pieces]
     table = RotorLosses(fit.multipoles, sparse(fit.weights), nearest * np.array(CHECKED), np.zeros(len(CHECKED)))
     distances = watched(table.distances, watch, "error estimate")

@@ -25,6 +25,7 @@ M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, section 17.6.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 from typing import Any
 
 import heyoka as hy
@@ -156,30 +157,27 @@ class Filaments:
     @classmethod
     def of(cls, coils: Sequence[Coil], nearest: float) -> "Filaments":
         """Those of coils for points at a distance (m) from their windings and more."""
-        rows = []
-        for k, coil in enumerate(coils):
-            rules = []
-            for size in (coil.width, coil.height):
-                ratio = 2 * nearest / size  # Gauss's rule converges by the ellipse through the nearest singularity
-                count = np.log(1 / FILAMENT_ERROR) / (2 * np.arcsinh(ratio))
-                nodes, weights = gauss_legendre(int(np.clip(np.ceil(count), 1, NODES)))
-                rules.append((size / 2 * nodes, weights / 2))
-            rows += [
-                [*coil.center[:2], coil.center[2] + up, coil.radius + out, coil.turns * one * other, k]
-                for out, one in zip(*rules[0], strict=True)
-                for up, other in zip(*rules[1], strict=True)
-            ]
+
+        def rule(size: float) -> list[tuple[float, float]]:
+            ratio = 2 * nearest / size  # Gauss's rule converges by the ellipse through the nearest singularity
+            count = np.log(1 / FILAMENT_ERROR) / (2 * np.arcsinh(ratio))
+            nodes, weights = gauss_legendre(int(np.clip(np.ceil(count), 1, NODES)))
+            return list(zip(size / 2 * nodes, weights / 2, strict=True))
+
+        rows = [
+            [*coil.center[:2], coil.center[2] + up, coil.radius + out, coil.turns * one * other, k]
+            for k, coil in enumerate(coils)
+            for (out, one), (up, other) in product(rule(coil.width), rule(coil.height))
+        ]
         x, y, z, radii, turns, owners = np.array(rows).T
         return cls(np.stack([x, y, z], axis=1), radii, turns, owners.astype(int))
 
     def expressions(self, position: Sequence[hy.expression], currents: Sequence[Any]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m), for currents (coils,) A in each turn."""
         axes: dict[tuple[float, float], list[hy.expression]] = {}
-        x, y, z = position
-        square, height = hy.make_vars("square", "height")
-        for (a, b, c), radius, turns, owner in zip(
-            self.centers.tolist(), self.radii.tolist(), self.turns.tolist(), self.owners, strict=True
-        ):
+        (x, y, z), (square, height) = position, hy.make_vars("square", "height")
+        numbers = (part.tolist() for part in (self.centers, self.radii, self.turns, self.owners))
+        for (a, b, c), radius, turns, owner in zip(*numbers, strict=True):
             axes.setdefault((a, b), []).append(_filament(square, height - c, radius, turns * currents[owner]))
         parts = [_field_of(hy.sum(sources), [x - a, y - b, z], square, height) for (a, b), sources in axes.items()]
         field = [hy.sum([b[i] for b, _ in parts]) for i in range(3)]

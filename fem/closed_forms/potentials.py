@@ -3,13 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...geometry.common import MU_0, Array, freeze
-from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box
 from ..harmonics.solid import gauss_legendre
 from .uniform import attraction, newton_potential
@@ -69,11 +67,6 @@ class PolarizedCuboid:
 
     box: Box  # shape and pose
     polarization: Array  # (3,) T, in the frame in which the box is placed
-
-    @classmethod
-    def of_magnet(cls, magnet: Magnet) -> Self:
-        """The magnet with its remanent polarisation (μr = 1)."""
-        return cls(magnet.box, magnet.polarization_in_rotor)
 
     def vector_potential(self, points: Array) -> Array:
         """A (n, 3), T m, at points (n, 3), m."""

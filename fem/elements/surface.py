@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 from numpy.polynomial.chebyshev import chebvander
-from numpy.typing import NDArray
 
 from ...geometry.common import Array
 from ...geometry.magnets import Magnet
@@ -209,19 +208,15 @@ class _BoxSurface(Surface):
         seen = places[:, order] - [0, 0, side * self.half[axis]]
         return order, seen, self.half[order[:2]], (self.counts[order[0]], self.counts[order[1]])
 
-    def _image(self, axis: int) -> NDArray[np.intp]:
-        found = np.empty(len(self.places), int)
-        for (across, side), mine in self.numbers.items():
-            opposite = across == axis
-            found[mine] = self.numbers[across, -side] if opposite else np.flip(mine, self._order(across).index(axis))
-        return found
-
     @cached_property
     def kernel(self) -> Array:
         """K (n, n); what mirrors and, of a cube, turns of the body make of each other is computed once."""
         total = len(self.places)
         result, everything = np.zeros((total, total)), np.arange(total)
-        mirrors = [self._image(axis) for axis in range(3)]
+        mirrors = np.empty((3, total), int)  # the nodes' images at the plane across each axis
+        for axis, ((across, side), mine) in product(range(3), self.numbers.items()):
+            along = self._order(across).index(axis)
+            mirrors[axis, mine] = self.numbers[across, -side] if across == axis else np.flip(mine, along)
         cube = np.ptp(self.half) <= INSET * self.half[0]
         for axis in range(1 if cube else 3):
             order, seen, halves, counts = self._face(axis, -1, self.places)

@@ -304,8 +304,7 @@ def fit_field_map(
         deviations *= max(1.0, 1.0 / fit.misfit)
     coefficients = basis.coefficients(fit.unknowns, fit.degree)
     expansions = tuple(MultipoleExpansion(*part) for part in zip(middle, radii, coefficients, strict=True))
-    left_out = _left_out(basis, fit, field_map, distances, expansions)
-    doubts = {"tail": left_out} if left_out else {}
+    doubts = {"tail": _left_out(basis, fit, field_map, distances, expansions)}
     provenance: dict[str, str | float] = {
         "map_points": len(field_map.points),
         "observations": seen,

@@ -99,7 +99,7 @@ def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> 
         if not isinstance(magnet.body, Box):
             moments += uniform_cells(magnet, max(nearest - radius, CLOSEST * radius))  # that the plate keeps
         elif nearest < FAR * radius:
-            parts.append(PolarizedCuboid.of_magnet(magnet))
+            parts.append(PolarizedCuboid(magnet.box, magnet.polarization_in_rotor))
         else:
             moments.append(uniform_moments(magnet, FAR_DEGREE))
     for expansion in merged((one, 1.0) for one in moments):

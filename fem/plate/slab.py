@@ -78,16 +78,6 @@ class Slab:
         return np.asarray(diffusion * filling / (4 * k * kappa + excess * excess * filling))
 
 
-def checked(height: ArrayLike, frequency: ArrayLike) -> tuple[Array, Array]:
-    """Heights (m) and frequencies (Hz) as arrays of one shape. Raises ValueError: not positive; negative."""
-    h, f = np.broadcast_arrays(np.asarray(height, float), np.asarray(frequency, float))
-    if not np.all(h > 0):
-        raise ValueError(f"Input height_m must be positive (the dipole is over the face); instead received {h.min()}.")
-    if not np.all((f >= 0) & np.isfinite(f)):
-        raise ValueError(f"Input frequency_hz must be finite and not negative; instead received {f.min()}.")
-    return h, f
-
-
 def wave_numbers(height: Array, aperture: float = np.pi / 4) -> tuple[Array, Array]:
     """Nodes and weights (..., n), 1/m, for ∫ dk of e^{-2 k height} times what is analytic for |arg k| < aperture."""
     count = int(np.ceil((HIGHEST - LOWEST) * DIGITS / (2 * np.pi * aperture))) + 1
@@ -215,9 +205,12 @@ def mutual_tensor(slab: Slab, points: ArrayLike, source: ArrayLike, frequency: A
     distance of 20 (z+z'); farther off, the oscillation takes ever more nodes.
     """
     points, source = np.broadcast_arrays(np.asarray(points, float), np.asarray(source, float))
-    offset = points - source
-    h, f = checked(np.minimum(points[..., 2], source[..., 2]), frequency)
-    h, distance = np.broadcast_arrays((points[..., 2] + source[..., 2]) / 2, np.hypot(offset[..., 0], offset[..., 1]))
+    offset, f, lowest = points - source, np.asarray(frequency, float), np.minimum(points[..., 2], source[..., 2]).min()
+    if not lowest > 0:
+        raise ValueError(f"Input height_m must be positive (the dipole is over the face); instead received {lowest}.")
+    if not np.all((f >= 0) & np.isfinite(f)):
+        raise ValueError(f"Input frequency_hz must be finite and not negative; instead received {f.min()}.")
+    h, distance = (points[..., 2] + source[..., 2]) / 2, np.hypot(offset[..., 0], offset[..., 1])
     aperture = min(np.pi / 4, 0.8 * float(np.min(np.arctan2(2 * h, distance))))
     h, distance, f = np.broadcast_arrays(h, distance, f)
     k, weight = wave_numbers(h, aperture)

@@ -11,7 +11,7 @@ from ..closed_forms.moments import carriers_of
 from ..elements.surface_charges import SurfaceCharges
 from ..harmonics.expansion import MultipoleExpansion, merged, uniform_moments
 from .charges import bear_charges, charged_expansion
-from .models import DEGREE, Accuracy, Rotor, extrapolated_tail, nonzero
+from .models import DEGREE, Accuracy, Rotor, extrapolated_tail
 from .table import RotorTable
 
 STEADY_NODES, STEADY_DEGREE = 16, 40  # of charges on surfaces whose fields are smooth functions of the magnets' numbers
@@ -48,9 +48,8 @@ def changed_table(table: RotorTable, rotor: Rotor, doubts: bool = False) -> Chan
     added = *((part, -1) for part in less), *((part, 1) for part in more)
     parts, known = merged([*((part, 1) for part in table.expansions), *added]), dict(table.doubts) if doubts else {}
     if doubts and charged:
-        unsure = nonzero((*less, *more))
-        known["charges"] = tuple(replace(part, coefficients=STEADY_ERROR * part.coefficients) for part in unsure)
-        known["charges' tail"] = nonzero(extrapolated_tail(more))
+        known["charges"] = [replace(part, coefficients=STEADY_ERROR * part.coefficients) for part in (*less, *more)]
+        known["charges' tail"] = extrapolated_tail(more)
     return ChangedTable(table.model, rotor, uniform, parts, known, table.provenance, table)
 
 

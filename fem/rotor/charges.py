@@ -206,10 +206,9 @@ def surface_table(magnets: Rotor, accuracy: Accuracy, watch: Watch = unwatched) 
             break
     fitted, beside, alone = any(fits), None, len(tail)
     fits.clear()  # hundreds of megabytes, of which `beside` would keep a part
-    causes = {"discretisation": steps[:alone], "tail": tail, PIECES: pieces, CHARGES: steps[alone:]}
-    known = {cause: parts for cause, some in causes.items() if (parts := models.nonzero(some))}
+    doubts = {"discretisation": steps[:alone], "tail": tail, PIECES: pieces, CHARGES: steps[alone:]}
     polarized = tuple(one for one in carriers if one.polarization.any())
-    table = RotorTable("surface", magnets, polarized, tuple(whole), known)
+    table = RotorTable("surface", magnets, polarized, tuple(whole), doubts)
     # of hundreds of expansions it takes seconds to find what may be left out, where hardly anything may
     if not fitted or np.max(table.absolute_error(points)[0] / scale) < accuracy.rtol / 2:
         table = models.trimmed_table(table, accuracy, (points, scale), models.BETWEEN / 20, 1.0, FITTED)

@@ -19,7 +19,7 @@ from ...geometry.solids import Part, places_off
 from ..closed_forms.moments import carrier, carriers_of, closed_part, first_order_moments, uniform_cells
 from ..elements.ladder import RotorSolution, refined, refinement_of, solve_rotor, strongest
 from ..harmonics.expansion import MOST, MultipoleExpansion, trimmed_expansions, uniform_moments, without_noise
-from .table import KNOWN, RotorTable
+from .table import KNOWN, RotorTable, nonzero
 
 # Errors are looked at this far out, beyond the nearest distance, in sizes of the rotor
 OFFSETS = (0.0, 1.0, 3.0, 10.0, 100.0)
@@ -110,13 +110,11 @@ def dipole_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     """Moments J V/μ0 of the remanence at the magnets' centres."""
     start = time.perf_counter()
     dipoles = tuple(uniform_moments(magnet, 1) for magnet in rotor)
-    shapes = []
-    for magnet in rotor:
-        whole = uniform_moments(magnet, DEGREE)
-        rest = np.array(whole.coefficients)
-        rest[1:2] = 0.0
-        shapes.append(replace(whole, coefficients=rest))
-    return _finished(RotorTable("dipole", rotor, (), dipoles, {"shape": tuple(shapes)}), accuracy, start)
+    shapes = [uniform_moments(magnet, DEGREE) for magnet in rotor]
+    for k, whole in enumerate(shapes):
+        rest = np.where(np.arange(whole.degree + 1)[:, None] == 1, 0.0, whole.coefficients)
+        shapes[k] = replace(whole, coefficients=rest)
+    return _finished(RotorTable("dipole", rotor, (), dipoles, {"shape": shapes}), accuracy, start)
 
 
 def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
@@ -128,7 +126,7 @@ def moments_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     apart = [np.linalg.norm(points - one.center, axis=1) > one.nearest for one in full]
     there = np.all(apart, axis=0)  # elsewhere, as in the hole of a ring, no number of moments makes the field
     kept, dropped = trimmed_expansions(full, points[there], scale[there] * accuracy.rtol / 2)
-    return _finished(RotorTable("moments", rotor, (), tuple(kept), {KNOWN: tuple(dropped)}), accuracy, start)
+    return _finished(RotorTable("moments", rotor, (), tuple(kept), {KNOWN: dropped}), accuracy, start)
 
 
 def cuboid_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
@@ -137,37 +135,31 @@ def cuboid_table(rotor: Rotor, accuracy: Accuracy) -> RotorTable:
     known = tuple(magnet for magnet in rotor if not isinstance(magnet.body, Part))
     parts = [magnet for magnet in rotor if isinstance(magnet.body, Part)]
     moments = tuple(cell for magnet in parts for cell in uniform_cells(magnet, accuracy.clearance(rotor)))
-    return _finished(RotorTable("cuboid", rotor, known, moments, part_doubts(rotor)), accuracy, start)
+    return _finished(RotorTable("cuboid", rotor, known, moments, {"part": part_doubts(rotor)}), accuracy, start)
 
 
-def part_doubts(rotor: Rotor) -> dict[str, tuple[MultipoleExpansion, ...]]:
+def part_doubts(rotor: Rotor) -> list[MultipoleExpansion]:
     """What curved elements leave out of parts or add to them: a share of the dipole of each."""
     found = []
     for magnet in rotor:
-        body = magnet.body
-        if isinstance(body, Part):
+        if isinstance(body := magnet.body, Part):
             ball = Sphere(body.circumradius, body.center, body.rotation)
             dipole = uniform_moments(Magnet(ball, magnet.polarization), 1)
             share = PART_ERROR * body.volume / ball.volume
             found.append(replace(dipole, coefficients=share * dipole.coefficients))
-    return {"part": tuple(found)} if found else {}
+    return found
 
 
 def _finished(table: RotorTable, accuracy: Accuracy, start: float) -> RotorTable:
-    doubts = {**table.doubts, "permeability": neglected_permeability(table.magnets, accuracy)}
-    known = {cause: parts for cause, parts in doubts.items() if parts}
-    return replace(table, doubts=known, provenance={"seconds": time.perf_counter() - start})
-
-
-def neglected_permeability(rotor: Rotor, accuracy: Accuracy) -> tuple[MultipoleExpansion, ...]:
-    """What the permeability adds, to first order, about every piece of the magnets that have one."""
-    found = []
+    """With what the permeability adds, to first order, about every piece of the magnets that have one."""
+    found, rotor = [], table.magnets
     for magnet, pieces in zip(rotor, _cut(rotor, accuracy), strict=True):
         factor = FIRST_ORDER_SAFETY * np.sqrt(1 + magnet.contrast)
         for piece in pieces if magnet.contrast else ():
             added = factor * first_order_moments(piece, rotor, DEGREE)
             found.append(MultipoleExpansion(piece.body.center, piece.body.circumradius, added))
-    return tuple(found)
+    made = {"seconds": time.perf_counter() - start}
+    return replace(table, doubts={**table.doubts, "permeability": found}, provenance=made)
 
 
 def _cut(rotor: Rotor, accuracy: Accuracy) -> tuple[Rotor, ...]:
@@ -227,14 +219,14 @@ def fem_table(
     smallest = min(float(magnet.box.size.min()) for magnet in magnets)
     gap = GAP_SAFETY * float(np.linalg.norm(closing_shifts(magnets), axis=1).max()) / smallest
     doubts = {
-        **{cause: nonzero(step) for cause, step in steps.items()},
-        "quadrature": nonzero(solution.expansions(unsure)),
-        "tail": nonzero(extrapolated_tail(whole, min(ratios))),
-        "gap": nonzero(solution.expansions([gap * c for c in solution.coefficients])),
-        **part_doubts(magnets),
+        **steps,
+        "quadrature": solution.expansions(unsure),
+        "tail": extrapolated_tail(whole, min(ratios)),
+        "gap": solution.expansions([gap * c for c in solution.coefficients]),
+        "part": part_doubts(magnets),
     }
     polarized = tuple(one for one in carriers if one.polarization.any())
-    table = RotorTable("fem", magnets, polarized, tuple(whole), {k: parts for k, parts in doubts.items() if parts})
+    table = RotorTable("fem", magnets, polarized, tuple(whole), doubts)
     table = trimmed_table(table, accuracy, (points, scale), BETWEEN / 20, 1.0)
     reached = warn_beyond(table, accuracy, points, scale)
     mesh = solution.mesh
@@ -309,8 +301,8 @@ def trimmed_table(
         np.concatenate([allowed, beside * BESIDE * accuracy.rtol * scale_beside]),
         most,
     )
-    known = (*table.doubts.get(KNOWN, ()), *nonzero(dropped))
-    return replace(table, expansions=nonzero(kept), doubts={**table.doubts, **({KNOWN: known} if known else {})})
+    doubts = {**table.doubts, KNOWN: (*table.doubts.get(KNOWN, ()), *dropped)}
+    return replace(table, expansions=nonzero(kept), doubts=doubts)
 
 
 def least_ratio(magnets: Sequence[Magnet], rtol: float) -> float:
@@ -327,11 +319,6 @@ def enough_degree(pieces: Sequence[Magnet], ratios: Sequence[float], rtol: float
         if share:
             needed = max(needed, BEFORE + np.log(share / rtol) / np.log(ratio))
     return int(min(np.ceil(needed), HIGHEST_DEGREE))
-
-
-def nonzero(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
-    """Those of the expansions that are not zero."""
-    return tuple(expansion for expansion in expansions if expansion.coefficients.any())
 
 
 def extrapolated_tail(expansions: Sequence[MultipoleExpansion], ratio: float = CONVERGENCE) -> list[MultipoleExpansion]:

@@ -49,8 +49,8 @@ class NearElements:
         where none were needed, at `points` (n, 3) m. An order is taken that agrees with the one before to `allowed`
         (T), or the `highest`.
         """
-        field, slope = np.zeros_like(points), np.zeros((len(points), 3, 3))
-        error, steep, order = np.zeros(len(points)), np.zeros(len(points)), 0
+        field, slope, error, steep = (np.zeros((len(points), *shape)) for shape in ((3,), (3, 3), (), ()))
+        order = 0
         if not len(points) or not any(one.contrast or isinstance(one.body, Part) for one in self.magnets):
             return field, slope, error, steep, order
         inside = in_ball(self._solution(LOWEST), points)
@@ -58,7 +58,7 @@ class NearElements:
             first, second, error[inside], steep[inside], order = self._climbed(points[inside], allowed, highest)
             field[inside], slope[inside] = -first, -second
         if not inside.all():  # the expansions of a table of the outer field
-            largest = max(float(np.linalg.norm(magnet.polarization)) for magnet in self.magnets)
+            largest = largest_remanence(self.magnets)
             rtol = min(allowed / largest, OUTSIDE) if largest else OUTSIDE
             if rtol not in self._outside:
                 self._outside[rtol] = fem_table(self.magnets, Accuracy(rtol))
@@ -80,20 +80,17 @@ class NearElements:
         return self._solved[order]
 
     def _climbed(self, points: Array, allowed: float, highest: int) -> tuple[Array, Array, Array, Array, int]:
-        error, steep = np.full(len(points), np.inf), np.full(len(points), np.inf)
-        beside = self._off_faces(points)
+        beside, steps, order = self._off_faces(points), np.zeros((2, len(points))), LOWEST
+        errors = np.full(steps.shape, np.inf)
         first, second = potential_slopes(self._solution(LOWEST), points, beside)
-        step, step_of_slope = np.zeros(len(points)), np.zeros(len(points))
-        for order in range(LOWEST + 1, highest + 1):
-            before = first, second
+        while order < highest and errors[0].max() > allowed:
+            before, order = (first, second), order + 1
             first, second = potential_slopes(self._solution(order), points, beside)
             # a step that is small by chance does not tell the error: the one before it has a say
-            step = np.maximum(np.linalg.norm(first - before[0], axis=1), SLOWEST * step)
-            step_of_slope = np.maximum(np.linalg.norm(second - before[1], axis=(1, 2)), SLOWEST * step_of_slope)
-            error, steep = (size + SPREAD * np.sqrt(np.mean(size**2)) for size in (step, step_of_slope))
-            if error.max() <= allowed:
-                return first, second, error, steep, order
-        return first, second, error, steep, highest
+            sizes = np.linalg.norm(first - before[0], axis=1), np.linalg.norm(second - before[1], axis=(1, 2))
+            steps = np.maximum(sizes, SLOWEST * steps)
+            errors = steps + SPREAD * np.sqrt(np.mean(steps**2, axis=1))[:, None]
+        return first, second, errors[0], errors[1], order
 
     def _off_faces(self, points: Array) -> Array:
         """Points (n, 3) m, those next to a magnet's face moved away from it on their side."""
@@ -156,8 +153,7 @@ def near_field(
             places[on] += OFF_FACE * _normals(magnet.body, given[on])
     solved = elements or NearElements(magnets)
     closed = [UniformField(one).evaluate(places) for one in solved.carriers if one.polarization.any()]
-    largest = max((float(np.linalg.norm(magnet.polarization)) for magnet in magnets), default=0.0)
-    field, slope, error, steep, order = solved.reaction(places, rtol * largest, highest)
+    field, slope, error, steep, order = solved.reaction(places, rtol * largest_remanence(magnets), highest)
     owner = owners(magnets, places)
     for outer, outer_slope in closed:
         field, slope = field + outer, slope + outer_slope
@@ -175,6 +171,11 @@ def _normals(body: Solid, points: Array) -> Array:
     """Gradients (n, 3) of the distance from a body's surface at points (n, 3) m."""
     steps = ON_EDGE / 2 * np.eye(3)
     return np.transpose([body.distance(points + s) - body.distance(points - s) for s in steps]) / ON_EDGE
+
+
+def largest_remanence(magnets: Sequence[Magnet]) -> float:
+    """The largest |J|, T."""
+    return max((float(np.linalg.norm(magnet.polarization)) for magnet in magnets), default=0.0)
 
 
 def owners(magnets: Sequence[Magnet], points: Array) -> NDArray[np.intp]:
@@ -222,8 +223,7 @@ class CompleteTable(RotorTable):
         slow = self._slow_series(places[reached])
         flux, gradient, error, steep = (np.zeros((count, *shape)) for shape in ((3,), (3, 3), (), ()))
         error[reached], steep[reached] = slow * super().absolute_error(places[reached])
-        largest = max((float(np.linalg.norm(magnet.polarization)) for magnet in self.magnets), default=0.0)
-        reached[reached] = (slow == 1) | (error[reached] <= self.near_rtol * largest)
+        reached[reached] = (slow == 1) | (error[reached] <= self.near_rtol * largest_remanence(self.magnets))
         flux[reached], gradient[reached] = super().evaluate(places[reached])
         field, owner, order = flux.copy(), np.full(count, -1), 0
         if not reached.all():

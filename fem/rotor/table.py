@@ -88,6 +88,11 @@ class FieldTable(FieldFormula, Protocol):
         """Which of the points (..., 3) m lie where the table knows the field: (n,)."""
 
 
+def nonzero(expansions: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+    """Those of the expansions that are not zero."""
+    return tuple(expansion for expansion in expansions if expansion.coefficients.any())
+
+
 @dataclass(frozen=True, eq=False)
 class RotorTable:
     """Closed forms of magnets plus multipole expansions: free of divergence and curl by construction."""
@@ -97,9 +102,13 @@ class RotorTable:
     uniform: tuple[Magnet, ...] = ()  # those whose closed form (μr = 1) is part of the field
     expansions: tuple[MultipoleExpansion, ...] = ()  # what the closed forms leave out
     # by cause ("shape", "permeability", "truncation", "discretisation"), the estimated error as a field
-    doubts: Mapping[str, tuple[MultipoleExpansion, ...]] = field(default_factory=dict)
+    doubts: Mapping[str, Sequence[MultipoleExpansion]] = field(default_factory=dict)
     # how the table was made (versions, mesh, order, seconds); texts and numbers
     provenance: Mapping[str, str | float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        doubts = {cause: parts for cause, some in self.doubts.items() if (parts := nonzero(some))}
+        object.__setattr__(self, "doubts", doubts)
 
     def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""

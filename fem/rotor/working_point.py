@@ -79,8 +79,7 @@ class EasyField:
         body, along = self.magnets[number].body, easy_axis(self.magnets[number])
         away = first - body.center - along * ((first - body.center) @ along)
         if np.linalg.norm(away) < LAST_STEP * 10:
-            least = np.eye(3)[int(np.argmin(np.abs(along)))]
-            away = np.cross(along, least)
+            away = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
         up = away / np.linalg.norm(away)
         u, v = (1.02 * np.linspace(-1, 1, steps) * float(body.reach(way[None])[0]) for way in (along, up))
         points = (body.center + u[None, :, None] * along + v[:, None, None] * up).reshape(-1, 3)
@@ -127,8 +126,7 @@ def _working_point(field: EasyField, number: int) -> WorkingPoint:
     alone = found - field.of_floater(number, seen, 0.0)
     turned = [field.of_floater(number, seen, 360.0 * k / PHASES) for k in range(PHASES)]
     turning = min(float(found[best]), *(float((alone + one).min()) for one in turned))
-    knee = None if magnet.coercivity is None else -MU_0 * magnet.coercivity
-    share, share_error = 0.0, 0.0
+    knee, share, share_error = None if magnet.coercivity is None else -MU_0 * magnet.coercivity, 0.0, 0.0
     if knee is not None:
         shares = np.mean(values.reshape(BATCHES, -1) < knee, axis=1)
         share = float(shares.mean())
@@ -143,8 +141,7 @@ def _spread_inside(magnet: Magnet, seed: int) -> Array:
     body, wanted, found = magnet.body, 2**PER_BATCH, np.zeros((0, 3))
     draw = scipy.stats.qmc.Sobol(3, rng=np.random.default_rng(seed))
     while len(found) < wanted:
-        local = (2 * draw.random(2 * wanted) - 1) * body.half_edges
-        points = body.center + local @ body.rotation.T
+        points = body.center + (2 * draw.random(2 * wanted) - 1) * body.half_edges @ body.rotation.T
         off = (body.distance(points) < -JUST_INSIDE) & (body.edge_distance(points) > JUST_INSIDE)
         found = np.concatenate([found, points[off]])
     return found[:wanted]
@@ -166,11 +163,9 @@ def _lowest(field: EasyField, number: int, points: Array, values: Array, clear: 
         reached = np.full(len(tried), np.inf)
         if good.any():
             reached[good] = field.at(number, tried[good])[0]
-        around = reached.reshape(len(here), -1)
-        best = around.argmin(axis=1)
-        better = around[np.arange(len(here)), best] < low
-        low = np.where(better, around[np.arange(len(here)), best], low)
-        here = np.where(better[:, None], tried.reshape(len(here), -1, 3)[np.arange(len(here)), best], here)
+        best = np.arange(len(here)) * len(ways) + reached.reshape(len(here), -1).argmin(axis=1)
+        better = reached[best] < low
+        low, here = np.where(better, reached[best], low), np.where(better[:, None], tried[best], here)
         step /= 2
     found = field.near(here)
     axis = easy_axis(field.magnets[number])

@@ -15,6 +15,7 @@ from spinlev.fem.rotor_metal import (
     metal_of,
     of_motion,
     of_places,
+    pattern_fields,
     places_around,
     rotor_losses,
 )
@@ -107,8 +108,9 @@ def test_progress_is_told_block_by_block():
     heard = []
     cube = Box((8e-3,) * 3)
     places = places_around([cube], 5e-3, directions=12)[:90]
-    found = current_patterns([metal_of([cube], SIGMA, 2)], places, 0.5, lambda *told: heard.append(told))
-    found.fields(places, lambda *told: heard.append(told))
+    metals = [metal_of([cube], SIGMA, 2)]
+    found = current_patterns(metals, places, 0.5, lambda *told: heard.append(told))
+    pattern_fields(metals, found, places, lambda *told: heard.append(told))
     assert heard == [(stage, k / 3) for stage in ("patterns", "their fields") for k in range(3)]
 
 

@@ -116,7 +116,7 @@ def test_cylinder_waves_hear_a_dipole_by_the_gradient_of_a_bessel_function():
 def test_waves_hear_a_cuboid_and_its_moments_alike():
     """Closed form against the multipole expansion to degree 17, at k times radius up to 2.6: round-off."""
     magnet = ROTOR.magnets[0]
-    sources = [PolarizedCuboid.of_magnet(magnet), ExpansionSource(uniform_moments(magnet, 17))]
+    sources = [PolarizedCuboid(magnet.box, magnet.polarization_in_rotor), ExpansionSource(uniform_moments(magnet, 17))]
     cuboid, moments = cylinder_moments(
         sources, np.array([0.0, 0.0, -0.03]), rotation_matrix((5.0, 0.0, 0.0)), np.array([3.0, 50.0, 300.0]), 5, 32
     )
