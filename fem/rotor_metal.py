@@ -313,7 +313,8 @@ def rotor_losses(
     if not pieces:
         raise ValueError("Input rotor must have a conductivity; instead neither magnets nor conductors have one.")
     refuse_wide_holes(pieces, nearest)
-    around = partial(places_around, [part.body for part in (*rotor, *conductors)], directions=directions)
+    bodies = [magnet.body for magnet in rotor] + [conductor.body for conductor in conductors]
+    around = partial(places_around, bodies, directions=directions)
     metals = [metal_of(group, conductivity, ORDER) for group, conductivity in pieces]
     patterns = current_patterns(metals, around(nearest), LEFT_OUT, watch)
     places = np.concatenate([around(share * nearest) for share in SHELLS])

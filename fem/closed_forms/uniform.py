@@ -36,6 +36,7 @@ from ..harmonics.solid import FOUR_PI, contracted, entries, tensors, turned_entr
 from .round import BESIDE, outside_derivatives, round_slope, round_tensor, segments_field
 
 Expression = Any  # A heyoka expression
+Tensor = dict[tuple[int, ...], Expression]
 SIGNS = (-1, 1)
 
 
@@ -47,7 +48,7 @@ class _Corners:
         self.offset = [{s: position[a] - s * self.half_edges[a] for s in SIGNS} for a in range(3)]
         x, y, z = ({s: d * d for s, d in axis.items()} for axis in self.offset)
         corners = product(SIGNS, repeat=3)
-        self.distance = {(i, j, k): hy.sqrt(x[i] + y[j] + z[k]) for i, j, k in corners}
+        self.distance: Tensor = {(i, j, k): hy.sqrt(x[i] + y[j] + z[k]) for i, j, k in corners}
         self.inverse = {corner: 1.0 / r for corner, r in self.distance.items()}
 
     def edge(self, first: int, second: int, i: int, j: int) -> tuple[Expression, Expression]:
@@ -91,9 +92,6 @@ class _Corners:
 def _corner(axes: Sequence[int], *signs: int) -> tuple[int, ...]:
     """Signs along x, y and z of those along some axes."""
     return tuple(sign for _, sign in sorted(zip(axes, signs, strict=True)))
-
-
-Tensor = dict[tuple[int, ...], Expression]
 
 
 def _box_tensors(corners: _Corners, axes: Collection[int]) -> tuple[Tensor, Tensor]:

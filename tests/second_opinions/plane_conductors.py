@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from spinlev.fem.closed_forms.eddy_bodies import ComplexArray
-from spinlev.fem.plate.slab import Slab, checked, wave_numbers
+from spinlev.fem.plate.slab import Slab, wave_numbers
 from spinlev.geometry.common import MU_0
 
 
@@ -34,7 +34,7 @@ def reaction_gradient(slab: Slab, height: ArrayLike, frequency: ArrayLike) -> Co
 
     It is symmetric and without trace in its first two indices.  Accuracy and errors as `reaction_tensor`.
     """
-    h, f = checked(height, frequency)
+    h, f = np.broadcast_arrays(np.asarray(height, float), np.asarray(frequency, float))
     k, weight = wave_numbers(h)
     integral = np.sum(weight * k**3 * np.exp(-2 * k * h[..., None]) * slab.reflection(k, f[..., None]), axis=-1)
     pattern = np.zeros((3, 3, 3))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from second_opinions.plane_conductors import PlaneConductor
-from spinlev.fem.plate.slab import Slab, checked, wave_numbers
+from spinlev.fem.plate.slab import Slab, wave_numbers
 from spinlev.fem.rotor.models import AccuracyError
 from spinlev.geometry.common import MU_0, Array
 
@@ -26,12 +26,7 @@ def drag_tensor(slab: Slab, height: float, moment: ArrayLike) -> Array:
 
     Exact in the limit of slow motion, μ0σ|v|(h + t) ≪ 1.  A vertical moment has C_zz = μ0²σm²/64π (h⁻³ - (h+t)⁻³),
     and half of it in the plane.
-
-    Raises
-    ------
-    ValueError : height not positive
     """
-    checked(height, 0.0)
     m_x, m_y, m_z = np.asarray(moment, float)
     lateral = m_x**2 + m_y**2
     tensor = np.zeros((3, 3))
@@ -50,10 +45,8 @@ def sliding_force(conductor: PlaneConductor, height: float, velocity: ArrayLike,
 
     Raises
     ------
-    ValueError : height not positive
     AccuracyError : the force does not settle (speeds far above 2/(μ0σt), where drag is all but gone)
     """
-    checked(height, 0.0)
     moment, velocity = np.asarray(moment, float), np.asarray(velocity, float)
     previous, directions = np.full(3, np.inf), 32
     while directions <= MOST_DIRECTIONS:
