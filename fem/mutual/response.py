@@ -276,8 +276,9 @@ def two_body(
     degree = degree or enough_degree(rotor.magnets, ball)
     for k, magnet in enumerate(rotor.magnets):
         if sphere_overlap(ball.center, ball.radius, magnet.body) > TOUCHING:
-            text = f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
-            raise TwoBodyError(text)
+            raise TwoBodyError(
+                f"Input position must leave the floater outside the magnets; instead it cuts magnet {k}."
+            )
     own = rotor.own_field(ball, degree)
     permanent = interior.dipole_sources(floater.moment * np.asarray(direction, float), ball, degree)
     reflected = rotor.answer(permanent, ball, degree)
