@@ -36,7 +36,7 @@ from scipy.special import elliprd, elliprf, elliprj
 from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Coil
 from ..compiled_code import compiled
-from ..harmonics.expressions import UPPER, FieldExpressions, differentiated, whole_gradient
+from ..harmonics.expressions import UPPER, FieldExpressions, Vector, differentiated, whole_gradient
 from ..harmonics.solid import entries, gauss_legendre, tensors
 
 NODES, CROWD = 24, 3  # Gauss points on either side of a point's radius, and the power by which they crowd there
@@ -172,7 +172,7 @@ class Filaments:
         x, y, z, radii, turns, owners = np.array(rows).T
         return cls(np.stack([x, y, z], axis=1), radii, turns, owners.astype(int))
 
-    def expressions(self, position: Sequence[hy.expression], currents: Sequence[Any]) -> FieldExpressions:
+    def expressions(self, position: Vector, currents: Sequence[Any]) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m), for currents (coils,) A in each turn."""
         axes: dict[tuple[float, float], list[hy.expression]] = {}
         (x, y, z), (square, height) = position, hy.make_vars("square", "height")
@@ -228,7 +228,7 @@ def _filament(square: hy.expression, height: hy.expression, radius: Any, current
 
 
 def _field_of(
-    source: hy.expression, position: Sequence[hy.expression], square: hy.expression, height: hy.expression
+    source: hy.expression, position: Vector, square: hy.expression, height: hy.expression
 ) -> FieldExpressions:
     """B and its gradient of A_φ/ρ, a function of the variables `square` and `height`, at a position from its axis."""
     series = hy.diff_tensors([source], diff_args=[square, height], diff_order=2)

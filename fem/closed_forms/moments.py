@@ -50,16 +50,10 @@ def graded_rule(breaks: Array, nodes: int) -> tuple[Array, Array]:
 def panel_breaks(box: Box, others: Sequence[Solid]) -> list[Array]:
     """Ends of the panels along each body axis: the faces, and where faces of parallel boxes lie between them."""
     result = []
-    for axis in range(3):
-        half = box.half_edges[axis]
-        places = {-half, half}
-        for other in others:
-            body = box.to_body(other.corners)
-            if parallel(box, other):
-                places |= {place for place in body[:, axis] if abs(place) < half * (1 - 1e-9)}
-        ordered = np.array(sorted(places))
-        apart = np.concatenate([[True], np.diff(ordered) > 1e-9 * half])
-        result.append(ordered[apart])
+    corners = [np.zeros((0, 3)), *(box.to_body(other.corners) for other in others if parallel(box, other))]
+    for half, places in zip(box.half_edges, np.concatenate(corners).T, strict=True):
+        ordered = np.unique(np.append(places[np.abs(places) < half * (1 - 1e-9)], [-half, half]))
+        result.append(ordered[np.diff(ordered, prepend=-np.inf) > 1e-9 * half])
     return result
 
 

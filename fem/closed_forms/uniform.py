@@ -31,7 +31,7 @@ from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part, Solid, moved, of_one_shape
 from ..compiled_code import compiled
 from ..harmonics.expansion import MultipoleExpansion, turned_field, uniform_moments
-from ..harmonics.expressions import FieldExpressions, differentiated, turned_expressions
+from ..harmonics.expressions import FieldExpressions, Vector, differentiated, turned_expressions
 from ..harmonics.solid import FOUR_PI, contracted, entries, tensors, turned_entries
 from .round import BESIDE, outside_derivatives, round_slope, round_tensor, segments_field
 
@@ -235,7 +235,7 @@ class UniformField:
     def __init__(self, magnet: Magnet) -> None:
         self.magnet = magnet
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def expressions(self, position: Vector) -> FieldExpressions:
         """Closed form at a position (three expressions, m), turned from the magnet's axes into the rotor's."""
         body, axes, polarization = self.magnet.body, self.magnet.body.rotation, self.magnet.polarization
         if isinstance(body, Sphere):
@@ -333,13 +333,12 @@ def remanent_field(magnets: Sequence[Magnet], points: Array) -> Array:
     for numbers in of_one_shape(bodies):
         home = moved(bodies[numbers[0]], np.zeros(3), np.eye(3))
         some = max(1, TENSORS // max(len(points), 1))  # of few points there are many bodies at once
-        for few in (numbers[first : first + some] for first in range(0, len(numbers), some)):
-            for start in range(0, len(points), TENSORS):
-                here = slice(start, start + TENSORS)
-                seen = np.concatenate([bodies[number].to_body(points[here]) for number in few])
-                tensors = demagnetizing_tensor(home, seen).reshape(len(few), -1, 3, 3)
-                for number, tensor in zip(few, tensors, strict=True):
-                    found[here] += tensor @ known[number].polarization @ bodies[number].rotation.T
+        for first, start in product(range(0, len(numbers), some), range(0, len(points), TENSORS)):
+            few, here = numbers[first : first + some], slice(start, start + TENSORS)
+            seen = np.concatenate([bodies[number].to_body(points[here]) for number in few])
+            tensors = demagnetizing_tensor(home, seen).reshape(len(few), -1, 3, 3)
+            for number, tensor in zip(few, tensors, strict=True):
+                found[here] += tensor @ known[number].polarization @ bodies[number].rotation.T
     return found
 
 

@@ -15,6 +15,7 @@ Robin term 2/R is exact for l = 1; what other degrees lack is a matrix of low ra
 
 import contextlib
 import resource
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -79,24 +80,16 @@ def free_memory(group: Path = GROUP) -> float:
 class OpenBoundary:
     """Dirichlet-to-Neumann map of the outside of the sphere `outer` about the origin.
 
-    `mesh`: NGSolve mesh with the boundary `outer`; `space`: H1 space of the potential; `radius`: of the sphere;
-    `degree`: highest degree that is treated exactly, higher ones see the Robin term; `order`: of the elements;
-    `planes`, `signs`: mirror planes of the mesh, and whether the potential is even (+1) or odd (-1) there.
-
-    Attribute `area_error` is the relative error of the area of the meshed sphere, which measures its roundness.
+    `space`: H1 space of the potential, on a mesh with the boundary `outer`; `radius`: of the sphere; `degree`: highest
+    degree that is treated exactly, higher ones see the Robin term; `planes`, `signs`: mirror planes of the mesh, and
+    whether the potential is even (+1) or odd (-1) there. Attribute `area_error` is the relative error of the area of
+    the meshed sphere, which measures its roundness.
     """
 
     def __init__(
-        self,
-        mesh: Any,
-        space: Any,
-        radius: float,
-        degree: int,
-        order: int,
-        planes: tuple[int, ...] = (),
-        signs: tuple[int, ...] = (),
+        self, space: Any, radius: float, degree: int, planes: Sequence[int] = (), signs: Sequence[int] = ()
     ) -> None:
-        surface = surface_points(mesh, "outer", 2 * order + 4)
+        surface = surface_points(space.mesh, "outer", 2 * space.globalorder + 4)
         used = surface.weights > 0
         self.radius, self.degree, self.copies = radius, degree, 2 ** len(planes)
         self.area_error = abs(float(surface.weights.sum()) * self.copies / (FOUR_PI * radius**2) - 1)
@@ -104,7 +97,7 @@ class OpenBoundary:
         self.keys = [key for key in members(degree) if all(harmonic_parity(key, axis) == p for axis, p in parities)]
         harmonics = np.zeros((len(used), len(self.keys)))
         harmonics[used] = orthonormal(self.keys, surface.points[used])
-        self.unknowns = np.nonzero(np.array(space.GetDofs(mesh.Boundaries("outer"))))[0]
+        self.unknowns = np.nonzero(np.array(space.GetDofs(space.mesh.Boundaries("outer"))))[0]
         parts = (surface.function(values) * space.TestFunction() * surface.measure for values in harmonics.T)
         self.projection = np.stack([load_vector(space, one)[self.unknowns] for one in parts], axis=1)
         self.degrees = np.array([l for l, _, _ in self.keys], float)

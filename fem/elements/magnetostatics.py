@@ -112,7 +112,7 @@ def solve(
     ConvergenceError: the open boundary's iteration stalls.
     """
     mesh, space = system.mesh, system.space
-    boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, boundary_degree, system.order, mesh.planes, signs)
+    boundary = OpenBoundary(space, mesh.ball_radius, boundary_degree, mesh.planes, signs)
     load = ng.LinearForm(space)
     for name in mesh.mesh.GetMaterials():
         if name != "air":

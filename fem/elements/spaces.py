@@ -37,16 +37,12 @@ class Parity:
         """Sign (+1 even, -1 odd) of each class about each of `mirrors`."""
         return list(product((1, -1), repeat=len(self.mirrors)))
 
-    @property
-    def characters(self) -> Array:
-        """(2^n, 2^n) χ(R) by class and mirror."""
-        mirrored = self.flips[:, list(self.mirrors)] < 0
-        odd = np.array(self.classes).reshape(len(self.classes), -1) < 0
-        return np.asarray((-1.0) ** (odd.astype(int) @ mirrored.astype(int).T))
-
     def project(self, images: Array) -> Array:
         """Parts (2^n classes, ...) of fields given as R A(R x) for each mirror (2^n mirrors, ...)."""
-        return np.tensordot(self.characters, images, axes=1) / len(self.flips)
+        mirrored = self.flips[:, list(self.mirrors)] < 0
+        odd = np.array(self.classes).reshape(len(self.classes), -1) < 0
+        characters = (-1.0) ** (odd.astype(int) @ mirrored.astype(int).T)  # χ(R) by class and mirror
+        return np.tensordot(characters, images, axes=1) / len(self.flips)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,10 +53,11 @@ WIDEST = 3.0  # scale of the hyperbolic sine of an angle, so that it is one near
 @cache
 def graded(count: int) -> tuple[Array, Array]:
     """Places x (n,) = sin(π/2 sin(π/2 u)) at Gauss's u, or up to `FEW` sin(π/2 u), and weights of ∫ dx."""
-    x, weights = gauss_legendre(count)
-    for _ in range(1 if count <= FEW else 2):
-        x, weights = np.sin(np.pi / 2 * x), weights * np.pi / 2 * np.cos(np.pi / 2 * x)
-    return x, weights
+    u, weights = gauss_legendre(count)
+    if count <= FEW:
+        return np.sin(np.pi / 2 * u), weights * np.pi / 2 * np.cos(np.pi / 2 * u)
+    inner = np.pi / 2 * np.sin(np.pi / 2 * u)
+    return np.sin(inner), weights * (np.pi / 2) ** 2 * np.cos(inner) * np.cos(np.pi / 2 * u)
 
 
 @cache

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
-import heyoka as hy
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from ...geometry.meshes.solids import part_rule
 from ...geometry.shapes import Box, Cylinder, Sphere
 from ...geometry.solids import Part, Solid
 from . import solid
-from .expressions import FieldExpressions, harmonic_sums, turned_expressions, whole_gradient
+from .expressions import FieldExpressions, Vector, harmonic_sums, turned_expressions, whole_gradient
 from .interior import Ball, moment
 from .solid import FOUR_PI, Coefficients
 
@@ -109,7 +108,7 @@ class MultipoleExpansion:
         turned = solid.rotated_harmonics(self.coefficients, self.axes.T)
         return turned if turned is self.coefficients else without_noise(turned, TURNED)
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def expressions(self, position: Vector) -> FieldExpressions:
         """B (T) and ∂B_i/∂x_j (T/m) at a position (three expressions, m, rotor's frame)."""
         place = [position[i] - float(self.center[i]) for i in range(3)]
         if not np.array_equal(self.axes, np.eye(3)):

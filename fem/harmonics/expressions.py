@@ -23,6 +23,7 @@ from .solid import Entry, Member, entries, members, tensors
 Terms = Mapping[Member, float]  # weights of real harmonics, by `members`
 
 
+Vector = Sequence[hy.expression]  # three
 # B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric
 FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 
@@ -30,25 +31,25 @@ FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
 
 
-def weighted(weights: Array, terms: Sequence[hy.expression]) -> hy.expression:
+def weighted(weights: Array, terms: Vector) -> hy.expression:
     """Σ weight · term, where weights of zero cost nothing."""
     return hy.sum([float(w) * t for w, t in zip(weights, terms, strict=True) if w])
 
 
-def turned_expressions(axes: Array, vector: Sequence[hy.expression]) -> list[hy.expression]:
+def turned_expressions(axes: Array, vector: Vector) -> list[hy.expression]:
     """A `vector` along the columns of `axes`, along the outer ones."""
     exact = np.where(np.abs(axes) < 1e-15, 0.0, axes)  # a quarter turn leaves 6e-17, which would cost operations
     return [weighted(row, vector) for row in exact]
 
 
-def whole_gradient(entries: Sequence[hy.expression]) -> list[list[hy.expression]]:
+def whole_gradient(entries: Vector) -> list[list[hy.expression]]:
     """Symmetric traceless gradient (3 × 3) from its entries in `UPPER`."""
     upper = dict(zip(UPPER, entries, strict=True))
     upper[2, 2] = -upper[0, 0] - upper[1, 1]
     return [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
 
 
-def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], monic: bool = False) -> list[hy.expression]:
+def harmonic_sums(position: Vector, sums: Sequence[Terms], monic: bool = False) -> list[hy.expression]:
     """Σ weight Re Θ_lm or Im Θ_lm, one expression for each of `sums`, at a `position` in the harmonics' units.
 
     `monic`: harmonics without their factors (-1)^m (2l-1)!!, each with the weight 1.
@@ -84,7 +85,7 @@ def harmonic_sums(position: Sequence[hy.expression], sums: Sequence[Terms], moni
     return found
 
 
-def regular_harmonics(degree: int, position: Sequence[hy.expression]) -> list[hy.expression]:
+def regular_harmonics(degree: int, position: Vector) -> list[hy.expression]:
     """S_m Q_lm with r² for r⁻², regular at the origin, at a position (three expressions); in the order of `members`."""
     x, y, z = position
     powers = _powers_across(x, y, degree)
@@ -149,7 +150,7 @@ class CompiledField:
     expressions (position, m) and returns `FieldExpressions`.
     """
 
-    def __init__(self, build: Callable[[Sequence[hy.expression]], FieldExpressions]) -> None:
+    def __init__(self, build: Callable[[Vector], FieldExpressions]) -> None:
         self._build, self._known = build, dict[int, Any]()
 
     def __call__(self, points: ArrayLike) -> tuple[Array, Array]:
@@ -168,9 +169,7 @@ class CompiledField:
         return np.asarray(self._known[order](np.ascontiguousarray(points.T))).T
 
 
-def differentiated(
-    known: Mapping[Entry, hy.expression], variables: Sequence[hy.expression], last: int
-) -> list[hy.expression]:
+def differentiated(known: Mapping[Entry, hy.expression], variables: Vector, last: int) -> list[hy.expression]:
     """Derivatives of a harmonic function by their `entries`, from those `known` of one degree up to the `last`.
 
     `variables` are x, y and z.

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from ...geometry.common import MU_0, Array, even_directions
 from . import solid
-from .expressions import UPPER, FieldExpressions, regular_harmonics, whole_gradient
+from .expressions import UPPER, FieldExpressions, Vector, regular_harmonics, whole_gradient
 from .solid import FOUR_PI, Coefficients, factorials, members, regular_values
 
 # Nodes of the rule for balls beyond their degree. What it cannot tell apart is 1e-3 of the error: a ball's radius is a
@@ -237,7 +237,7 @@ class LocalField:
     ORDER: ClassVar[int] = 4  # of the potential: eddy currents in a floater ask for a slope of ∂²B
     count: ClassVar[int] = 3 + ORDER * (ORDER + 2)
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def expressions(self, position: Vector) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m).
 
         The gradient has what its own second derivatives at the place need, B what its first one needs.
@@ -276,11 +276,11 @@ class BallField:
         """Of the runtime parameters."""
         return 4 + 3 * self.degree**2 + 5 * (self.degree - 1) ** 2
 
-    def offset(self, position: Sequence[hy.expression]) -> list[hy.expression]:
+    def offset(self, position: Vector) -> list[hy.expression]:
         """(r - center)/radius at a position (three expressions, m)."""
         return [(p - hy.par[self.first + i]) * hy.par[self.first + 3] for i, p in enumerate(position)]
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def expressions(self, position: Vector) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m)."""
         size, less = self.degree**2, (self.degree - 1) ** 2
         _, *harmonics = regular_harmonics(self.degree - 1, self.offset(position))  # the first is 1

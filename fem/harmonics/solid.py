@@ -292,13 +292,8 @@ def _kept(degree: int) -> NDArray[np.intp]:
 
 def tensors(values: Array) -> list[Array]:
     """Derivatives (n, 3), (n, 3, 3), ... of harmonic functions, from their `entries` of degrees 1, 2, ... (n, k)."""
-    found: list[Array] = []
-    start = 0
-    while start < values.shape[1]:
-        degree = len(found) + 1
-        found.append((values[:, start : start + 2 * degree + 1] @ _spread(degree)).reshape(-1, *(3,) * degree))
-        start += 2 * degree + 1
-    return found
+    degrees = range(1, math.isqrt(values.shape[1] + 1))
+    return [(values[:, d * d - 1 : d * (d + 2)] @ _spread(d)).reshape(-1, *(3,) * d) for d in degrees]
 
 
 def contracted(degree: int, vector: Array) -> Array:

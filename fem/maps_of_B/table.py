@@ -10,7 +10,6 @@ from functools import cached_property
 from itertools import product
 from pathlib import Path
 
-import heyoka as hy
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +22,7 @@ from ...geometry.solids import Part
 from ..cache import TableKind
 from ..closed_forms.uniform import remanent_field
 from ..harmonics.expansion import MultipoleExpansion
-from ..harmonics.expressions import FieldExpressions
+from ..harmonics.expressions import FieldExpressions, Vector
 from ..harmonics.solid import Coefficients, derivative, field_sizes, field_spectrum, outer_sums
 from ..rotor.table import RangeError, RotorTable, error_below, keeps_shape
 from .columns import METERS, TESLAS, UNITS, FieldMap, FieldMapError
@@ -215,7 +214,7 @@ class GriddedTable:
         squares = np.square(values).reshape(len(points), -1, 9).mean(axis=1)
         return np.sqrt(squares[:, :3].sum(axis=1)), np.sqrt(squares[:, 3:] @ TWICE)
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def expressions(self, position: Vector) -> FieldExpressions:
         return self.expansions.expressions(position)
 
     def derivatives(self, points: Array, order: int) -> Array:
@@ -318,11 +317,7 @@ def fit_field_map(
 
 
 def _left_out(
-    basis: HarmonicBasis,
-    fit: HarmonicFit,
-    field_map: FieldMap,
-    distances: Array,
-    expansions: tuple[MultipoleExpansion, ...],
+    basis: HarmonicBasis, fit: HarmonicFit, field_map: FieldMap, distances: Array, parts: Sequence[MultipoleExpansion]
 ) -> tuple[MultipoleExpansion, ...]:
     """What may follow a series that was cut at the basis' end, as fields of the size that is to be doubted.
 
@@ -331,7 +326,7 @@ def _left_out(
     """
     if fit.degree < basis.degree:
         return ()
-    tails = [replace(e, coefficients=_tail(field_spectrum(e.coefficients))) for e in expansions]
+    tails = [replace(e, coefficients=_tail(field_spectrum(e.coefficients))) for e in parts]
     near = np.nonzero((distances <= EDGE * distances.min(axis=0)).any(axis=1))[0]
     near = near[:: 1 + len(near) // EDGE_POINTS]
     predicted = RotorTable("map", (), doubts={"tail": tuple(tails)}).absolute_error(field_map.points[near])[0]

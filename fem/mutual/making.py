@@ -22,7 +22,7 @@ from ..harmonics.interior import Ball, field_at_center, gradient_at_center
 from ..rotor.table import alike
 from . import response, table as formulas
 from .response import ChargeResponse
-from .table import PARALLEL, MutualTable, ResponseGrid, effort
+from .table import PARALLEL, Grids, MutualTable, ResponseGrid, effort
 
 # Relative size of a singular value that is none; and up to how many weights they are found. No QR with pivots: their
 # order jumps from a scene to its neighbour, and derivatives would jump with it.
@@ -168,7 +168,7 @@ def mutual_table(
     return replace(table, gaps=gaps, errors=errors, provenance={"seconds": time.perf_counter() - started})
 
 
-def _enough_samples(grids: Sequence[ResponseGrid], facing: int) -> float:
+def _enough_samples(grids: Grids, facing: int) -> float:
     """Places beside those `facing` the magnets that do for the weights of both `_fitted`."""
     free = SPARE * ENOUGH * sum(_classes(grid).shape[1] for grid in grids)
     # of the sphere's response four values a place for two weights a power; of what returns twelve at fewer places
@@ -182,7 +182,7 @@ def _counts(magnet: Magnet, radius: float, number: int) -> tuple[int, int, int]:
     return x, y, z
 
 
-def _inner(grids: Sequence[ResponseGrid], magnets: Sequence[Magnet]) -> int:
+def _inner(grids: Grids, magnets: Sequence[Magnet]) -> int:
     """Points along each axis of a magnet for what it does as a whole: of a ring two, as one would be in its hole."""
     near = any(gap_of(*pair) < APART for pair in combinations([magnet.body for magnet in magnets], 2))
     number = effort(len(magnets)).inner if near else 1
@@ -205,12 +205,7 @@ def without_response(magnet: Magnet) -> str:
 
 
 def _rotor_fit(
-    grids: Sequence[ResponseGrid],
-    inner: Sequence[Array],
-    magnets: Sequence[Magnet],
-    direct: Array,
-    beyond: Array,
-    places: Array,
+    grids: Grids, inner: Sequence[Array], magnets: Sequence[Magnet], direct: Array, beyond: Array, places: Array
 ) -> tuple[list[ResponseGrid], Array]:
     """Strengths λ and coupling that give the products of dipoles' fields with the responses to them.
 
@@ -302,7 +297,7 @@ def mutual_table_beside(
 
 
 def sphere_fit(
-    grids: Sequence[ResponseGrid], single: bool, images: Array, places: Array, samples: Sequence[Array]
+    grids: Grids, single: bool, images: Array, places: Array, samples: Sequence[Array]
 ) -> tuple[list[ResponseGrid], Array]:
     """`grids` with `degrees`, and weights of pairs, that give the `samples` of `sphere_samples` at `places` (n, 3) m.
 
@@ -325,12 +320,7 @@ def sphere_fit(
 
 
 def returned_fit(
-    grids: Sequence[ResponseGrid],
-    single: bool,
-    inner: Sequence[Array],
-    images: Array,
-    places: Array,
-    samples: tuple[Array, Array],
+    grids: Grids, single: bool, inner: Sequence[Array], images: Array, places: Array, samples: tuple[Array, Array]
 ) -> tuple[list[ResponseGrid], Array]:
     """`grids` with `returned`, and weights of pairs, that give the `samples` of `returned_samples` at `places`.
 

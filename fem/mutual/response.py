@@ -25,7 +25,7 @@ from ..harmonics import interior
 from ..harmonics.expansion import box_rule, gauss, uniform_moments
 from ..harmonics.interior import Ball, Surroundings
 from ..harmonics.solid import FOUR_PI, Coefficients, factorials, weighted_sums
-from .table import PARALLEL, ResponseGrid, effort, induced_sources, point_counts, reflection
+from .table import PARALLEL, Grids, effort, induced_sources, point_counts, reflection
 
 DEGREES = range(6, 41)
 ROTOR_GAPS, SPHERE_GAPS = (0.1, 0.16, 0.25, 0.4, 0.7, 1.2, 2.5), (0.08, 0.16, 0.3, 0.55, 0.95, 1.6, 2.8)
@@ -258,17 +258,12 @@ class TwoBody:
 
 
 def two_body(
-    rotor: ChargeResponse,
-    floater: Floater,
-    position: Array,
-    direction: Array,
-    degree: int | None = None,
-    rtol: float = 1e-11,
+    rotor: ChargeResponse, floater: Floater, position: Array, direction: Array, degree: int = 0, rtol: float = 1e-11
 ) -> TwoBody:
     """Magnetostatics of `rotor` and `floater` for one pose.
 
     The floater's centre is at `position` (3,) m, rotor's frame, its remanence along `direction` (3,); radius, remanence
-    and permeability count. `degree` is the highest about its centre (None: by the nearest edge); the series ends at
+    and permeability count. `degree` is the highest about its centre (0: by the nearest edge); the series ends at
     `rtol` of its first term. Raises TwoBodyError: the bodies overlap, or it does not converge. Accuracy: that of the
     rotor's response and `tail`.
     """
@@ -292,19 +287,10 @@ def two_body(
         incident, sources, terms = incident + back, sources + change, terms + 1
         change = induced_sources(back, floater.recoil_permeability)
     induced = induced_sources(own, floater.recoil_permeability)
-    return TwoBody(
-        ball=ball,
-        rigid=_wrench(own, permanent, ball),
-        floater_answer=_wrench(own, induced, ball),
-        rotor_answer=_wrench(reflected, permanent, ball),
-        total=_wrench(incident, sources, ball),
-        own=own,
-        permanent=permanent,
-        incident=incident,
-        sources=sources,
-        terms=terms,
-        tail=singular_ratio(rotor.magnets, ball) ** (2 * degree),
-    )
+    tail = singular_ratio(rotor.magnets, ball) ** (2 * degree)
+    pairs = (own, permanent), (own, induced), (reflected, permanent), (incident, sources)
+    rigid, floater_answer, rotor_answer, total = (_wrench(*pair, ball) for pair in pairs)
+    return TwoBody(ball, rigid, floater_answer, rotor_answer, total, own, permanent, incident, sources, terms, tail)
 
 
 def two_body_ladder(
@@ -405,13 +391,7 @@ def sphere_samples(rotor: ChargeResponse, floater: Floater, places: Array, watch
 
 
 def returned_samples(
-    rotor: ChargeResponse,
-    floater: Floater,
-    grids: Sequence[ResponseGrid],
-    inner: Array,
-    coupling: Array,
-    places: Array,
-    watch: Watch,
+    rotor: ChargeResponse, floater: Floater, grids: Grids, inner: Array, coupling: Array, places: Array, watch: Watch
 ) -> tuple[Array, Array]:
     """The rotor's response to the sphere's response of degree 2 and more to the rotor's field.
 
@@ -443,9 +423,7 @@ def returned_samples(
     return np.array(fields), np.array(slopes)
 
 
-def point_response(
-    grids: Sequence[ResponseGrid], inner: Array, coupling: Array, sources: Coefficients, ball: Ball
-) -> Coefficients:
+def point_response(grids: Grids, inner: Array, coupling: Array, sources: Coefficients, ball: Ball) -> Coefficients:
     """Coefficients a_lm (T) of what the points of `grids`, and magnets as a whole, send back to `sources` in a `ball`.
 
     Both are [k, l, m]; `inner` (n, 3) m and `coupling` (3n, 3n) A m²/T are of the magnets as a whole.

@@ -28,7 +28,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Sphere
 from ...geometry.solids import Solid
 from ..compiled_code import compiled
-from ..harmonics.expressions import turned_expressions
+from ..harmonics.expressions import Vector, turned_expressions
 from ..harmonics.solid import FOUR_PI, Coefficients, factorials, gauss_legendre
 
 # β of the images, and the degree up to which their weights are fitted from 2 on: to 7e-4 of t_l
@@ -281,11 +281,6 @@ class ResponseGrid:
                 amounts.append(side * self.axis[k] * first * second)
         return self.box.center + np.concatenate(places) @ self.box.rotation.T, np.array(amounts)
 
-    @property
-    def numbers(self) -> Array:
-        """(n, 13) of each point: λ (3), v and w of three powers, s and t of two."""
-        return np.concatenate([self.strengths, *(w.reshape(len(w), -1) for w in (self.degrees, self.returned))], axis=1)
-
     def fields(self, powers: Sequence[int], places: Array) -> Iterator[tuple[Array, Array]]:
         """For each of the `powers` q what `point_energy` weighs in V: (R/d)^2q ĵ, and (R/d)^2q (ĵ·d) d/d².
 
@@ -305,8 +300,12 @@ class ResponseGrid:
 
     def energy(self) -> EnergySum:
         same = np.broadcast_to([*self.axis, self.radius], (len(self.points), 4))
-        rows = np.concatenate([self.points, self.numbers, same], axis=1)
+        parts = (self.points, self.strengths, self.degrees, self.returned, same)
+        rows = np.concatenate([part.reshape(len(same), -1) for part in parts], axis=1)
         return EnergySum(point_energy, rows, self.box.center, self.box.rotation)
+
+
+Grids = Sequence[ResponseGrid]
 
 
 def coupled_sum(points: Array, coupling: Array) -> EnergySum:
@@ -402,11 +401,7 @@ class MutualTable:
         return sums
 
     def energy(
-        self,
-        position: Sequence[hy.expression],
-        moment: Sequence[hy.expression],
-        flux: Sequence[hy.expression],
-        share: hy.expression | float = 1.0,
+        self, position: Vector, moment: Vector, flux: Vector, share: hy.expression | float = 1.0
     ) -> hy.expression:
         """U as an expression, for the floater's centre at a `position` (3 expressions, m), rotor's frame.
 

@@ -123,11 +123,8 @@ class ShiftedSystem:
     def __init__(self, space: EddySpace, shift: complex) -> None:
         self.space, self.shift = space, shift
         self.fes = space.elements(complex_valued=True) if np.iscomplexobj(shift) else space.real
-        require_memory(
-            self.fes,
-            self.fes.FreeDofs(True),
-            "Allow a larger error of the plate (--plate-rtol, or --rtol of the command plate)",
-        )
+        way_out = "Allow a larger error of the plate (--plate-rtol, or --rtol of the command plate)"
+        require_memory(self.fes, self.fes.FreeDofs(True), way_out)
         trial, test = self.fes.TnT()
         form = ngsolve.BilinearForm(self.fes, symmetric=True, condense=True)
         form += ngsolve.curl(trial) * ngsolve.curl(test) * ngsolve.dx
@@ -258,6 +255,7 @@ BEST_REDUCTION = 0.03
 STALLED = 0.6  # A weaker reduction than this says that the mesh is too coarse for its order
 MESH_SHARE = 0.6  # Share of a table's tolerance for the finite elements
 MODULUS = 2.0  # Most that |s/(1 + sτ)|² can grow from s = ω to s = iω, whatever the time constant τ
+REFINEMENTS = 3  # Of a mesh at most
 
 
 class MeshTooLargeError(AccuracyError):
@@ -371,24 +369,19 @@ class PlateReaction:
 
 
 def plate_reaction(
-    plate: Plate,
-    positions: ArrayLike,
-    frequency: float,
-    rtol: float = 1e-3,
-    rule: MeshRule | None = None,
-    refinements: int = 3,
+    plate: Plate, positions: ArrayLike, frequency: float, rtol: float = 1e-3, rule: MeshRule | None = None
 ) -> PlateReaction:
     """Reaction tensors of `plate` at `positions` (n, 3), m, laboratory frame, and `frequency`, Hz, phasors e^{+iωt}.
 
-    `rtol`: estimated relative error asked of every own tensor; `rule`: first mesh; `refinements`: how often it may be
-    refined. Raises ValueError: an argument out of range; AccuracyError: `rtol` not reached after all refinements, or
+    `rtol`: estimated relative error asked of every own tensor; `rule`: first mesh, which is refined `REFINEMENTS` times
+    at most. Raises ValueError: an argument out of range; AccuracyError: `rtol` not reached after all of them, or
     with `MOST_UNKNOWNS`.
     """
     places = np.asarray(positions, float).reshape(-1, 3)
     if frequency == 0:
         return PlateReaction(np.zeros((len(places), 3, 3), complex), np.zeros(len(places)))
     body, rule, turn, best = plate.box.to_body(places), rule or MeshRule(), plate.box.rotation, np.inf
-    for _ in range(refinements + 1):
+    for _ in range(REFINEMENTS + 1):
         try:
             ladder = Ladder(plate, body, frequency, rule, rtol)
         except MeshTooLargeError:

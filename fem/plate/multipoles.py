@@ -15,7 +15,7 @@ import scipy
 
 from ...geometry.common import Array, Watch, freeze, unwatched
 from ..compiled_code import compiled
-from ..harmonics.expressions import FieldExpressions, harmonic_sums, weighted
+from ..harmonics.expressions import FieldExpressions, Vector, harmonic_sums, weighted
 from ..harmonics.solid import derivative, outer_sums
 
 INDEPENDENT = 1e-10  # Squared part of a multipole that the chosen ones must leave for it to be taken
@@ -67,7 +67,7 @@ class Multipoles:
         degree, m, _ = self.kinds.astype(int).T
         return np.asarray((-1.0) ** m * scipy.special.factorial2(2 * (degree + order) - 1))
 
-    def derivatives(self, position: Sequence[hy.expression], order: int) -> list[list[hy.expression]]:
+    def derivatives(self, position: Vector, order: int) -> list[list[hy.expression]]:
         """Derivatives of each harmonic f by scaled lengths over its factor, as heyoka expressions of a `position` (m).
 
         With n = `order`, (-∂z)ⁿ f, then both parts of (-1)ᵇ (-∂z)ⁿ⁻ᵇ (∂x + i∂y)ᵇ f for b = 1 … n: sums of two monic
@@ -97,7 +97,7 @@ class Multipoles:
                     found[number] += [other_im - im, re - other_re] if part else [re + other_re, im + other_im]
         return [found[number] for number in range(len(self.kinds))]
 
-    def expressions(self, position: Sequence[hy.expression]) -> list[FieldExpressions]:
+    def expressions(self, position: Vector) -> list[FieldExpressions]:
         """B (T) and its gradient (T/m) of each as heyoka expressions of a position (m)."""
         found = []
         numbers = self.factors(1), self.factors(2) / self.scale
@@ -138,10 +138,9 @@ class Multipoles:
         degree = int(self.kinds[:, 0].max())
         for center in np.unique(self.centers, axis=0):
             here = np.flatnonzero((self.centers == center).all(axis=1))
+            l, m, part = self.kinds[here].astype(int).T
             single = np.zeros((len(here), degree + 1, degree + 1), complex)
-            for row, number in enumerate(here):
-                l, m, part = self.kinds[number].astype(int)
-                single[row, l, m] = 1j if part else 1.0
+            single[np.arange(len(here)), l, m] = np.where(part, 1j, 1.0)
             parts = [-derivative(coefficients, axis) for coefficients in single for axis in range(3)]
             found[:, here] = outer_sums(parts, (points - center) / self.scale).reshape(len(points), len(here), 3)
         return found

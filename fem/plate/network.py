@@ -257,10 +257,8 @@ def _functions(
         return max(tensor_error(values, error, rates, omega) for omega in (low, middle, high))
 
     choice = candidates(region, network.plate.body, DEGREE if rtol >= STRICT else STRICT_DEGREE)
-    fit = fit_multipoles(
-        choice, points, values, state_scale, point_scale, rtol,
-        lambda error: worst(error) <= FUNCTION_SHARE * rtol, watch=watch,
-    )  # fmt: skip
+    enough = lambda error: worst(error) <= FUNCTION_SHARE * rtol  # noqa: E731
+    fit = fit_multipoles(choice, points, values, state_scale, point_scale, rtol, enough, watch=watch)
     return fit.multipoles, fit.weights, worst(fit.error)
 
 

@@ -163,11 +163,9 @@ def _angles(number: int) -> list[float]:
 
 def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
     """Where the inner parts of the turning magnets are, in the plate's frame, on all of its way."""
-    boxes = [magnet.box for magnet in rotor.magnets]
-    inner = [INNER * float(box.size.max()) for box in boxes]
-    radius = max(float(np.hypot(*box.center[:2])) + r for box, r in zip(boxes, inner, strict=True))
-    low = min(float(box.center[2]) - r for box, r in zip(boxes, inner, strict=True))
-    high = max(float(box.center[2]) + r for box, r in zip(boxes, inner, strict=True))
+    inner = INNER * np.array([magnet.box.size.max() for magnet in rotor.magnets])
+    x, y, z = np.array([magnet.box.center for magnet in rotor.magnets]).T
+    radius, low, high = np.max(np.hypot(x, y) + inner), np.min(z - inner), np.max(z + inner)
     corners = np.stack(np.meshgrid((-radius, radius), (-radius, radius), (low, high + plate.way)), -1).reshape(8, 3)
     body = plate.box.to_body(corners)
     return Region(body.min(axis=0), body.max(axis=0))

@@ -108,22 +108,18 @@ class PlateAround:
         body = plate.body, plate.metal, plate.way
         return *body, rotor.uniform, rotor.expansions, self.region, self.frequencies, self.rtol
 
-    @property
-    def _kind(self) -> TableKind[Both]:
-        return SLAB if self.slab else DRIVEN
-
     @cached_property
     def _turning(self) -> rotors.TurningRotor:
         return rotors.TurningRotor(_seen(self.plate, self.slab), self.rotor, rotors.UNNOTICED * self.rtol)
 
     @cached_property
     def key(self) -> str:
-        return self._kind.key(*self.deciding)
+        return (SLAB if self.slab else DRIVEN).key(*self.deciding)
 
     def made(self, report: Report, watch: Watch = unwatched) -> tuple[PlateTable, RotorShare, bool]:
         """The `tables`, and whether they were cached."""
         make = partial(self.tables, partial(currents.cached_currents, report=report, watch=watch), watch)
-        (table, share), cached = self._kind.cached(self.deciding, make, report)
+        (table, share), cached = (SLAB if self.slab else DRIVEN).cached(self.deciding, make, report)
         return table, share, cached
 
     def changed_shares(self, known: Both, others: Sequence[tuple[Plate, RotorTable]], report: Report) -> Array:

@@ -13,6 +13,7 @@ Turning waves add up to the waves of a cylinder, by DLMF 10.9.2:
 """
 
 import time
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -282,23 +283,17 @@ def _pairs(values: Sequence[Array]) -> Array:
 
 def _in_plate(fits: Sequence[Fit], frame: SlabFrame) -> tuple[Multipoles, Array]:
     """All orders with both partners, in the plate's frame, where other axes mix the orders of one degree."""
-    columns: dict[tuple[float, ...], int] = {}
-    entries: list[tuple[int, int, Array]] = []
-    start = 0
+    states, start = sum(len(fit.weights) * (1 + (m > 0)) for m, fit in enumerate(fits)), 0
+    columns = defaultdict[tuple[float, ...], Array](lambda: np.zeros(states))
     for m, fit in enumerate(fits):
+        centers, degrees = frame.to_plate(fit.multipoles.centers).tolist(), fit.multipoles.kinds[:, 0].astype(int)
         for factor in (1.0, -1j)[: 1 + (m > 0)]:  # of Θ_lm; the real parts are 2 Re Θ_lm and 2 Im Θ_lm
-            for center, degree, weights in zip(
-                frame.to_plate(fit.multipoles.centers), fit.multipoles.kinds[:, 0], fit.weights.T, strict=True
-            ):
-                for kind, share in _kinds(int(degree), m, factor, frame.axes):
-                    column = columns.setdefault((*center.tolist(), *kind), len(columns))
-                    entries.append((start, column, share * weights))
+            for center, degree, weights in zip(centers, degrees, fit.weights.T, strict=True):
+                for kind, share in _kinds(degree, m, factor, frame.axes):
+                    columns[*center, *kind][start : start + len(weights)] += share * weights
             start += len(fit.weights)
-    total = np.zeros((start, len(columns)))
-    for row, column, part in entries:
-        total[row : row + len(part), column] += part
     keys = np.array(list(columns))
-    return Multipoles(keys[:, :3], keys[:, 3:], fits[0].multipoles.scale), total
+    return Multipoles(keys[:, :3], keys[:, 3:], fits[0].multipoles.scale), np.array(list(columns.values())).T
 
 
 def _kinds(degree: int, order: int, factor: complex, axes: Array) -> list[tuple[tuple[int, int, int], float]]:

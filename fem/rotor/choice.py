@@ -6,17 +6,16 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from ...geometry.common import Watch, unwatched
+from ...geometry.common import Report, Watch, unwatched
 from ...geometry.cutting import united
-from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box
 from ..elements.surface import smooth
 from .charges import surface_table, without_charges
-from .models import Accuracy, cuboid_table, dipole_table, error_points, fem_table, moment_error, moments_table
+from .models import Accuracy, Rotor, cuboid_table, dipole_table, error_points, fem_table, moment_error, moments_table
 from .table import ROTOR, RotorTable, alike
 
 # From the cheapest to the dearest in evaluation
-MODELS: dict[str, Callable[[tuple[Magnet, ...], Accuracy], RotorTable]] = {
+MODELS: dict[str, Callable[[Rotor, Accuracy], RotorTable]] = {
     "dipole": dipole_table,
     "moments": moments_table,
     "cuboid": cuboid_table,
@@ -31,9 +30,7 @@ SURELY = 10  # what permeability does to the moments, by the tolerance, from whi
 FEW_MOMENTS = 16  # coefficients per magnet up to which moments are quicker to evaluate than the closed form
 
 
-def resolve_model(
-    rotor: tuple[Magnet, ...], model: str, rtol: float = 3e-6, nearest: float | None = None
-) -> tuple[str, str]:
+def resolve_model(rotor: Rotor, model: str, rtol: float = 3e-6, nearest: float | None = None) -> tuple[str, str]:
     """Name of the model that `rotor_table` uses for `model`, and the reason in words.
 
     `auto` is the cheapest of dipole, moments and closed form that meets the accuracy, else charges on the surfaces
@@ -70,11 +67,7 @@ def resolve_model(
 
 
 def rotor_table(
-    rotor: tuple[Magnet, ...],
-    model: str = "auto",
-    rtol: float = 3e-6,
-    nearest: float | None = None,
-    watch: Watch = unwatched,
+    rotor: Rotor, model: str = "auto", rtol: float = 3e-6, nearest: float | None = None, watch: Watch = unwatched
 ) -> RotorTable:
     """Table of a rotor's field.
 
@@ -108,7 +101,7 @@ def rotor_table(
     return _simple_table(_Requested(ROTOR.key(lone, name, rtol, nearest), lone), name, accuracy).posed(rotor)
 
 
-def _bodies(rotor: tuple[Magnet, ...], model: str) -> tuple[Magnet, ...]:
+def _bodies(rotor: Rotor, model: str) -> Rotor:
     """The magnets of a model's table: each has a dipole of its own, else those that are one are one."""
     return rotor if model == "dipole" else united(rotor)
 
@@ -116,7 +109,7 @@ def _bodies(rotor: tuple[Magnet, ...], model: str) -> tuple[Magnet, ...]:
 @dataclass(frozen=True)
 class _Requested:
     key: str
-    rotor: tuple[Magnet, ...] = field(compare=False)
+    rotor: Rotor = field(compare=False)
 
 
 @lru_cache(maxsize=64)  # sweeps and sliders that move a lone magnet ask for the same again
@@ -125,12 +118,7 @@ def _simple_table(requested: _Requested, model: str, accuracy: Accuracy) -> Roto
 
 
 def cached_rotor_table(
-    rotor: tuple[Magnet, ...],
-    model: str,
-    rtol: float,
-    report: Callable[[str], None],
-    nearest: float | None = None,
-    watch: Watch = unwatched,
+    rotor: Rotor, model: str, rtol: float, report: Report, nearest: float | None = None, watch: Watch = unwatched
 ) -> tuple[RotorTable, bool]:
     """`rotor_table` of `rotor`, `model`, `rtol`, `nearest`, `watch` from the cache if there, and whether it was.
 

@@ -70,13 +70,10 @@ class FloaterSources:
         """Its mean over a `number` of turns about its z, exact for orders m of its multipoles below that."""
         angles = 2 * np.pi * np.arange(number) / number
         turned = [self.turned(rotation_matrix((0.0, 0.0, angle))) for angle in np.degrees(angles)]
-        return replace(
-            self,
-            places=np.concatenate([one.places for one in turned]),
-            moments=np.concatenate([one.moments for one in turned]) / number,
-            corners=np.concatenate([one.corners for one in turned]),
-            charges=np.tile(self.charges, number) / number,
-        )
+        parts = zip(*((one.places, one.moments / number, one.corners) for one in turned), strict=True)
+        places, moments, corners = map(np.concatenate, parts)
+        charges = np.tile(self.charges, number) / number
+        return replace(self, places=places, moments=moments, corners=corners, charges=charges)
 
     @property
     def dipole_moment(self) -> Array:

@@ -185,10 +185,7 @@ class AccuracyWarning(UserWarning):
 
 
 def fem_table(
-    magnets: tuple[Magnet, ...],
-    accuracy: Accuracy | None = None,
-    settings: MeshSettings | None = None,
-    watch: Watch = unwatched,
+    magnets: Rotor, accuracy: Accuracy | None = None, settings: MeshSettings | None = None, watch: Watch = unwatched
 ) -> RotorTable:
     """Field of permeable magnets: closed form of the remanence, and expansions of what is added to it.
 
@@ -295,12 +292,8 @@ def trimmed_table(
     allowed = np.maximum(BETWEEN * (scale * accuracy.rtol - rest), least * scale * accuracy.rtol)
     # without points beside edges the fit, which need only hold at the others, would run wild there
     guards, scale_beside = _guards(table.magnets, clearance)
-    kept, dropped = trimmed_expansions(
-        table.expansions,
-        np.concatenate([points, guards]),
-        np.concatenate([allowed, beside * BESIDE * accuracy.rtol * scale_beside]),
-        most,
-    )
+    points, allowed = np.concatenate([points, guards]), [*allowed, *(beside * BESIDE * accuracy.rtol * scale_beside)]
+    kept, dropped = trimmed_expansions(table.expansions, points, np.array(allowed), most)
     doubts = {**table.doubts, KNOWN: (*table.doubts.get(KNOWN, ()), *dropped)}
     return replace(table, expansions=nonzero(kept), doubts=doubts)
 

@@ -15,7 +15,7 @@ from ...geometry.solids import Solid, moved
 from ..cache import TableKind
 from ..closed_forms.uniform import UniformField, squared_distance
 from ..harmonics.expansion import MultipoleExpansion, summed_derivatives, without_noise
-from ..harmonics.expressions import FieldExpressions
+from ..harmonics.expressions import FieldExpressions, Vector
 from ..harmonics.interior import Ball, dipole_sources
 from ..harmonics.solid import rotated_harmonics, tensors
 
@@ -53,7 +53,7 @@ def keeps_shape(method: Callable[[Any, Array], Found]) -> Callable[[Any, ArrayLi
 class FieldFormula(Protocol):
     """A field that the equations of motion can be written with."""
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def expressions(self, position: Vector) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
 
 
@@ -110,7 +110,7 @@ class RotorTable:
         doubts = {cause: parts for cause, some in self.doubts.items() if (parts := nonzero(some))}
         object.__setattr__(self, "doubts", doubts)
 
-    def expressions(self, position: Sequence[hy.expression]) -> FieldExpressions:
+    def expressions(self, position: Vector) -> FieldExpressions:
         """B and its gradient as heyoka expressions of a position (m, rotor's frame)."""
         parts = [part.expressions(position) for part in self._closed_forms]
         parts += [part.expressions(position) for part in self.expansions]
@@ -247,14 +247,7 @@ class RotorTable:
         """The table of a rotor from that of `alike(rotor)`: the same field and errors, moved, but for round-off."""
         if len(rotor) != 1:
             return replace(self, magnets=rotor)
-        found = self.transformed(canonical(rotor)[0].body, rotor[0])
-
-        def quiet(parts: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
-            """Without what symmetry forbids and round-off makes, which costs time."""
-            return tuple(replace(e, coefficients=without_noise(e.coefficients, 1e-15)) for e in parts)
-
-        doubts = {cause: quiet(parts) for cause, parts in found.doubts.items()}
-        return replace(found, expansions=quiet(found.expansions), doubts=doubts)
+        return self.transformed(canonical(rotor)[0].body, rotor[0])
 
     def transformed(self, before: Solid, after: Magnet, size: float = 1.0, strength: float = 1.0) -> "RotorTable":
         """The field of a lone magnet from that of one with the body `before`: as it, but for its pose.
@@ -264,18 +257,18 @@ class RotorTable:
         body = after.body
         turn = body.rotation @ before.rotation.T
 
-        def there(part: MultipoleExpansion) -> MultipoleExpansion:
-            center = body.center + size * turn @ (part.center - before.center)
-            coefficients = strength * rotated_harmonics(part.coefficients, turn)
-            return MultipoleExpansion(center, size * part.radius, coefficients, turn @ part.axes)
+        def there(parts: Sequence[MultipoleExpansion]) -> tuple[MultipoleExpansion, ...]:
+            found = []
+            for part in parts:
+                center = body.center + size * turn @ (part.center - before.center)
+                # without what symmetry forbids and round-off makes, which costs time
+                coefficients = without_noise(strength * rotated_harmonics(part.coefficients, turn), 1e-15)
+                found.append(MultipoleExpansion(center, size * part.radius, coefficients, turn @ part.axes))
+            return tuple(found)
 
-        return replace(
-            self,
-            magnets=(after,),
-            uniform=tuple(replace(form, body=body, polarization=strength * form.polarization) for form in self.uniform),
-            expansions=tuple(map(there, self.expansions)),
-            doubts={cause: tuple(map(there, parts)) for cause, parts in self.doubts.items()},
-        )
+        uniform = tuple(replace(form, body=body, polarization=strength * form.polarization) for form in self.uniform)
+        doubts = {cause: there(parts) for cause, parts in self.doubts.items()}
+        return replace(self, magnets=(after,), uniform=uniform, expansions=there(self.expansions), doubts=doubts)
 
     @keeps_shape
     def in_range(self, points: Array) -> NDArray[np.bool_]:

@@ -107,7 +107,7 @@ def assemble_regions(mesh: Any, permeability: Mapping[str, Array], ball_radius: 
     TooLargeError : the memory does not hold the system
     """
     space, stiffness = stiffness_of(mesh, permeability, ball_radius, order, "Take elements of a lower degree")
-    boundary = OpenBoundary(mesh, space, ball_radius, BOUNDARY_DEGREE, order)
+    boundary = OpenBoundary(space, ball_radius, BOUNDARY_DEGREE)
     inverse = stiffness.mat.Inverse(space.FreeDofs(True), inverse="sparsecholesky")
     rules = [volume_points(mesh, name, 2 * order - 2) for name in permeability]
     owner = np.repeat(np.arange(len(rules)), [len(rule.weights) for rule in rules])

@@ -204,7 +204,7 @@ def test_equilibria_of_other_rotors_against_both_bodies(rotor, frequency, part):
     whole = interaction(scene)
     found = find_equilibria(scene, whole)[0]
     (fine,) = element_ladder(rotor, (3,))
-    both = two_body(fine, PERMEABLE, found.position, found.state.moment, None, 1e-8)
+    both = two_body(fine, PERMEABLE, found.position, found.state.moment, 0, 1e-8)
     added, (field, gradient) = both.total - both.rigid, whole.evaluate(found.position[None])
     force, _ = whole.effects[0].wrench(found.position[None], found.state.moment[None], field, gradient)
     apart, size = np.linalg.norm(force[0] - added.force), np.linalg.norm(added.force)

@@ -66,7 +66,7 @@ def test_open_boundary_recognises_outer_potentials(order, planes):
     potential = ng.GridFunction(space)
     radius = ng.sqrt(ng.x**2 + ng.y**2 + ng.z**2)
     potential.Set(ng.z / radius**3, definedon=mesh.mesh.Boundaries("outer"))
-    boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, 3, order, planes, (1, 1, -1)[: len(planes)])
+    boundary = OpenBoundary(space, mesh.ball_radius, 3, planes, (1, 1, -1)[: len(planes)])
     expected = np.zeros((4, 4), complex)
     expected[1, 0] = 1.0
     found = boundary.expansion(potential.vec.FV().NumPy())

@@ -19,7 +19,7 @@ def system():
     mesh = mesh_magnets(load_scene("scenes/horizontal.toml").rotor[:1])
     space = ng.H1(mesh.mesh, order=ORDER)
     trial, test = space.TnT()
-    boundary = OpenBoundary(mesh.mesh, space, mesh.ball_radius, DEGREE, ORDER)
+    boundary = OpenBoundary(space, mesh.ball_radius, DEGREE)
     form = ng.BilinearForm(space, symmetric=True, condense=True)
     form += ng.grad(trial) * ng.grad(test) * ng.dx + 2 / mesh.ball_radius * trial * test * ng.ds("outer")
     form.Assemble()

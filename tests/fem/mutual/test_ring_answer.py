@@ -95,7 +95,7 @@ def test_a_rings_answer_is_that_of_both_bodies_in_one_mesh():
     table = cached_mutual_table(RING, PERMEABLE, print)[0]
     (rotor,) = element_ladder(RING, (3,))
     for place, direction in zip(PLACES, DIRECTIONS, strict=True):
-        both = two_body(rotor, PERMEABLE, place, direction, None, 1e-8)
+        both = two_body(rotor, PERMEABLE, place, direction, 0, 1e-8)
         whole = solve_both_bodies(mesh_two_bodies(RING, place, PERMEABLE.radius, 0.2), PERMEABLE, place, direction)
         exact = whole - both.rigid
         field, slope = field_at_center(both.own), gradient_at_center(both.own, PERMEABLE.radius)

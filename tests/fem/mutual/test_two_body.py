@@ -192,7 +192,7 @@ def test_both_bodies_solved_at_once_agree(rotors):
 @pytest.mark.slow
 def test_dipoles_in_one_mesh_of_both_agree(rotors):
     """By the sums that serve floaters of any shape (`test_mutual`), of a sphere, whose answer is exact: to 1e-3."""
-    both = two_body(rotors[-1], PERMEABLE, PLACE, DIRECTION, None, 1e-8)
+    both = two_body(rotors[-1], PERMEABLE, PLACE, DIRECTION, 0, 1e-8)
     known = both.total - both.rigid
     ball = Magnet(Sphere(RADIUS, PLACE), PERMEABLE.remanence * DIRECTION, PERMEABLE.recoil_permeability)
     apart = added_to_body(rotors[-1].magnets, ball, 0.25) - known
