@@ -292,8 +292,8 @@ def trimmed_table(
     allowed = np.maximum(BETWEEN * (scale * accuracy.rtol - rest), least * scale * accuracy.rtol)
     # without points beside edges the fit, which need only hold at the others, would run wild there
     guards, scale_beside = _guards(table.magnets, clearance)
-    points, allowed = np.concatenate([points, guards]), [*allowed, *(beside * BESIDE * accuracy.rtol * scale_beside)]
-    kept, dropped = trimmed_expansions(table.expansions, points, np.array(allowed), most)
+    allowed = np.concatenate([allowed, beside * BESIDE * accuracy.rtol * scale_beside])
+    kept, dropped = trimmed_expansions(table.expansions, np.concatenate([points, guards]), allowed, most)
     doubts = {**table.doubts, KNOWN: (*table.doubts.get(KNOWN, ()), *dropped)}
     return replace(table, expansions=nonzero(kept), doubts=doubts)
 
