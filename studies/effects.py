@@ -93,6 +93,8 @@ def _mutual(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
     (answers, why), shift = levitation.answers, None
     if first is not None and why != NOTHING_PERMEABLE:
         shift = 1e3 * shift_by_mutual(_scene(levitation, first), levitation.table, first, answers)
+        if not shift < 1e3 * levitation.scene.floater.radius:  # farther than to first order it can
+            shift, why = None, f"{why}; what it does to the equilibrium is not known"
     return ListedEffect(MUTUAL, answers is not None, shift, None, why)
 
 

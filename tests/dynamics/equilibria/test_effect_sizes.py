@@ -18,8 +18,9 @@ from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import cached_mutual_table
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.fem.rotor_metal import ball_losses, pieces_of
-from spinlev.geometry.magnets import horizontal
+from spinlev.geometry.magnets import Magnet, horizontal
 from spinlev.geometry.scene.contents import Drag, Scene
+from spinlev.geometry.shapes import Cylinder
 
 SCENE = Scene(150.0, horizontal(1.5e-3, 10e-3, 1.305, 1.05), PERMEABLE, Drag(0.0, 0.0))
 CONDUCTING = replace(SCENE, floater=replace(PERMEABLE, conductivity=6.7e5))
@@ -71,6 +72,15 @@ def test_shift_by_mutual_magnetisation(table, alone, locked):
         force = effect.wrench(place, direction, *table.evaluate(place))[0][0]
         rough = rough_force(SCENE.rotor, PERMEABLE, table, place[0], direction[0])
         assert 0.5 < np.linalg.norm(rough) / np.linalg.norm(force) < 2
+
+
+def test_no_dipole_stands_for_a_ring_about_the_floater():
+    """In its hole the shift was said to be 2e12 mm."""
+    ring = Magnet(Cylinder(7e-3, 8e-3, inner_radius=3e-3), (1.2, 0.0, 0.2), 1.05)
+    table, floater = rotor_table((ring,), "cuboid"), replace(PERMEABLE, radius=2.5e-3)
+    inside, below = (rough_force((ring,), floater, table, np.array([0.0, 0.0, -z]), np.eye(3)[2]) for z in (7e-6, 7e-3))
+    assert np.isnan(inside).all()
+    assert 1e-4 < np.linalg.norm(below) < 1.0
 
 
 def test_growth_by_the_currents_of_the_floater(table, alone):
