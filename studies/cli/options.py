@@ -402,7 +402,10 @@ def combinations(values: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
 
 def frequency_grid(text: str) -> Array:
     """(n,) Hz, rising, from FIRST:LAST:STEP or VALUE,VALUE,... Raises InputError unless all are positive."""
-    numbers = sorted(set(_numbers(text)))
+    given = _numbers(text)
+    if len(given) > MOST_VALUES:
+        raise refused("--frequency-hz", f"have at most {MOST_VALUES} values", text)
+    numbers = sorted(set(given))
     if not numbers or numbers[0] <= 0:
         rule = "be FIRST:LAST:STEP or VALUE,VALUE,... of positive numbers, such as 100:180:5"
         raise refused("--frequency-hz", rule, text, _decimal_point(text))

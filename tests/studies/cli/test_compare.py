@@ -127,6 +127,7 @@ def test_gravity_across_the_axis_leaves_no_stable_range():
         (("--frequency-hz", "abc"), "--frequency-hz must be"),
         (("--frequency-hz", "0:100:10"), "positive numbers"),
         (("--frequency-hz", "120:100:10"), "--frequency-hz must be"),
+        (("--frequency-hz", "100:200:1e-12"), "at most 100000 values"),
         (("--plate-model", "thick"), "--plate-model"),
         (("--rtol", "2"), "--rtol"),
         (("--spin", "1e9"), "--spin"),
