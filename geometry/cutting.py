@@ -107,12 +107,10 @@ class Cells:
     def which(self, points: Array) -> NDArray[np.intp]:
         """Number of the part (n,) to which points (n, 3) m of the body belong, the nearest where there is none."""
         share = self.body.to_body(points) / (2 * self.body.half_edges) + 0.5
-        place = np.clip((share * self.counts).astype(int), 0, np.array(self.counts) - 1)
-        found = self.numbers[tuple(place.T)]
+        found = self.numbers[tuple(np.clip((share * self.counts).astype(int), 0, np.array(self.counts) - 1).T)]
         lost = found < 0
         if lost.any():
-            apart = np.linalg.norm(points[lost, None] - self.centers, axis=2)
-            found[lost] = np.argmin(apart, axis=1)
+            found[lost] = np.argmin(np.linalg.norm(points[lost, None] - self.centers, axis=2), axis=1)
         return np.asarray(found)
 
 
@@ -128,8 +126,7 @@ def cells_of(body: Solid, nearest: float) -> Cells:
 
 def _cells(body: Solid, counts: tuple[int, int, int]) -> Cells:
     lines = [np.linspace(-h, h, n * SAMPLES + 1) for h, n in zip(body.half_edges, counts, strict=True)]
-    size = 2 * body.half_edges / counts
-    step = float(np.linalg.norm(size)) / SAMPLES
+    step = float(np.linalg.norm(2 * body.half_edges / counts)) / SAMPLES
     centers, radii = list[Array](), list[float]()
     numbers = np.full(counts, -1)
     for place in np.ndindex(*counts):

@@ -152,8 +152,7 @@ class Body:
 
 def _from_excess(excess: Array) -> Array:
     """Signed distance (...,) of points that lie so far beyond faces square to each other (..., n), m."""
-    outside = np.linalg.norm(np.maximum(excess, 0.0), axis=-1)
-    return np.asarray(outside + np.minimum(excess.max(axis=-1), 0.0))
+    return np.asarray(np.linalg.norm(np.maximum(excess, 0.0), axis=-1) + np.minimum(excess.max(axis=-1), 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,8 +268,7 @@ class Cylinder(Body):
 
     def reach(self, directions: Array) -> Array:
         along = np.abs(directions @ self.rotation[:, 2])
-        across = np.sqrt(np.maximum(1 - along**2, 0.0))
-        return np.asarray(self.radius * across + self.height / 2 * along)
+        return np.asarray(self.radius * np.sqrt(np.maximum(1 - along**2, 0.0)) + self.height / 2 * along)
 
     def distance(self, points: ArrayLike) -> Array:
         across, height = self._off_axis(points)

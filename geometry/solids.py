@@ -66,8 +66,7 @@ class Part(Body):
         return float(1.001 * np.linalg.norm(self.triangles, axis=2).max())
 
     def reach(self, directions: Array) -> Array:
-        along = (directions @ self.rotation) @ self.triangles.reshape(-1, 3).T
-        return np.asarray(np.abs(along).max(axis=1))
+        return np.asarray(np.abs((directions @ self.rotation) @ self.triangles.reshape(-1, 3).T).max(axis=1))
 
     def support(self, directions: Array) -> Array:
         return np.asarray(((directions @ self.rotation) @ self.triangles.reshape(-1, 3).T).max(axis=1))
@@ -78,8 +77,7 @@ class Part(Body):
         normals, areas = self._normals
         normals, areas = normals[areas > 0], areas[areas > 0]
         alike, first, number = np.unique(np.round(normals, 7), axis=0, return_index=True, return_inverse=True)
-        order = np.argsort(-np.bincount(number.ravel(), areas, len(alike)))
-        return np.asarray(normals[first[order[:FACES]]])
+        return np.asarray(normals[first[np.argsort(-np.bincount(number.ravel(), areas, len(alike)))[:FACES]]])
 
     @property
     def _normals(self) -> tuple[Array, Array]:

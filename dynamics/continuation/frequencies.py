@@ -134,8 +134,7 @@ def distance_error(scene: Scene, table: FieldTable, family: Family, point: Branc
     size = of_gradient[0] * np.linalg.norm(gradient)
     force = np.prod(values[[Parameter.TORQUE, Parameter.INERTIA, Parameter.LENGTH]]) * size
     slope = family.balance(point.parameter)(point.state[None, :3], point.state[None, 6:9])[1][0]
-    shares = np.abs(np.linalg.inv(slope)[2])
-    return float(shares @ np.array([force] * 3 + [torque] * 2)) * scales.length
+    return float(np.abs(np.linalg.inv(slope)[2]) @ np.array([force] * 3 + [torque] * 2)) * scales.length
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,8 +336,7 @@ def way_out(
     The `scene` has these `equilibria` in the field, and with the effects, of `table`, and the plate's currents, if they
     are modelled (`memory`).
     """
-    rates = [e.growth_per_s for e in equilibria]
-    times = [f"{1 / g:.2g} s" if g < 10 else f"{1e3 / g:.2g} ms" for g in rates]
+    times = [f"{1 / g:.2g} s" if g < 10 else f"{1e3 / g:.2g} ms" for g in [e.growth_per_s for e in equilibria]]
     pairs = zip(equilibria, times, strict=True)
     kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (e-folding time {time})" for e, time in pairs)
     found = f"only unstable ones: {', '.join(kinds)}" if kinds else "nor an unstable one below the rotor"

@@ -77,8 +77,7 @@ class SearchRange:
         corners = [magnet.box.corners / self.scene.floater.radius for magnet in self.scene.rotor]
         nearest = 1.0 + max((-c[:, 2].min() for c in corners), default=0.0)
         beside = 1.0 + np.array([1.0, 1.1, 1.3, 2.0]) * max((np.abs(c[:, :2]).max() for c in corners), default=0.0)
-        below = -np.geomspace(nearest, max(self.bound, nearest), 16)
-        near = _rings(below, np.array([0.0, 0.15, 0.7]), 4)
+        near = _rings(-np.geomspace(nearest, max(self.bound, nearest), 16), np.array([0.0, 0.15, 0.7]), 4)
         places = np.concatenate([near, _rings(np.array([-0.01, -0.1, -0.4, -0.9]), beside, 12)])
         moment = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if sum(map(abs, v)) in (1.0, 3.0)])
         moment /= np.linalg.norm(moment, axis=1, keepdims=True)

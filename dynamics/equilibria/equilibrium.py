@@ -307,8 +307,7 @@ def nearest_of(equilibria: Sequence[Equilibrium], place: Array) -> Equilibrium |
 
 def resampled(samples: Array, count: int) -> Array:
     """Trigonometric interpolation (count, ...) of samples (n, ...) at equidistant instants, both numbers odd."""
-    spectrum = np.fft.rfft(samples, axis=0)[: count // 2 + 1] * (count / len(samples))
-    return np.fft.irfft(spectrum, count, axis=0)
+    return np.fft.irfft(np.fft.rfft(samples, axis=0)[: count // 2 + 1] * (count / len(samples)), count, axis=0)
 
 
 def _extremes(values: Array) -> Array:

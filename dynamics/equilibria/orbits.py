@@ -150,8 +150,7 @@ class Pencil:
         found = np.einsum("ab,xy->axby", self.change + shift * np.eye(n), np.eye(size))
         found[np.arange(n), :, np.arange(n)] -= self.slopes
         if self.plate is not None and self.drive is not None:
-            answer = self.plate.remembered(n, shift) - np.eye(n)
-            parts = self.drive.fields, answer, self.drive.by_state
+            parts = self.drive.fields, self.plate.remembered(n, shift) - np.eye(n), self.drive.by_state
             found[:, accelerated(size)] -= np.einsum("aix,iab,biy->axby", *parts, optimize=True)
         return np.asarray(found.reshape(size * n, size * n))
 
@@ -213,8 +212,7 @@ class OrbitProblem:
         size, rows = own + len(decay), accelerated(own)
         full = np.zeros((self.count, size, size))
         full[:, :own, :own] = slopes
-        strengths = self.plate.strengths(memory - drive.signals)
-        full[:, rows, :own] += np.einsum("akyx,ak->axy", drive.pull, strengths)
+        full[:, rows, :own] += np.einsum("akyx,ak->axy", drive.pull, self.plate.strengths(memory - drive.signals))
         full[:, rows, :own] -= np.einsum("aix,aiy->axy", drive.fields, drive.by_state)
         full[:, rows, own:] = drive.fields.swapaxes(1, 2)
         full[:, own:, :own] = decay[:, None] * drive.by_state
@@ -320,8 +318,7 @@ def _propagated(derivatives: Array, own_size: int, steps: int) -> Array:
 def _turns(matrices: Array, shapes: Array, rates: Array) -> Array:
     """The multiple of the rotor's frequency that is strongest in the periodic part of each mode."""
     steps = len(matrices) - 1
-    times = 2 * np.pi * np.arange(steps) / steps
-    motion = (matrices[:-1] @ shapes) * np.exp(-np.outer(times, rates))[:, None]
+    motion = (matrices[:-1] @ shapes) * np.exp(-np.outer(2 * np.pi * np.arange(steps) / steps, rates))[:, None]
     strength = np.sum(np.abs(np.fft.fft(motion, axis=0)) ** 2, axis=1)
     return np.asarray(np.fft.fftfreq(steps, 1 / steps)[np.argmax(strength, axis=0)])
 
@@ -452,8 +449,7 @@ def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None
         last, tangent, farthest = points[0], tangents[0], max(farthest, float(points[0, -1]))
         return END if tangent[-1] < 0 or last[-1] >= 1 else ON
 
-    forward = np.append(0.0 * last[:-1], 1.0)[None]
-    follow(curve, last[None], directions(curve, last[None], forward), TURNING, watch)
+    follow(curve, last[None], directions(curve, last[None], np.append(0.0 * last[:-1], 1.0)[None]), TURNING, watch)
     if last[-1] >= 1:
         return curve.states(last[:-1]), NOT_CONVERGED, farthest
     return None, FOLD if tangent[-1] < 0 else NOT_CONVERGED, farthest

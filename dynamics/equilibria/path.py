@@ -204,8 +204,7 @@ def whole_curves(
     ways, before = [[pair] for pair in zip(begin, tangent, strict=True)], begin.copy()
 
     def watch(which: Indices, points: Array, turned: Array, lengths: Array) -> NDArray[np.int_]:
-        travelled = np.linalg.norm(points - before[which], axis=1)
-        near = np.linalg.norm(points - begin[which], axis=1) < travelled
+        near = np.linalg.norm(points - begin[which], axis=1) < np.linalg.norm(points - before[which], axis=1)
         closed = near & (np.sum(turned * tangent[which], axis=1) > 0.9)
         before[which] = points
         for k, (way, point, direction) in enumerate(zip(which, points, turned, strict=True)):

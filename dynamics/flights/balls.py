@@ -262,6 +262,5 @@ def _room(scene: Scene, center: Array, reach: float) -> float:
     places, slack = turned_about_z(center, angles), float(np.hypot(*center[:2])) * np.pi / ANGLES
     plate = replace(scene.plate, lowering=None) if scene.plate else None
     still, way = replace(scene, rotor=(), conductors=(), plate=plate), scene.plate.way if scene.plate else 0.0
-    depths = np.linspace(0.0, way, DEPTHS if way else 1)
-    seen = (places[:, None] + depths[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 3)
+    seen = (places[:, None] + np.linspace(0.0, way, DEPTHS if way else 1)[:, None] * [0.0, 0.0, 1.0]).reshape(-1, 3)
     return min(room, float(clearance(still, np.zeros(len(seen)), seen).min()) - slack - way / DEPTHS / 2)

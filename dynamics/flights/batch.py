@@ -336,8 +336,7 @@ def simulate_together(
     passengers, keys = [], [startless_text(scene) for scene in scenes]
     for scene, start, key in zip(scenes, starts, keys, strict=True):
         if key not in known:
-            several = len(set(keys)) > 1
-            known[key] = Flight(scene, table, duration, compact=True, in_balls=True, shared=several)
+            known[key] = Flight(scene, table, duration, compact=True, in_balls=True, shared=len(set(keys)) > 1)
         offset = scene.start.offset if isinstance(scene.start, OffsetStart) else None  # each has its own
         passengers.append(_begun(known[key], start, duration, True, offset))
     _fly(passengers)

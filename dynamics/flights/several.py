@@ -86,8 +86,7 @@ class Neighbours:
             for weight, own, others in pairs:
                 for arm, pole in _along(own, axes):
                     for away, source in _along(others, turn):
-                        way = subtract(add(apart, arm), away)
-                        pull, turning, stored = _on_dipole(weight, pole, source, way)
+                        pull, turning, stored = _on_dipole(weight, pole, source, subtract(add(apart, arm), away))
                         force, torque = add(force, pull), add(torque, turning, cross(arm, pull))
                         energy = energy + stored
         unit = share * share

@@ -283,8 +283,7 @@ class BodyShape:
         else:
             (w, *before), (a, *now) = given[3:7], motion.quaternion
             # twice the vector part of q q0*, which is the small turn from the one to the other
-            turned = zip(now, before, cross(before, now), strict=True)
-            turn = [2.0 * (n * w - a * b + c) for n, b, c in turned]
+            turn = [2.0 * (n * w - a * b + c) for n, b, c in zip(now, before, cross(before, now), strict=True)]
         change = [*subtract(motion.position, given), *turn]
         values = [given[7 + i] + dotted(given[13 + 6 * i : 19 + 6 * i], change) for i in range(6)]
         return Added(values[:3], values[3:])

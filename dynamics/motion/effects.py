@@ -96,8 +96,7 @@ def with_effects(scene: Scene, table: FieldFormula) -> Interaction:
         if scene.floater.round and not scene.floater.mean:
             effects.append(FloaterShape.of(scene.floater, floater_sources(scene.floater), whole.field))
         else:
-            bodies = [magnet.body for magnet in scene.rotor]
-            effects.append(BodyShape.of(scene.floater, whole.field, bodies))
+            effects.append(BodyShape.of(scene.floater, whole.field, [magnet.body for magnet in scene.rotor]))
     if MUTUAL in known and INDUCED_SHAPE not in known and not scene.floater.is_sphere:
         mutual = next((effect for effect in whole.effects if isinstance(effect, Mutual)), None)
         effects.append(InducedShape.of(scene.floater, mutual))
@@ -116,7 +115,6 @@ def mean_over_turns(scene: Scene, table: FieldFormula) -> tuple[Scene, Interacti
     whole, round_scene = with_coils(scene, table), replace(scene, floater=scene.floater.averaged)
     # Beside what its shape decides all effects are those of a round body as well.
     of_shape = FLOATER_SHAPE, INDUCED_SHAPE, FLOATER_CURRENTS, REAL_AIR
-    kept = tuple(e for e in whole.effects if e.name not in of_shape)
-    others = replace(whole, turning=False, effects=kept)
+    others = replace(whole, turning=False, effects=tuple(e for e in whole.effects if e.name not in of_shape))
     rough = FloaterShape.of(round_scene.floater, floater_sources(round_scene.floater), whole.field)
     return round_scene, with_effects(round_scene, others), with_effects(round_scene, others.joined(rough))

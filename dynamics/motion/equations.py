@@ -243,8 +243,7 @@ def equations_of_motion(
     if moving:
         axial, lateral = NOTHING, rotor.gravity
     elif tilted_gravity:
-        across = [hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y], ZERO]
-        lateral = about_z(across, rotor.angle, -1.0)
+        lateral = about_z([hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y], ZERO], rotor.angle, -1.0)
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
     drift = subtract(velocity, turned(position, rotor.rate, rotor.across))
     drift = subtract(drift, rotor.velocity) if moving else drift
@@ -317,12 +316,10 @@ def balances(equations: Equations, still: bool = False) -> tuple[list[hy.express
     rates = hy.subs(list(equations.rates[:12]), dict(zip(NAMES, state, strict=True)))
     force, torque = rates[3:6], rates[9:12]
     values = [*force, *(dot(tangent, torque) for tangent in tangents)]
-    free = [*position, *tilts]
-    slopes = np.asarray(hy.diff_tensors(values, diff_args=free, diff_order=1).jacobian).reshape(5, 5)
+    slopes = np.asarray(hy.diff_tensors(values, diff_args=[*position, *tilts], diff_order=1).jacobian).reshape(5, 5)
     for k in (3, 4):
         slopes[k, k] = slopes[k, k] - dot(moment, torque)  # the tangents turn with the moment
-    untilted = {name: hy.expression(0.0) for name in TILTS}
-    return hy.subs([*values, *slopes.ravel()], untilted), given
+    return hy.subs([*values, *slopes.ravel()], {name: hy.expression(0.0) for name in TILTS}), given
 
 
 def still_balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
@@ -351,5 +348,4 @@ def locked_balances(equations: Equations) -> tuple[list[hy.expression], list[hy.
     rates = hy.subs(list(equations.rates[:13]), state)
     values = [*rates[3:6], *rates[10:13]]
     slopes = hy.diff_tensors(values, diff_args=[*position, *turns], diff_order=1).jacobian
-    unturned = {name: hy.expression(0.0) for name in TURNS}
-    return hy.subs([*values, *np.asarray(slopes).ravel()], unturned), given
+    return hy.subs([*values, *np.asarray(slopes).ravel()], {name: hy.expression(0.0) for name in TURNS}), given

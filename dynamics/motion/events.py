@@ -116,8 +116,7 @@ def _pairs(scene: Scene, time: float, position: Array, orientation: Array) -> li
         turn = scene.angle(time)
         seen = turned_about_z(position, turn)
         seen[2] += scene.plate.depth(time) if scene.plate else 0.0
-        axes = turned_about_z(scene.floater.axes(orientation).T, turn).T
-        floater = scene.floater.placed(seen, axes)
+        floater = scene.floater.placed(seen, turned_about_z(scene.floater.axes(orientation).T, turn).T)
         found += [(body, part) for body in scene.standing_bodies for part in floater]
     return found
 

@@ -129,8 +129,7 @@ class RealAir:
             spin = [s + along * m for s, m in zip(spin, moment, strict=True)]
         # Reynolds number of unit spin or speed, by the sphere of its volume
         unit = length * length / time * (self.size**2 * AIR_DENSITY / AIR_VISCOSITY)
-        fast = hy.relu(spin[2]) + hy.relu(-spin[2])
-        steady = _beyond(STOKES_UP_TO + hy.relu(unit * fast - STOKES_UP_TO)) - 1.0
+        steady = _beyond(STOKES_UP_TO + hy.relu(unit * (hy.relu(spin[2]) + hy.relu(-spin[2])) - STOKES_UP_TO)) - 1.0
         swing = _layered(hy.sqrt(0.5 * unit * motion.turn.pace)) - 1.0
         torque = [-swing * spin[0], -swing * spin[1], -steady * spin[2]]
         tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
@@ -326,8 +325,7 @@ def slow_error(scene: Scene) -> float:
     floater, radius, (times, rates, _) = scene.floater, _as_slow(scene.floater), scene.knots
     delay = skin_number(radius, floater.conductivity or 0.0, 1 / (2 * np.pi)) / ZEROS[0][0] ** 2
     ramp = float(np.abs(np.diff(rates) / np.diff(times)).max(initial=0.0)) * delay**2
-    number = skin_number(radius, floater.conductivity or 0.0, scene.fastest)
-    return min(1.0, (2 * number) ** 2 / 105 + ramp)
+    return min(1.0, (2 * skin_number(radius, floater.conductivity or 0.0, scene.fastest)) ** 2 / 105 + ramp)
 
 
 def too_slow(scene: Scene) -> bool:
@@ -497,8 +495,7 @@ def _changed_field(lag: Vector, field: Vector, moving: Vector, slower: float) ->
     later = hy.sum([c * t**2.0 * (3 + s) * once * once for c, t, s, once in modes])
     sheared = [late * a - turned * b for a, b in zip(moving, field, strict=True)]
     twice = [later * a - lifted * b for a, b in zip(moving, field, strict=True)]
-    following = cross(lag, add(sheared, cross(lag, twice)))
-    return add(moving, following)
+    return add(moving, cross(lag, add(sheared, cross(lag, twice))))
 
 
 def _turned_gradient(lag: Vector, gradient: Matrix, slower: float) -> Matrix:

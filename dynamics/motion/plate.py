@@ -77,8 +77,7 @@ class PlateMemory:
         Those of a rotor of the rate `ENDLESS` are means over a turn alone.
         """
         series = self.share.series.copy()
-        turns = np.arange(1, len(series) // 2 + 1)[:, None]
-        followed = 1 / (1 + 1j * angular_velocity * turns / self.table.rates)
+        followed = 1 / (1 + 1j * angular_velocity * np.arange(1, len(series) // 2 + 1)[:, None] / self.table.rates)
         amplitudes = (series[1::2] - 1j * series[2::2]) * followed[:, :, None]
         series[1::2], series[2::2] = amplitudes.real, -amplitudes.imag
         return replace(self.share, series=series)
@@ -105,8 +104,7 @@ def plate_numbers(memory: PlateMemory, values: Array, driven: bool = False) -> A
     left = memory.left_by_rotor(velocity).series
     strengths = np.einsum("nim,ik->nmk", left[1:] - memory.share.series[1:], _signal_weights(table)).ravel()
     of_states = memory.share.series if driven else left if memory.plate.lowering else np.zeros((0, 0, 0))
-    unit = float(values[Parameter.PLATE_SHARE])
-    by_rotor = unit * np.concatenate([strengths, of_states.swapaxes(1, 2).ravel()])
+    by_rotor = float(values[Parameter.PLATE_SHARE]) * np.concatenate([strengths, of_states.swapaxes(1, 2).ravel()])
     return np.concatenate([-table.rates * float(values[Parameter.TIME]), by_rotor])
 
 
@@ -127,8 +125,7 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     rotor, states = DRIVEN if driven else STEADY, [hy.expression(f"plate_{i}") for i in range(len(table.rates))]
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place = seen_by_plate(plate, position, rotor)
-    pointing = turned_expressions(plate.box.rotation.T, about_z(moment, rotor.angle, 1.0))
-    source = [strength * m for m in pointing]
+    source = [strength * m for m in turned_expressions(plate.box.rotation.T, about_z(moment, rotor.angle, 1.0))]
     # x, y and z enter only after the sums over multipoles: every operation counts in Taylor's method
     flux, slopes = (table.multipoles.derivatives(place, order) for order in (1, 2))
     along = [weighted(column, source) for column in cartesian(1).T]
@@ -198,8 +195,7 @@ def _rotor_terms(
     if driven:
         weights = [[number(n, i) for n in range(len(constant), len(constant) + len(here))] for i in range(len(own))]
         shares = [dotted(row, here) for row in weights]
-        driving = [-hy.par[first + i] * share for i, share in enumerate(shares)]
-        forced = add(forced or [zero] * len(own), driving)
+        forced = add(forced or [zero] * len(own), [-hy.par[first + i] * share for i, share in enumerate(shares)])
         braked = hy.sum([(r - y) * dotted(row, by_angle) for r, y, row in zip(shares, own, weights, strict=True)])
     spent = -dotted(own, forced) if forced else zero
     strengths = [dotted(column, here) for column in zip(*rows, strict=True)] or [zero] * count

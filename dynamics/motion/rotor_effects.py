@@ -244,8 +244,7 @@ def rough_force(
         return np.full(3, np.nan)
     step = STEP * floater.radius
     places = place + step * np.concatenate([np.eye(3), -np.eye(3)])
-    field = table.evaluate(places)[0]
-    energy = -floater.polarizability / 2 * np.sum(field**2, axis=1)
+    energy = -floater.polarizability / 2 * np.sum(table.evaluate(places)[0] ** 2, axis=1)
     for magnet in magnets:
         offset = places - magnet.box.center
         distance = np.linalg.norm(offset, axis=1)
@@ -282,10 +281,8 @@ class RotorCurrents(_Near):
         rates = [*(length * p for p in pairs), *cross(motion.lag, moment)]
         strength = hy.par[Parameter.PLATE_MOMENT] * hy.par[Parameter.PLATE_MOMENT] / hy.par[Parameter.TIME]
         xx, yy, xy, xz, yz, *field = (-strength * s for s in self._response(motion, rates))
-        slopes = [[xx, xy, xz], [xy, yy, yz], [xz, yz, -xx - yy]]
-        force = [length * dotted(moment, row) for row in slopes]
-        torque = [t / hy.par[Parameter.INERTIA] for t in cross(moment, field)]
-        return dissipative(force, torque, motion)
+        force = [length * dotted(moment, row) for row in [[xx, xy, xz], [xy, yy, yz], [xz, yz, -xx - yy]]]
+        return dissipative(force, [t / hy.par[Parameter.INERTIA] for t in cross(moment, field)], motion)
 
     def _response(self, motion: Motion, rates: Vector) -> Vector:
         metres = [hy.par[Parameter.LENGTH] * x for x in motion.position]

@@ -254,8 +254,7 @@ class Scales:
 
     def off_unit(self, scaled: Array) -> float:
         """By how much moments or quaternions of states (n, 12 or more) are not of unit length, at most."""
-        turn = scaled[:, 6 : 10 if self.size == 13 else 9]
-        return float(np.abs(np.linalg.norm(turn, axis=1) - 1).max())
+        return float(np.abs(np.linalg.norm(scaled[:, 6 : 10 if self.size == 13 else 9], axis=1) - 1).max())
 
     def pack(self, state: State) -> Array:
         """Scaled state (..., 12): position, velocity, moment, spin; or (..., 13 or 15) with another turn and spin."""
@@ -319,8 +318,7 @@ def matrices_of(quaternions: Array) -> Array:
 def rotation_slopes(quaternions: Array) -> Array:
     """(..., 4, 3, 3) derivatives of `matrices_of` by quaternions (..., 4)."""
     # of second degree in them, so that a difference is the derivative
-    ends = [matrices_of(quaternions + e) - matrices_of(quaternions - e) for e in np.eye(4)]
-    return np.stack(ends, axis=-3) / 2
+    return np.stack([matrices_of(quaternions + e) - matrices_of(quaternions - e) for e in np.eye(4)], axis=-3) / 2
 
 
 def quaternions_of(matrices: Array) -> Array:

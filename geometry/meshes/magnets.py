@@ -226,8 +226,7 @@ def _edge_directions(point: Array, bodies: Sequence[Solid], unit: float) -> list
             if excess.max() < TINY * unit and flush.sum() >= 2:
                 found += [body.rotation[:, axis] for axis in range(3) if np.delete(flush, axis).all()]
         elif isinstance(body, Cylinder) and body.edge_distance((point * unit)[None])[0] < TINY * unit:
-            across = np.array([-local[1], local[0], 0.0])
-            found.append(np.asarray(body.rotation @ across / np.hypot(*local[:2])))
+            found.append(np.asarray(body.rotation @ np.array([-local[1], local[0], 0.0]) / np.hypot(*local[:2])))
     return found
 
 

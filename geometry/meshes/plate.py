@@ -104,8 +104,7 @@ def hex_mesh(lines: Sequence[Array], blocks: Sequence[Block], mirrors: tuple[int
         inside = np.all((centers > block.lower) & (centers < block.upper), axis=-1)
         number_of[inside] = materials.index(block.material) + 1
     for cell, number in np.ndenumerate(number_of):
-        corners = [points[tuple(np.add(cell, corner))] for corner in HEXAHEDRON]
-        mesh.Add(netgen.Element3D(int(number), corners))
+        mesh.Add(netgen.Element3D(int(number), [points[tuple(np.add(cell, corner))] for corner in HEXAHEDRON]))
     for axis, end in itertools.product(range(3), (0, -1)):
         number = axis + 1 if end == 0 and axis in mirrors else 4
         layer = np.take(points, end, axis=axis)

@@ -52,8 +52,7 @@ def occ_solid(body: Solid, center: Array, unit: float) -> Any:
     foot = (body.center - center - body.half_edges[2] * z) / unit
     if isinstance(body, Box):
         half = body.half_edges / unit
-        corner = foot - body.rotation[:, :2] @ half[:2]
-        axes = occ.Axes(tuple(map(float, corner)), n=_vector(z), h=_vector(x))
+        axes = occ.Axes(tuple(map(float, foot - body.rotation[:, :2] @ half[:2])), n=_vector(z), h=_vector(x))
         return occ.WorkPlane(axes).Rectangle(2 * half[0], 2 * half[1]).Face().Extrude(float(2 * half[2]))
     axes = occ.Axes(tuple(map(float, foot)), n=_vector(z), h=_vector(x))
     filled = occ.Cylinder(axes, body.radius / unit, body.height / unit)

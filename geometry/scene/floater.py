@@ -227,8 +227,7 @@ class Floater:
         """A sphere of its magnets' volume, remanence and permeability: itself where it is one."""
         if self.is_sphere:
             return self
-        volume = sum(magnet.body.volume for magnet in self.magnets)
-        radius = float(np.cbrt(0.75 / np.pi * volume))
+        radius = float(np.cbrt(0.75 / np.pi * sum(magnet.body.volume for magnet in self.magnets)))
         return Floater(radius, self.remanence, self.recoil_permeability, self.density)
 
     def axes(self, orientation: Array, near: Array | None = None) -> Array:
