@@ -1,7 +1,7 @@
 """A solid of any shape, as a STEP file has it: known here by its surface in triangles; and what all solids have."""
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import permutations
@@ -307,47 +307,45 @@ def known_shape(part: Part) -> Solid | None:
 
 def _candidates(part: Part) -> Iterator[Solid]:
     """Shapes of about the part's sizes about its centroid, along its body axes."""
-    corners = part.triangles.reshape(-1, 3) - part.centroid
+    corners, normals = part.triangles.reshape(-1, 3) - part.centroid, list[Array]()
     yield Sphere(float(np.cbrt(part.volume * 0.75 / np.pi)), part.centroid)
-    normals = _directions(part.face_normals)
+    for normal in part.face_normals:  # opposite ones are the same direction
+        if all(np.linalg.norm(np.cross(normal, other)) > ALONG for other in normals):
+            normals.append(normal)
     for axis in normals[:KNOWN_FACES]:
         along = corners @ axis
         height = float(np.ptp(along))
         radius = float(np.linalg.norm(corners - np.outer(along, axis), axis=1).max())
-        frame = _frame([axis])
+        frame = _tidy(frame_about(axis * np.sign(axis[np.argmax(np.abs(axis))])))
         yield Cylinder(radius, height, part.centroid, frame)
         hole = radius**2 - part.volume / (np.pi * height)
         if hole > 0:
             yield ring(radius, float(np.sqrt(hole)), height, part.centroid, frame)
     if len(normals) == 3:
-        frame = _frame(normals)
+        first, second, _ = nearest_axes(np.stack(normals, axis=1)).T
+        second = second - (second @ first) * first
+        second /= np.linalg.norm(second)
+        frame = _tidy(np.stack([first, second, np.cross(first, second)], axis=1))
         yield Box(np.ptp(corners @ frame, axis=0), part.centroid, frame)
-
-
-def _directions(normals: Iterable[Array]) -> list[Array]:
-    found = list[Array]()
-    for normal in normals:
-        if all(np.linalg.norm(np.cross(normal, other)) > ALONG for other in found):
-            found.append(normal)
-    return found
-
-
-def _frame(directions: Sequence[Array]) -> Array:
-    """(3, 3) right-handed axes from three normals, or with one direction the third; turned as little as they can be."""
-    if len(directions) == 1:
-        axis = directions[0] * np.sign(directions[0][np.argmax(np.abs(directions[0]))])
-        across = np.eye(3)[int(np.argmin(np.abs(np.round(axis, 6))))]
-        first = across - (across @ axis) * axis
-        first /= np.linalg.norm(first)
-        return _tidy(np.stack([first, np.cross(axis, first), axis], axis=1))
-    best = max(permutations(directions), key=lambda order: sum(abs(order[k][k]) for k in range(3)))
-    columns = [direction * (1.0 if direction[k] >= 0 else -1.0) for k, direction in enumerate(best)]
-    first, second = columns[0], columns[1] - (columns[1] @ columns[0]) * columns[0]
-    second /= np.linalg.norm(second)
-    return _tidy(np.stack([first, second, np.cross(first, second)], axis=1))
 
 
 def _tidy(frame: Array) -> Array:
     """Axes without the round-off of the file where they are those of the file."""
     straight = np.round(frame) + 0.0
     return straight if np.abs(frame - straight).max() < STRAIGHT else frame
+
+
+def nearest_axes(columns: Array) -> Array:
+    """Directions, columns of (3, 3), in the order and with the signs in which they are nearest to the frame's axes."""
+    # those in a tie, as at 45°, are in their own order
+    columns = columns[:, max(permutations(range(3)), key=lambda order: round(sum(np.abs(columns[range(3), order])), 9))]
+    columns = columns * np.where(np.diag(columns) < 0, -1.0, 1.0)
+    return np.asarray(columns if np.linalg.det(columns) > 0 else columns * [1.0, 1.0, -1.0])
+
+
+def frame_about(axis: Array) -> Array:
+    """(3, 3) right-handed axes as columns, the third along a unit vector (3,), turned about it as little as can be."""
+    across = np.eye(3)[int(np.argmin(np.abs(axis)))] if abs(axis[0]) > 0.99 else np.eye(3)[0]
+    first = across - (across @ axis) * axis / (axis @ axis)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first), axis], axis=1)

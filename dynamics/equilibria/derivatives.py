@@ -24,7 +24,6 @@ from ...geometry.common import Array
 from ..motion.plate import PlateForce
 from ..motion.rates import Rates
 from ..motion.state import Parameter, Scales, State
-from .balance import CONVERGED_STEP, EVERY, Balance, solve
 from .equilibrium import Equilibrium, Mode
 from .orbits import CONVERGED, ROUNDED, SHAKING, OrbitProblem, Pencil, conserved, one_sided
 
@@ -257,15 +256,8 @@ class Implicit:
         return replace(found, modes=tuple(modes), growth_per_s=growth)
 
     def _solved(self, setting: Setting, states: Array) -> Array | None:
-        """States (n, m) near others that are in balance; a fixed point is sought in its five unknowns alone."""
-        spin, size = self.known.spin, np.inf
-        if self.known.turn is None and setting.plate is None and not setting.rates.turning:
-            values = setting.values.copy()
-            values[SHAKING] = 0.0
-            balance = Balance(setting.rates, values, spin * setting.scales.spin_ratio)
-            position, moment, left = solve(balance, states[:, :3], states[:, 6:9], EVERY, NEWTON_STEPS)
-            far = np.abs(position - states[:, :3]).max()
-            return balance.states(position, moment) if left[0] < CONVERGED_STEP and far < FARTHEST else None
+        """States (n, m) near others that are in balance."""
+        size = np.inf
         for _ in range(NEWTON_STEPS):
             residual, pencil, rows, aims = self._linear(setting, setting.scales.unpack(states))
             step = np.linalg.lstsq(np.vstack([pencil.matrix(0.0), rows]), -np.append(residual, aims))[0]

@@ -28,7 +28,7 @@ from ..motion.effect import Stateful
 from ..motion.effects import with_effects
 from ..motion.equations import Equations, equations_of_motion, parameters
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory, plate_numbers
-from ..motion.state import DRIVEN, SAME, STEADY, Given, Parameter, Scales, State
+from ..motion.state import DRIVEN, SAME, STEADY, Given, Parameter, Scales, State, moved
 from .balls import DEGREE, Balls, in_ball, is_long
 from .trajectory import (
     DURATION,
@@ -173,20 +173,18 @@ class Flight:
         """Equations of motion and terminal events; a ball is free of bodies and ends before the floater is lost."""
         ball = BallField(DEGREE + 1, abs(degree), degree < 0)
         whole = in_ball(self.whole, ball) if degree else self.whole
-        driven, moving = bool(self.scene.drive), self.scene.moving
+        rotor = moved() if self.scene.moving else DRIVEN if self.scene.drive else STEADY
         given = Given(self.values if whole.turning and not self._shared else None)
-        equations = equations_of_motion(
-            whole, self.tilted, self.memory, self.first, driven, moving, given, self.scales.frame
-        )
-        position, turn = equations.variables[:3], DRIVEN if driven else STEADY
+        equations = equations_of_motion(whole, self.tilted, self.memory, self.first, rotor, given, self.scales.frame)
+        position = equations.variables[:3]
         if degree:
             away = ball.offset([given[Parameter.LENGTH] * x for x in position])  # as the field has it
             ends = [(1.0 - hy.sum([a * a for a in away]), LEFT)]
             if whole.turning:
                 ends.append((SIZE + equations.variables[6], LEFT))  # no number may be one; a part of a unit vector
         else:
-            ends = events.flight_events(self.scene, position, turn)
-        return equations, ends if self.memory is None else [*ends, *events.range_events(self.memory, position, turn)]
+            ends = events.flight_events(self.scene, position, rotor)
+        return equations, ends if self.memory is None else [*ends, *events.range_events(self.memory, position, rotor)]
 
     def jacobi(self, values: Array, times: Array, states: Array) -> Array:
         """Terms (k, n) of the Jacobi integral at scaled times (n,) and states (n, s), with the plate where it is then.

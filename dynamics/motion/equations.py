@@ -45,22 +45,20 @@ from ...geometry.scene.contents import Scene
 from .effect import NOTHING, PARAMETERS, ZERO, Motion, interaction_of
 from .plate import PlateMemory, memory_terms
 from .state import (
-    DRIVEN,
     HALF,
     STEADY,
     Given,
     Parameter,
     Scales,
+    Turn,
     Vector,
     about_z,
     add,
     cross,
     dot,
     left_product,
-    moved,
     rotation_of,
     subtract,
-    turned,
 )
 
 Matrix = list[list[hy.expression]]
@@ -85,83 +83,61 @@ class Attitude:
     quaternion: Vector | None = None  # (4,) of these axes
 
 
-def round_attitude(moment: Vector, spin: Vector, rate: hy.expression, across: Vector = ()) -> Attitude:
-    """That of a body that is round about its `moment` (3,), with the integrated `spin` (3,), in a frame of a `rate`.
-
-    See `turned` for a rate `across` its axis.
-    """
-    lag = lag_of(spin, rate, across)
-    tilt, along = hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
+def round_attitude(moment: Vector, spin: Vector, rotor: Turn) -> Attitude:
+    """That of a body that is round about its `moment` (3,), with the integrated `spin` (3,), seen from a `rotor`."""
+    lag, tilt, along = rotor.lag(spin), hy.par[Parameter.TILT_DRAG], hy.par[Parameter.SPIN_DRAG]
     excess = (tilt - along) * dot(spin, moment)
-    brake = [excess * moment[i] - tilt * spin[i] for i in range(3)]
+    brake = [excess * m - tilt * s for m, s in zip(moment, spin, strict=True)]
 
     def rates(torque: Vector) -> list[hy.expression]:
-        return [*cross(lag, moment), *subtract([torque[i] + brake[i] for i in range(3)], turned(spin, rate, across))]
+        return [*cross(lag, moment), *subtract(add(torque, brake), rotor.swept(spin))]
 
     return Attitude(moment, spin, 0.5 * dot(spin, spin), spin, dot(brake, lag), rates)
 
 
-def lag_of(spin: Vector, rate: hy.expression, across: Vector = ()) -> list[hy.expression]:
-    """A spin (3,) as seen from a frame of a `rate` about z and one `across` it."""
-    x, y = [s - a for s, a in zip(spin[:2], across, strict=True)] if across else spin[:2]
-    return [x, y, spin[2] - rate]
+def turning_attitude(quaternion: Vector, spin: Vector, rotor: Turn, given: Given) -> Attitude:
+    """That of any body, from its `quaternion` (4,) and its `spin` (3,) along its own axes, seen from a `rotor`.
 
-
-def turning_attitude(quaternion: Vector, spin: Vector, rate: hy.expression, across: Vector, given: Given) -> Attitude:
-    """That of any body, from its `quaternion` (4,) and its `spin` (3,) along its own axes, in a frame of a `rate`.
-
-    See `turned` for a rate `across` its axis. `given` are the runtime parameters.
+    `given` are the runtime parameters.
     """
-    w, x, y, z = quaternion
+    w, *vector = quaternion
     axes = rotation_of(quaternion)
     ratios = [given[p] for p in (Parameter.INERTIA_X, Parameter.INERTIA_Y, Parameter.INERTIA_Z)]
     pointing = [given[p] for p in (Parameter.POINTING_X, Parameter.POINTING_Y, Parameter.POINTING_Z)]
     turning = [a * s for a, s in zip(ratios, spin, strict=True)]  # angular momentum
-    lag = [s - rate * a for s, a in zip(spin, axes[2], strict=True)]
-    if across:
-        lag = [s - across[0] * a - across[1] * b for s, a, b in zip(lag, axes[0], axes[1], strict=True)]
-    brake = [-given[Parameter.TILT_DRAG] * s for s in spin]
+    lag = [s - rotor.rate * a for s, a in zip(spin, axes[2], strict=True)]
+    for rate, row in zip(rotor.across, axes, strict=False):
+        lag = [s - rate * a for s, a in zip(lag, row, strict=True)]
+    brake, half = [-given[Parameter.TILT_DRAG] * s for s in spin], [0.5 * s for s in lag]
 
     def rates(torque: Vector) -> list[hy.expression]:
-        own = [dot(torque, [axes[i][k] for i in range(3)]) + brake[k] for k in range(3)]
+        own = add([dot(torque, column) for column in zip(*axes, strict=True)], brake)
         stiff = [(ratios[1] - ratios[2]), (ratios[2] - ratios[0]), (ratios[0] - ratios[1])]
         across = [spin[1] * spin[2], spin[2] * spin[0], spin[0] * spin[1]]
-        half = [0.5 * s for s in lag]
         return [
-            -dot([x, y, z], half),
-            w * half[0] + y * half[2] - z * half[1],
-            w * half[1] + z * half[0] - x * half[2],
-            w * half[2] + x * half[1] - y * half[0],
+            -dot(vector, half),
+            *(w * h + c for h, c in zip(half, cross(vector, half), strict=True)),
             *((t + s * c) / a for t, s, c, a in zip(own, stiff, across, ratios, strict=True)),
         ]
 
-    return Attitude(
-        moment=[dot(row, pointing) for row in axes],
-        spin=[dot(row, spin) for row in axes],
-        energy=0.5 * dot(spin, turning),
-        momentum=[dot(row, turning) for row in axes],
-        braking=dot(brake, lag),
-        rates=rates,
-        axes=axes,
-        quaternion=quaternion,
-    )
+    moment, outer, momentum = ([dot(row, own) for row in axes] for own in (pointing, spin, turning))
+    energy, braking = 0.5 * dot(spin, turning), dot(brake, lag)
+    return Attitude(moment, outer, energy, momentum, braking, rates, axes, quaternion)
 
 
-def even_attitude(
-    turn: Vector, halved: Vector, rate: hy.expression, across: Vector, given: Given, frame: Array
-) -> Attitude:
+def even_attitude(turn: Vector, halved: Vector, rotor: Turn, given: Given, frame: Array) -> Attitude:
     """That of a body of equal moments of inertia, from its moment and half a direction across it, `turn` (6,).
 
-    Its spin is `halved` (3,), too; see `Scales` for both and for `frame`, and `turned` for a rate `across` the axis.
-    `given` are the runtime parameters.
+    Its spin is `halved` (3,), too, see `Scales` for both and for `frame`; seen from a `rotor`. `given` are the runtime
+    parameters.
     """
     moment, half, spin = turn[:3], turn[3:], [s / HALF for s in halved]
-    side, lag = [s / HALF for s in half], lag_of(spin, rate, across)
+    side, lag = [s / HALF for s in half], rotor.lag(spin)
     brake = [-given[Parameter.TILT_DRAG] * s for s in spin]
 
     def rates(torque: Vector) -> list[hy.expression]:
         own = [HALF * t for t in add(torque, brake)]
-        return [*cross(lag, moment), *cross(lag, half), *subtract(own, turned(halved, rate, across))]
+        return [*cross(lag, moment), *cross(lag, half), *subtract(own, rotor.swept(halved))]
 
     columns = [side, cross(moment, side), moment]
     axes = [[dot(row, column) for row in frame.tolist()] for column in zip(*columns, strict=True)]
@@ -210,8 +186,7 @@ def equations_of_motion(
     tilted_gravity: bool = False,
     memory: PlateMemory | None = None,
     first: int = len(Parameter),
-    driven: bool = False,
-    moving: bool = False,
+    rotor: Turn = STEADY,
     given: Given = PARAMETERS,
     frame: Array | None = None,
 ) -> Equations:
@@ -219,20 +194,20 @@ def equations_of_motion(
 
     The `table` is the rotor's field, with effects if it is an `Interaction`. `tilted_gravity`: gravity has a part
     across the axis; it turns in this frame, so that time enters. `memory` is of the plate's currents, if they are
-    modelled, and `first` the number of the first of their runtime parameters, which are `given`. The rotor's rate
-    changes in time if it is `driven`, and it is moved, too, if it is `moving`. `frame` is that of `Scales`.
+    modelled, and `first` the number of the first of their runtime parameters, which are `given`. The `rotor` is
+    `STEADY`, `DRIVEN` or `moved`. `frame` is that of `Scales`.
     """
-    whole, steady = interaction_of(table), replace(STEADY, rate=given[Parameter.RATE])
-    rotor = moved() if moving else DRIVEN if driven else steady
+    whole, about, driven, moving = interaction_of(table), rotor, rotor is not STEADY, bool(rotor.velocity)
+    rotor = rotor if driven else replace(STEADY, rate=given[Parameter.RATE])
     names = EVEN_NAMES if frame is not None else TURNING_NAMES if whole.turning else ROUND_NAMES
     variables = list(hy.make_vars(*CENTRE, *names))
     position, velocity, turn_states, spin_states = variables[:3], variables[3:6], variables[6:-3], variables[-3:]
     if frame is not None:
-        attitude = even_attitude(turn_states, spin_states, rotor.rate, rotor.across, given, frame)
+        attitude = even_attitude(turn_states, spin_states, rotor, given, frame)
     elif whole.turning:
-        attitude = turning_attitude(turn_states, spin_states, rotor.rate, rotor.across, given)
+        attitude = turning_attitude(turn_states, spin_states, rotor, given)
     else:
-        attitude = round_attitude(turn_states, spin_states, rotor.rate, rotor.across)
+        attitude = round_attitude(turn_states, spin_states, rotor)
     moment, spin = attitude.moment, attitude.spin
     length, torque, inertia, linear = (
         given[p] for p in (Parameter.LENGTH, Parameter.TORQUE, Parameter.INERTIA, Parameter.LINEAR_DRAG)
@@ -245,9 +220,9 @@ def equations_of_motion(
     elif tilted_gravity:
         lateral = about_z([hy.par[Parameter.GRAVITY_X], hy.par[Parameter.GRAVITY_Y], ZERO], rotor.angle, -1.0)
     push = [lateral[i] - linear * velocity[i] for i in range(3)]
-    drift = subtract(velocity, turned(position, rotor.rate, rotor.across))
+    drift = subtract(velocity, rotor.swept(position))
     drift = subtract(drift, rotor.velocity) if moving else drift
-    lag = lag_of(spin, rotor.rate, rotor.across)
+    lag = rotor.lag(spin)
     momenta = [a + inertia * b for a, b in zip(cross(position, velocity), attitude.momentum, strict=True)]
     jacobi = [
         0.5 * dot(velocity, velocity),
@@ -262,7 +237,7 @@ def equations_of_motion(
     )
     parts = [effect.added(motion) for effect in whole.effects]
     if memory is not None:
-        parts.append(memory_terms(memory, first, position, moment, driven))
+        parts.append(memory_terms(memory, first, position, moment, about))
     states = [state for added in parts for state in added.states]
     state_rates = [rate for added in parts for rate in added.rates]
     if more := sum(added.more for added in parts):
@@ -290,7 +265,7 @@ def equations_of_motion(
                 drive = drive + added.motor - cross(position, added.force)[2] - inertia * added.torque[2]
         states = [*states, *hy.make_vars("motor_momentum", "motor_work")]
         state_rates = [*state_rates, drive, rotor.rate * drive]
-    acceleration = subtract(add(force, axial, push), turned(velocity, rotor.rate, rotor.across))
+    acceleration = subtract(add(force, axial, push), rotor.swept(velocity))
     rates = [*drift, *acceleration, *attitude.rates(turn), *state_rates]
     return Equations([*variables, *states], rates, jacobi, power)
 

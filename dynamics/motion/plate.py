@@ -35,7 +35,6 @@ from ...geometry.common import Array
 from ...geometry.scene.contents import Plate
 from .effect import Added
 from .state import (
-    DRIVEN,
     OF_BODY,
     STEADY,
     Parameter,
@@ -48,7 +47,6 @@ from .state import (
     dotted,
     matrices_of,
     rotation_slopes,
-    turned,
     turned_about_z,
 )
 
@@ -113,16 +111,16 @@ def _signal_weights(table: PlateTable) -> Array:
     return table.weights * table.multipoles.factors(1)
 
 
-def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vector, driven: bool = False) -> Added:
+def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vector, rotor: Turn) -> Added:
     """The plate's part of the equations of motion; its states are p - q.
 
     Its energy is that of the floater's currents, and of the floater in the field of the rotor's; power is what both
     gain from heat, from what turns the rotor and from what lowers the plate. The numbers of `memory` are the runtime
-    parameters from number `first` on; `position` and `moment` are the floater's, scaled; the rotor's rate changes in
-    time if it is `driven`.
+    parameters from number `first` on; `position` and `moment` are the floater's, scaled; the `rotor` is `STEADY` or
+    `DRIVEN`.
     """
     plate, table = memory.plate, memory.table
-    rotor, states = DRIVEN if driven else STEADY, [hy.expression(f"plate_{i}") for i in range(len(table.rates))]
+    states = [hy.expression(f"plate_{i}") for i in range(len(table.rates))]
     strength, length = hy.par[Parameter.PLATE_MOMENT], hy.par[Parameter.LENGTH]
     place = seen_by_plate(plate, position, rotor)
     source = [strength * m for m in turned_expressions(plate.box.rotation.T, about_z(moment, rotor.angle, 1.0))]
@@ -133,7 +131,7 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     weights = _signal_weights(table)
     own = [p - weighted(row, signals) for p, row in zip(states, weights, strict=True)]
     decay = [hy.par[first + i] * y for i, y in enumerate(own)]
-    by_rotor, forced, stored, spent, braked = _rotor_terms(memory, first, signals, own, driven)
+    by_rotor, forced, stored, spent, braked = _rotor_terms(memory, first, signals, own, rotor)
     # of all states together, so that the fields of 20 to 40 multipoles are summed instead of those of 40 to 90 states
     strengths = [weighted(column, own) + r for column, r in zip(weights.T, by_rotor, strict=True)]
     steeper = table.multipoles.factors(2) / table.multipoles.factors(1) / table.multipoles.scale
@@ -147,7 +145,7 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
     force = [length * f for f in _seen_by_rotor(plate, push, rotor)]
     turn = [strength * t for t in cross(moment, _seen_by_rotor(plate, field, rotor))]
     speed = hy.par[Parameter.PLATE_SPEED] if plate.lowering else hy.expression(0.0)
-    drive = dot(force, [*turned(position, rotor.rate)[:2], speed]) + rotor.rate * turn[2]
+    drive = dot(force, [*rotor.swept(position)[:2], speed]) + rotor.rate * turn[2]
     return Added(
         force=force,
         torque=[t / hy.par[Parameter.INERTIA] for t in turn],
@@ -160,7 +158,7 @@ def memory_terms(memory: PlateMemory, first: int, position: Vector, moment: Vect
 
 
 def _rotor_terms(
-    memory: PlateMemory, first: int, signals: Vector, own: Vector, driven: bool
+    memory: PlateMemory, first: int, signals: Vector, own: Vector, rotor: Turn
 ) -> tuple[Vector, Vector, hy.expression, hy.expression, hy.expression]:
     """The part of the rotor's currents, from the floater's signals in each multipole and y_f of each state.
 
@@ -169,7 +167,7 @@ def _rotor_terms(
     with a drive, the torque by which the plate brakes the rotor.
     """
     angle, depth = names = hy.make_vars("rotor_angle", "plate_depth")
-    rotor = DRIVEN if driven else STEADY
+    driven = rotor is not STEADY
     speed = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_SPEED]
     below = hy.par[Parameter.LENGTH] * hy.par[Parameter.PLATE_DEPTH] + speed * hy.time
     now = {"rotor_angle": rotor.angle, "plate_depth": below}

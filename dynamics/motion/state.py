@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...geometry.common import Array
 from ...geometry.scene.contents import Scene
-from ...geometry.scene.floater import frame_about
+from ...geometry.solids import frame_about
 
 Vector = Sequence[hy.expression]
 
@@ -78,6 +78,16 @@ class Turn:
     velocity: Vector = ()
     gravity: Vector = ()
 
+    def swept(self, vector: Vector) -> list[hy.expression]:
+        """W × vector: what the frame's rotation adds to the rate of a vector fixed in the laboratory."""
+        about_z = [-(self.rate * vector[1]), self.rate * vector[0], hy.expression(0.0)]
+        return add(about_z, cross([*self.across, hy.expression(0.0)], vector)) if self.across else about_z
+
+    def lag(self, spin: Vector) -> list[hy.expression]:
+        """A spin (3,) as seen from the frame, Ω - W."""
+        x, y = [s - a for s, a in zip(spin[:2], self.across, strict=True)] if self.across else spin[:2]
+        return [x, y, spin[2] - self.rate]
+
 
 RATE, ACCELERATION = hy.par[Parameter.RATE], hy.par[Parameter.ACCELERATION]
 NOW = RATE + ACCELERATION * hy.time
@@ -121,17 +131,6 @@ def dot(a: Vector, b: Vector) -> hy.expression:
 def cross(a: Vector, b: Vector) -> list[hy.expression]:
     """Vector product of the first three components."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def turned(vector: Vector, rate: hy.expression, across: Vector = ()) -> list[hy.expression]:
-    """W × vector: what the frame's rotation adds to the rate of a vector fixed in the laboratory.
-
-    W is a `rate` about z, with a part `across` it (2), if there is one.
-    """
-    about_z = [-(rate * vector[1]), rate * vector[0], hy.expression(0.0)]
-    if not across:
-        return about_z
-    return add(about_z, cross([*across, hy.expression(0.0)], vector))
 
 
 def about_z(vector: Vector, angle: hy.expression, sense: float) -> list[hy.expression]:

@@ -318,13 +318,11 @@ def mirror_images(magnets: Sequence[Magnet], axis: int) -> list[int] | None:
     images, flip = [], mirror(axis)
     for magnet in magnets:
         seen = magnet.permeability_in_rotor * flip[:, None] * flip
-        for k, other in enumerate(magnets):
-            alike = np.allclose(seen, other.permeability_in_rotor, rtol=0, atol=1e-12)
-            if alike and _same_body(magnet.body, other.body, flip):
-                images.append(k)
-                break
-        else:
+        alike = (np.allclose(seen, other.permeability_in_rotor, rtol=0, atol=1e-12) for other in magnets)
+        same = (k for k, like in enumerate(alike) if like and _same_body(magnet.body, magnets[k].body, flip))
+        if (image := next(same, None)) is None:
             return None
+        images.append(image)
     return images
 
 
@@ -341,8 +339,9 @@ def parity_parts(
     Of `polarizations` (..., n, 3) T, one or several sets, by default those of the `magnets`: pairs of the signs, one a
     plane, and the polarisations (..., n, 3), T. The potential has the same signs.
     """
-    own = np.array([magnet.polarization_in_rotor for magnet in magnets])
-    whole = own if polarizations is None else polarizations
+    whole = polarizations
+    if whole is None:
+        whole = np.array([magnet.polarization_in_rotor for magnet in magnets])
     images = {axis: mirror_images(magnets, axis) for axis in planes}
     parts = []
     for signs in product((1, -1), repeat=len(planes)):

@@ -7,7 +7,6 @@ Of a body that is round about its moment the moment is along z; a cuboid's axes 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import permutations
 from typing import Self
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from ..common import Array, InputError, even_directions, frozen_array
 from ..magnets import Magnet, polarizability
 from ..shapes import Box, Cylinder, Sphere, rotation_matrix, unturned
-from ..solids import Part, Solid, moved, with_frame
+from ..solids import Part, Solid, frame_about, moved, nearest_axes, with_frame
 from ..step_file import second_moments_of_part
 
 ROUND = 1e-9  # of sizes, moments of inertia and directions: what deviates less is round-off of a file
@@ -294,13 +293,7 @@ def _inertia(parts: Sequence[FloaterPart], center: Array) -> Array:
 def _principal_axes(tensor: Array) -> Array:
     """(3, 3) principal axes as columns, as near to those of the tensor as they can be: these where they are some."""
     off = np.abs(tensor - np.diag(np.diag(tensor))).max()
-    if off <= ROUND * np.trace(tensor):
-        return np.eye(3)
-    columns = np.linalg.eigh(tensor)[1]
-    # directions in a tie, as at 45°, are in the order of their moments
-    columns = columns[:, max(permutations(range(3)), key=lambda order: round(sum(np.abs(columns[range(3), order])), 9))]
-    columns = columns * np.where(np.diag(columns) < 0, -1.0, 1.0)
-    return np.asarray(columns if np.linalg.det(columns) > 0 else columns * [1.0, 1.0, -1.0])
+    return np.eye(3) if off <= ROUND * np.trace(tensor) else nearest_axes(np.linalg.eigh(tensor)[1])
 
 
 def _round_about(parts: Sequence[FloaterPart], center: Array, axis: Array) -> bool:
@@ -314,11 +307,3 @@ def _round_about(parts: Sequence[FloaterPart], center: Array, axis: Array) -> bo
         if not turns or off or across:
             return False
     return True
-
-
-def frame_about(axis: Array) -> Array:
-    """(3, 3) right-handed axes as columns, the third along a unit vector (3,), turned about it as little as can be."""
-    across = np.eye(3)[int(np.argmin(np.abs(axis)))] if abs(axis[0]) > 0.99 else np.eye(3)[0]
-    first = across - (across @ axis) * axis / (axis @ axis)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first), axis], axis=1)

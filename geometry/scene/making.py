@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..common import InputError, shown, spelled
+from ..common import InputError, P, shown, spelled
 from ..files import regular_file
 from ..step_file import read_part
 from .contents import Scene
@@ -147,11 +147,22 @@ def _with_paths(keys: Any, folder: Path, known: Scene | None, found: dict[str, l
 Table = Mapping[str, Any]  # A table of the scene file
 
 
+def _table(name: str) -> Callable[[Callable[P, Table]], Callable[P, Table]]:
+    """Decorator of what makes a table: slips in arguments are named, and the docstring says what is returned."""
+
+    def documented(function: Callable[P, Table]) -> Callable[P, Table]:
+        found, returned = spelled(function), f"dict\n        The table `[{name}]` of a scene file.\n    "
+        found.__doc__ = f"{function.__doc__}\n    Returns\n    -------\n    {returned}"
+        return found
+
+    return documented
+
+
 def _rotor(configuration: str, edge_mm: float | None, **keys: Any) -> Table:
     return {"configuration": configuration, **keys} | ({} if edge_mm is None else {"edge_mm": edge_mm})
 
 
-@spelled
+@_table("rotor")
 def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """One cube magnetised along +x and displaced along it from the axis.
 
@@ -163,16 +174,11 @@ def horizontal(*, displacement_mm: float, remanence_T: float, edge_mm: float | N
         Edge of the cubes, mm; left out where `shape` is "sphere" (with diameter_mm) or "cylinder" (and height_mm).
     **more : float or list
         Further keys, as for `magnets`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
     return _rotor("horizontal", edge_mm, displacement_mm=displacement_mm, remanence_T=remanence_T, **more)
 
 
-@spelled
+@_table("rotor")
 def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """A cube magnetised along +x and one above it along +z.
 
@@ -182,16 +188,11 @@ def vertical(*, displacement_mm: float, remanence_T: float, edge_mm: float | Non
         From centre to centre, mm.
     remanence_T, edge_mm, **more : float or list
         As for `horizontal`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
     return _rotor("vertical", edge_mm, displacement_mm=displacement_mm, remanence_T=remanence_T, **more)
 
 
-@spelled
+@_table("rotor")
 def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, **more: Any) -> Table:
     """One cube, turned with its magnetisation about y.
 
@@ -201,15 +202,11 @@ def tilt(*, angle_deg: float, remanence_T: float, edge_mm: float | None = None, 
         The magnetisation is along (cos angle, 0, sin angle), degrees.
     remanence_T, edge_mm, **more : float or list
         As for `horizontal`.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
     return _rotor("tilt", edge_mm, angle_deg=angle_deg, remanence_T=remanence_T, **more)
 
 
+@_table("rotor")
 def magnets(*bodies: Table, **more: Any) -> Table:
     """Any set of magnets.
 
@@ -225,16 +222,11 @@ def magnets(*bodies: Table, **more: Any) -> Table:
         currents, else left out), coercivity_kA_m (the knee of their demagnetisation curves), field_map, and
         conductors, a list of tables with shape ("cuboid" or "cylinder"), size_mm or diameter_mm and height_mm,
         center_mm, rotation_deg and conductivity_S_m: metal that turns with the rotor.
-
-    Returns
-    -------
-    dict
-        The table `[rotor]` of a scene file.
     """
     return {"magnets": list(bodies), **more}
 
 
-@spelled
+@_table("floater")
 def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **more: Any) -> Table:
     """The floating sphere.
 
@@ -244,16 +236,11 @@ def sphere(*, diameter_mm: float, remanence_T: float, density_kg_m3: float, **mo
         Diameter, mm, remanence, T, and density, kg/m³.
     **more : float
         Further keys: recoil_permeability (1.05), conductivity_S_m (its eddy currents, else left out).
-
-    Returns
-    -------
-    dict
-        The table `[floater]` of a scene file.
     """
     return {"diameter_mm": diameter_mm, "remanence_T": remanence_T, "density_kg_m3": density_kg_m3, **more}
 
 
-@spelled
+@_table("plate")
 def plate(
     *, center_mm: Sequence[float], conductivity_S_m: float, size_mm: Sequence[float] | None = None, **more: Any
 ) -> Table:
@@ -271,11 +258,6 @@ def plate(
         Further keys: rotation_deg about x, y, z, and lowering = {start_s, speed_mm_s, distance_mm}; in place of
         size_mm shape "disc" with diameter_mm and height_mm, "ring" with inner_diameter_mm beside, "sphere" with
         diameter_mm, or "file" with the name of a STEP file as file.
-
-    Returns
-    -------
-    dict
-        The table `[plate]` of a scene file.
     """
     size = {} if size_mm is None else {"size_mm": size_mm}
     return {**size, "center_mm": center_mm, "conductivity_S_m": conductivity_S_m, **more}
