@@ -102,8 +102,7 @@ def find_equilibria(
 ) -> list[Equilibrium]:
     """All synchronous equilibria free of the bodies, the stable ones first, then by distance.
 
-    `scene`, `table`, `spin`, `rates`: see `survey`, as for what it raises; `memory`: the plate's currents;
-    None leaves them out.
+    `scene`, `table`, `spin`, `rates`: see `survey`, as for what it raises; `memory`: the plate's currents, or None.
     """
     rates = rates or Rates(with_effects(scene, table))
     found = survey(scene, table, spin, rates)
@@ -205,7 +204,7 @@ def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, rates: Rates) 
     chosen = np.flatnonzero(inside)[known]
     doubts = _with_shape(doubts, scene, table, position[chosen], matrices_of(quaternion[chosen]))
     poses = zip(position[chosen], quaternion[chosen], doubts, strict=True)
-    found = [locked_equilibrium(scales, rates, values, *pose) for pose in poses]
+    found = [_locked_equilibrium(scales, rates, values, *pose) for pose in poses]
     return without_twins([one for one in found if rotor_gap(scene, one.position, one.state.orientation) > 0])
 
 
@@ -403,22 +402,17 @@ def check_turning(scene: Scene) -> None:
 def _equilibrium(
     scales: Scales, balance: Balance, point: Array, doubt: Array, residual: Array, slope: Array, jacobian: Array
 ) -> Equilibrium:
-    (state,) = balance.states(point[None, :3], point[None, 3:])
-    motion = modes(state, jacobian)
-    values = np.ravel(balance.values)
-    inverse = np.asarray(np.linalg.inv(slope), float)
-    error = place_error(inverse, residual, values, doubt, point[3:], tangent_basis(point[None, 3:])[0])
-    gravity = abs(float(values[Parameter.GRAVITY_Z]))
-    return Equilibrium(
-        state=scales.unpack(state),
-        spin=float(balance.spin) / scales.spin_ratio,
-        steady_frame=not values[Parameter.RATE],
-        residual=float(np.abs(residual).max() / (gravity or 1.0)),
-        position_error=error * scales.length,
-        **motion.in_seconds(scales.time),
-        slope=slope,
-        jacobian=jacobian,
-    )
+    (state,), values = balance.states(point[None, :3], point[None, 3:]), np.ravel(balance.values)
+    inverse, tangents = np.asarray(np.linalg.inv(slope), float), tangent_basis(point[None, 3:])[0]
+    error = place_error(inverse, residual, values, doubt, point[3:], tangents) * scales.length
+    more = {"steady_frame": not values[Parameter.RATE], **modes(state, jacobian).in_seconds(scales.time)}
+    spin, left = float(balance.spin) / scales.spin_ratio, _left(residual, values)
+    return Equilibrium(scales.unpack(state), spin, left, error, slope=slope, jacobian=jacobian, **more)
+
+
+def _left(residual: Array, values: Array) -> float:
+    """Largest unbalanced acceleration, as a part of gravity."""
+    return float(np.abs(residual).max() / (abs(float(values[Parameter.GRAVITY_Z])) or 1.0))
 
 
 def locked_poses(rates: Rates, values: Array, points: Array, axes: Array) -> tuple[Array, Array]:
@@ -465,30 +459,18 @@ def locked_modes(rates: Rates, values: Array, position: Array, quaternion: Array
     return state, eigenmodes(projections @ jacobian @ tangents, tangents), jacobian
 
 
-def locked_equilibrium(
+def _locked_equilibrium(
     scales: Scales, rates: Rates, values: Array, position: Array, quaternion: Array, doubt: Array
 ) -> Equilibrium:
-    """The equilibrium in a pose of `locked_poses`, with its modes.
-
-    `scales`: of the scene; `rates`: of a body that is not round; `values`: (p,) of the parameters; `position`: (3,)
-    scaled; `quaternion`: (4,); `doubt`: (2 + 12 c,) of the field there, T and T/m, see `field_doubts`.
-    """
+    """The equilibrium in a scaled pose of `locked_poses`, with its modes; see `field_doubts` for the `doubt` there."""
     axes = matrices_of(quaternion)
     quaternion = quaternions_of(axes)  # of its two signs that of a packed state: the Jacobian's entries have it
     value, slope = (part[0] for part in rates.locked_balance(position[None], quaternion[None], values))
-    state, found, jacobian = locked_modes(rates, values, position, quaternion)
-    gravity = abs(float(values[Parameter.GRAVITY_Z]))
-    unpacked = scales.unpack(state)
-    return Equilibrium(
-        state=unpacked,
-        spin=float(unpacked.moment[2]),
-        residual=float(np.abs(value).max() / (gravity or 1.0)),
-        position_error=place_error(np.linalg.pinv(slope), value, values, doubt, axes[:, 2], axes.T) * scales.length,
-        **found.in_seconds(scales.time),
-        kind=LOCKED,
-        slope=slope,
-        jacobian=jacobian,
-    )
+    packed, found, jacobian = locked_modes(rates, values, position, quaternion)
+    state, more = scales.unpack(packed), {"kind": LOCKED, **found.in_seconds(scales.time)}
+    error = place_error(np.linalg.pinv(slope), value, values, doubt, axes[:, 2], axes.T) * scales.length
+    spin, left = float(state.moment[2]), _left(value, values)
+    return Equilibrium(state, spin, left, error, slope=slope, jacobian=jacobian, **more)
 
 
 def without_twins(found: list[Equilibrium]) -> list[Equilibrium]:

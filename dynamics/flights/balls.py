@@ -190,8 +190,7 @@ class Balls:
         best = int(np.argmax(left))
         if float(times[left[best], 0]) < PART:
             return None
-        found = self.at(formula, spacing, lost, cells[best])
-        for ball in (found, here):
+        for ball in (self.at(formula, spacing, lost, cells[best]), here):
             if ball is not None and np.linalg.norm(place - ball[0][:3]) * ball[0][3] <= SNUG:
                 return ball
         return None
