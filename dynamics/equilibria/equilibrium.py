@@ -1,7 +1,7 @@
 """A synchronous equilibrium with its modes, the curve on which it lies, and the survey of all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -220,13 +220,8 @@ class Equilibrium:
     @cached_property
     def laboratory_turn(self) -> State:
         """The motion (n, 3) along the laboratory's axes at equal intervals of a turn, the first at t = 0."""
-        angles = 2 * np.pi * np.arange(INSTANTS) / INSTANTS
-        if self.turn is None:
-            turn = State(*(np.tile(vector, (INSTANTS, 1)) for vector in self.state.vectors))
-        else:
-            axes = None if self.turn.axes is None else resampled(self.turn.axes, INSTANTS)
-            turn = replace(State(*(resampled(vectors, INSTANTS) for vectors in self.turn.vectors)), axes=axes)
-        return turn if self.steady_frame else turn.to_lab(angles)
+        turn = self.turn.each(lambda part: resampled(part, INSTANTS)) if self.turn else self.state[None][[0] * INSTANTS]
+        return turn if self.steady_frame else turn.to_lab(2 * np.pi * np.arange(INSTANTS) / INSTANTS)
 
     @property
     def laboratory_position(self) -> Array:
@@ -236,8 +231,7 @@ class Equilibrium:
     @cached_property
     def _course(self) -> tuple[Array, Array, Array]:
         """Distance and lateral offset, m, and polar angle, °, through a turn; one of each where it is at rest."""
-        at_rest = State(*(vector[None] for vector in self.state.vectors))
-        turn = at_rest if self.turn is None else self.laboratory_turn
+        turn = self.state[None] if self.turn is None else self.laboratory_turn
         offset = np.hypot(*turn.position[:, :2].T)
         return np.linalg.norm(turn.position, axis=1), offset, np.degrees(polar_angle(turn.moment))
 

@@ -23,7 +23,7 @@ from ..motion.body_shape import MISSED_BY_PLATE, response_error
 from ..motion.events import clearance
 from ..motion.plate import PlateCoupling, PlateForce, PlateMemory
 from ..motion.rates import Rates
-from ..motion.state import Parameter, Scales, State, turned_about_z
+from ..motion.state import Parameter, Scales, turned_about_z
 from .balance import Indices
 from .equilibrium import (
     FOLD,
@@ -457,10 +457,7 @@ def _turned(curve: OrbitCurve, states: Array, done: float) -> tuple[Array | None
 
 def overlap(scene: Scene, known: Equilibrium) -> str:
     """Where in a turn the floater of an equilibrium would overlap the plate or the rotor, which; else nothing."""
-    if (turn := known.turn) is None:
-        axes = known.state.axes
-        vectors = (np.tile(vector, (INSTANTS, 1)) for vector in known.state.vectors)
-        turn = replace(State(*vectors), axes=None if axes is None else np.tile(axes, (INSTANTS, 1, 1)))
+    turn = known.turn or known.state[None][[0] * INSTANTS]
     times = np.arange(len(turn.position)) / (len(turn.position) * (scene.frequency or np.inf))
     if clearance(scene, times, turn.position, turn.orientation).min() >= 0:
         return ""

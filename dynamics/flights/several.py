@@ -18,7 +18,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from ...fem.rotor.floater import FloaterSources, floater_sources, remanent_sources
+from ...fem.rotor.floater import floater_sources, remanent_sources
 from ...fem.rotor.table import FieldTable
 from ...geometry.common import MU_0, Array
 from ...geometry.overlap import parting
@@ -51,11 +51,8 @@ def poles_of(floater: Floater) -> tuple[list[Pole], list[Pole]]:
     fine, coarse = (remanent_sources(floater, degree) for degree in (FINE, COARSE))
     # what permeability does to the whole dipole it does to all of them
     whole, plain = (float(np.linalg.norm(part.multipoles(1, 1.0))) for part in (sources, fine))
-    return _poles(fine, whole / plain), _poles(coarse, whole / plain)
-
-
-def _poles(sources: FloaterSources, share: float) -> list[Pole]:
-    return list(zip(sources.places, share * sources.moments, strict=True))
+    share = whole / plain
+    return tuple([*zip(s.places, share * s.moments, strict=True)] for s in (fine, coarse))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Runtime parameters of the equations of motion, and vectors and quaternions of expressions."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any
@@ -172,7 +172,11 @@ class State:
 
     def __getitem__(self, chosen: Any) -> "State":
         """One of many states, or some."""
-        return replace(State(*(v[chosen] for v in self.vectors)), axes=None if self.axes is None else self.axes[chosen])
+        return self.each(lambda part: part[chosen])
+
+    def each(self, change: Callable[[Array], Array]) -> "State":
+        """Its vectors and axes changed."""
+        return replace(State(*map(change, self.vectors)), axes=None if self.axes is None else change(self.axes))
 
     def to_rotor(self, angle: ArrayLike) -> "State":
         """Components along the rotor's axes, from those along the laboratory's; `angle` of the rotor in rad."""
