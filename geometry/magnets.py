@@ -19,22 +19,14 @@ class Magnet:
     """A permanent magnet: B = μ0 μ H + J inside, with J the remanent polarisation.
 
     Raises ValueError: two unlike permeabilities without a polarisation that gives the easy axis.
-
-    Parameters
-    ----------
-    body : shape and pose
-    polarization : (3,) remanent polarisation along the body axes, T; it turns with the body
-    recoil_permeability : μr of the demagnetisation curve, along the easy axis, which is that of the polarisation
-    transverse_permeability : μr across the easy axis; None: as along it
-    conductivity : S/m, or None where its eddy currents are not modelled
-    coercivity : field (A/m) against the polarisation at the knee of the demagnetisation curve, or None if not known
     """
 
-    body: Solid
-    polarization: Array = field(metadata={"units": "T"})
-    recoil_permeability: float = 1.0
-    transverse_permeability: float | None = None
-    conductivity: float | None = field(default=None, metadata={"units": "S/m"})
+    body: Solid  # shape and pose
+    polarization: Array = field(metadata={"units": "T"})  # (3,) remanent, along the body axes; it turns with the body
+    recoil_permeability: float = 1.0  # μr of the demagnetisation curve along the easy axis, that of the polarisation
+    transverse_permeability: float | None = None  # μr across the easy axis; None: as along it
+    conductivity: float | None = field(default=None, metadata={"units": "S/m"})  # None: no eddy currents are modelled
+    # field against the polarisation at the knee of the demagnetisation curve, or None if not known
     coercivity: float | None = field(default=None, metadata={"units": "A/m"})
 
     def __post_init__(self) -> None:

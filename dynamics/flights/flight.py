@@ -82,18 +82,14 @@ class Part:
 
 
 class Flight:
-    """A scene's motion, compiled part by part when it is first needed.
+    """The motion of a `scene` in `table`, compiled part by part when it is first needed.
 
-    Parameters
-    ----------
-    scene, table : the problem
-    duration : how long it shall last, s: it decides how much compilation is worth
-    tolerance : relative error of a step; None: `TOLERANCE`, or `PLATE_TOLERANCE` with a plate's currents
-    compact : compile loops instead of straight code: sooner ready, up to twice as slow; None to choose
-    memory : the plate's currents, if they are modelled; else the plate is only an obstacle
-    in_balls : whether the rotor's field is expanded in balls about the floater; None: where its expressions are long
-    scales : units of the states; None: those of the scene
-    shared : whether the code of a body that is not round is for others as well, which differ in runtime parameters
+    How long it shall last, `duration` (s), decides how much compilation is worth. `tolerance` is the relative error of
+    a step, by default `TOLERANCE`, if None with a plate's currents `PLATE_TOLERANCE`; `compact` code of loops is sooner
+    ready than straight code, and up to twice as slow (None: chosen). `memory` is of the plate's currents, if they are
+    modelled, else it is only an obstacle; `in_balls`: the rotor's field is expanded in balls about the floater (None:
+    where its expressions are long); `scales` are units of the states, by default the scene's; `shared`: the code of a
+    body that is not round is for others as well, which differ in runtime parameters.
     """
 
     def __init__(
@@ -590,6 +586,5 @@ def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | Non
 def displaced(start: State, offset: Array, angular_velocity: float) -> State:
     """State `start` moved by `offset` (..., 3) m, as much at rest in a frame of `angular_velocity` as it was."""
     turning = np.cross([0.0, 0.0, angular_velocity], offset)
-    moment, spin = (np.broadcast_to(v, offset.shape) for v in (start.moment, start.spin))
-    axes = None if start.axes is None else np.broadcast_to(start.axes, (*offset.shape, 3))
-    return State(start.position + offset, start.velocity + turning, moment, spin, axes)
+    many = start.each(lambda part: np.broadcast_to(part, offset.shape[:-1] + part.shape))
+    return replace(many, position=start.position + offset, velocity=start.velocity + turning)

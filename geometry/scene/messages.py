@@ -51,14 +51,7 @@ TAGS = "horizontal", "vertical", "tilt", "magnets", "one", "several"
 
 
 class SceneError(InputError):
-    """A scene file that cannot be used.
-
-    Parameters
-    ----------
-    source : what messages call it
-    faults : everything that is wrong
-    text : of the file, if it is given, in which the lines of keys are found
-    """
+    """A scene file that cannot be used, called `source` in messages: all `faults`, by its `text` with lines of keys."""
 
     def __init__(self, source: str, faults: Sequence[str], text: str = "") -> None:
         self.faults = tuple(faults)
