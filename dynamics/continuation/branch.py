@@ -129,10 +129,7 @@ class Family(BalanceCurve):
         return self.at(points[0], tangents[0], float(points[0, -1]) * self.unit)
 
     def point(self, position: Array, turn: Array, parameter: float) -> BranchPoint:
-        """Equilibrium at a scaled `position` (3,), with a moment (3,) or quaternion (4,).
-
-        Its tangent is towards growing values of `parameter`.
-        """
+        """Equilibrium at a scaled `position` (3,) and `turn`, moment or quaternion, towards growing `parameter`."""
         unknowns = np.concatenate([position, turn, [parameter / self.unit]])
         return self.at(unknowns, directions(self, unknowns[None], np.eye(len(unknowns))[-1:])[0], parameter)
 

@@ -65,10 +65,7 @@ class Branch:
 
 
 def by_frequency(scene: Scene, rates: Rates, spin: float = 0.0) -> Family:
-    """Equilibria of a `scene` with `rates` and a body `spin` against the frequency of the rotor.
-
-    Those that are frequency-locked, if the `rates` are of a body that is not round.
-    """
+    """Equilibria of a `scene`, with `rates` and body `spin`, by frequency, Hz; locked ones of a body not round."""
     return (LockedFamily if rates.turning else Family)(rates, frequencies(scene, spin), UNIT, scene.floater.spin_ratio)
 
 
@@ -121,10 +118,7 @@ def hanging_distance(scene: Scene, table: FieldTable) -> float:
 
 
 def distance_error(scene: Scene, table: FieldTable, family: Family, point: BranchPoint) -> float:
-    """Error of the distance along the axis, m, to first order by the errors that `table` and its effects state.
-
-    Of a `point` of the `family` of equilibria of a `scene` against the frequency.
-    """
+    """Error of the distance on the axis, m, of a `point` of a `scene`'s `family` by those of `table`, to first order."""
     here = replace(scene, frequency=point.parameter)
     scales = Scales.of(here)
     values = parameters(here, scales, frozen_spin=True)
@@ -160,10 +154,7 @@ def reference_state(scene: Scene) -> tuple[Array, float]:
 
 
 def levitating_ranges(scene: Scene, table: FieldTable, rates: Rates) -> list[StableRange]:
-    """All intervals of stability of a `scene` on the branch that levitates below the rotor, by ascending frequency.
-
-    The branch is found without a search, see `levitating_branch`, whose `table`, `rates` and errors these are.
-    """
+    """Intervals of stability on the `levitating_branch` of a `scene`, ascending; `table`, `rates`, errors as there."""
     bare, family = replace(scene, plate=None), by_frequency(scene, rates)
     hanging = _hanging(replace(bare, frequency=HIGHEST), table, family)
     for steps in (LONG_STEPS, STEPS):  # of the far side nothing but where it turns is asked for
@@ -210,11 +201,7 @@ def nearest_range(points: Sequence[BranchPoint], hz: float) -> StableRange | Non
 
 
 def stable_range(scene: Scene, rates: Rates, start: Array, frequency: float) -> StableRange:
-    """The interval of stability that holds `frequency` (Hz) or is nearest to it, its ends good to round-off.
-
-    On the branch through the equilibrium of `scene` and `rates` near `start` (12,) there. Raises EquilibriumError where
-    there is none.
-    """
+    """The `nearest_range` to a `frequency` on the `branch_through` `start`; `scene`, `rates`, errors as there."""
     if (found := nearest_range(branch_through(scene, rates, start, frequency), frequency)) is None:
         raise EquilibriumError("There is no stable levitation on the branch of the point dipoles.")
     return found
@@ -244,10 +231,7 @@ def at_frequency(
 def on_branch(
     scene: Scene, rates: Rates, points: Sequence[BranchPoint], grid: Array, steps: Steps = STEPS
 ) -> list[BranchPoint | None]:
-    """The equilibrium at each frequency (n,) Hz of a `grid`, to round-off; None beyond the ends of the branch.
-
-    The `points` of the branch are those of a `scene` with its `rates`; `steps` lead from the nearest of them.
-    """
+    """Equilibria at a `grid` (n,) Hz, or None, by `steps` from `points` of a branch of the `scene` with its `rates`."""
     ordinary = [point for point in points if point.kind != FOLD]  # a fold has no way towards other frequencies
     ends = [point.parameter for point in points]
     found: list[BranchPoint | None] = []

@@ -61,10 +61,7 @@ class SlowTorque:
 
     @classmethod
     def of(cls, scene: Scene, rates: Rates, stokes: bool = False) -> Self:
-        """The slow torques of a `scene` by its `rates`; with `stokes`, drag is Stokes'.
-
-        Raises InputError for a floater that is no sphere.
-        """
+        """The slow torques of a `scene` by its `rates`, Stokes' with `stokes`. Raises InputError but for a sphere."""
         if (shape := scene.floater.shape) != "sphere":
             raise InputError(
                 f'Input floater.shape must be "sphere" for its slow drift; instead received "{shape}". Simulate it '

@@ -150,10 +150,7 @@ def _thinned(problem: Indices, points: Array, edge: float) -> tuple[Indices, Arr
 def from_starts(
     balance: Balance, where: SearchRange, free: Indices = EVERY, every: int = 1, watch: Watch = unwatched
 ) -> Array:
-    """Distinct points (n, 6) in the range `where`, lowest first, at which the balances of `free` vanish.
-
-    Of a `balance`, from one of `every` so many starts; `watch` as for `newton_search`.
-    """
+    """Distinct points (n, 6) `where` the `free` of a `balance` vanish, lowest first, from one of `every` starts."""
     points = where.starts()[::every]
     one = np.zeros(len(points), int)
     return newton_search(lambda _: balance, lambda _, *places: where.holds(*places), one, points, free, watch=watch)[1]

@@ -122,10 +122,7 @@ def shift_by_mutual(scene: Scene, table: FieldTable, equilibrium: Equilibrium, a
 
 
 def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium, included: bool) -> float:
-    """Change of the growth rate (1/s) of the mode that grows fastest with the floater's own currents.
-
-    `included`: whether the motion of the `equilibrium`, in the field `table` of the `scene`, had them.
-    """
+    """Change (1/s) of an `equilibrium`'s fastest growth by own currents, in `table` of `scene` `included` or not."""
     fixed = equilibrium.without or equilibrium
     scales = Scales.of(scene)
     values = parameters(scene, scales, frozen_spin=True)
@@ -139,10 +136,7 @@ def growth_by_floater(scene: Scene, table: FieldTable, equilibrium: Equilibrium,
 
 
 def growth_by_rotor(scene: Scene, equilibrium: Equilibrium, losses: RotorLosses, included: bool) -> float:
-    """Change of the growth rate (1/s) of the mode that grows fastest with the losses in the rotor.
-
-    `included`: whether the motion of the `equilibrium` of the `scene` had these `losses`.
-    """
+    """Change (1/s) of an `equilibrium`'s fastest growth by `losses` in the rotor of `scene`, `included` or not."""
     fixed = equilibrium.without or equilibrium
     return _growth(scene, fixed, brake_slope(losses, scene, fixed.state), included)
 

@@ -184,10 +184,7 @@ def _survey_of_any_body(scene: Scene, table: FieldTable, spin: float, rates: Rat
 
 
 def _locked(scene: Scene, table: Interaction, seeds: FixedPoints, rates: Rates) -> list[Equilibrium]:
-    """Frequency-locked equilibria near those of the body's mean, `seeds`, gravity along the axis.
-
-    And near where the mean is almost in balance, as its equilibria end in another fold than the body's.
-    """
+    """Frequency-locked equilibria near the mean's, `seeds`, and where it is almost in balance: its fold is another."""
     scales, floater = Scales.of(scene), scene.floater
     near, weight = [seeds.points], floater.mass * float(scene.gravity[2])
     for curve in seeds.curves:
@@ -416,11 +413,7 @@ def _left(residual: Array, values: Array) -> float:
 
 
 def locked_poses(rates: Rates, values: Array, points: Array, axes: Array) -> tuple[Array, Array]:
-    """Scaled positions (k, 3) and quaternions (k, 4) of equilibria, by Newton's method.
-
-    `rates`, `values`: of the equations, and the runtime parameters (p,); `points`, `axes`: (n, 3) scaled positions and
-    (n, 3, 3) axes of the body from which they are looked for.
-    """
+    """Scaled positions, quaternions (k, 4) balanced by `rates` and `values`, from `points` and `axes` (n, 3, 3)."""
     position, quaternion = points.copy(), quaternions_of(axes)
     active, met = np.arange(len(points)), np.zeros(len(points), bool)
     for _ in range(STEPS):

@@ -147,10 +147,7 @@ class Balls:
         return error
 
     def centre(self, values: Array, ways: Array) -> float | None:
-        """Set the runtime parameters `values` to a ball of their kind about the middle of `ways` (n, 3) m.
-
-        Its error; None where there is none that holds them, and `values` stay.
-        """
+        """Put `values` into a ball of their kind about the middle of `ways` (n, 3) m: its error; None without one."""
         formula = next(kind for kind in self.kinds if kind.number == values[DEGREE])
         lost, middle = float(values[Parameter.LOST_DISTANCE] * values[Parameter.LENGTH]), ways.mean(axis=0)
         found = self.at(formula, self._spacing(formula), lost, middle)

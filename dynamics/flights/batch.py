@@ -87,10 +87,7 @@ class _Passenger(Course):
 
 
 class _Launch(_Passenger):
-    """A launch over a plate's currents; each leg of the plate's way is integrated for itself, too.
-
-    Of a floater that is no sphere samples alone tell of contact with its surface.
-    """
+    """A launch over a plate's currents, whose way is of interest only where samples tell of contact with no sphere."""
 
     def __init__(self, course: Course, left: bool) -> None:
         super().__init__(course, left)
@@ -427,10 +424,7 @@ def launched(
 
 
 def _obstacles(scene: Scene, memory: PlateMemory, position: Vector) -> list[hy.expression]:
-    """What becomes negative in contact, and is a polynomial of the scaled position, so that no step misses it.
-
-    Raises InputError: the plate does not lie flat.
-    """
+    """Polynomials of the scaled position that are negative in contact: no step misses them. Raises InputError."""
     box, length = memory.plate.box, hy.par[Parameter.LENGTH]
     normal = int(np.argmin(box.size))
     if memory.plate.each:

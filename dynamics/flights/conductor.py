@@ -119,10 +119,7 @@ def on_axis(scene: Scene) -> bool:
 
 
 def heights_over(scene: Scene) -> tuple[float, float]:
-    """Range of heights (m) of the floater's centre in which its modes are known.
-
-    Raises InputError: a start that is not given or not above the coils, or a floater of no use here.
-    """
+    """Heights (m) of the floater's centre in which its modes are known. Raises InputError for a scene of no use."""
     start, floater, coils = scene.start, scene.floater, scene.coils
     if not floater.conductivity or floater.remanence or len(floater.bodies) > 1:
         raise InputError(
@@ -166,11 +163,7 @@ def levitation_height(scene: Scene, modes: FloatingModes) -> float:
 
 
 def conductor_motion(scene: Scene, modes: FloatingModes, duration: float) -> ConductorMotion:
-    """Simulate a conductor over the coils of a scene, from its start until contact, loss or the end.
-
-    The `scene` has an absolute start within the heights of `modes`, those of its floater over its coils; it lasts for a
-    `duration` (s).
-    """
+    """Simulate a conductor over a `scene`'s coils, along their axis by `modes`, for `duration` (s) or to an end."""
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)
     supply = Supply(scene.coils)
@@ -243,10 +236,7 @@ def _integrated(
 
 
 def room_over(scene: Scene) -> Room:
-    """Box (3,) m of the centre of a floater that moves freely, and the level (m) that it keeps above.
-
-    Raises InputError: as `heights_over`.
-    """
+    """Box (3,) m of the centre of a floater that moves freely, and the level (m) it keeps above. Raises InputError."""
     start, (low, high) = scene.start, heights_over(scene)
     assert isinstance(start, AbsoluteStart)
     top = max(coil.center[2] + coil.height / 2 for coil in scene.coils)
@@ -262,11 +252,7 @@ def _turn(quaternion: Array) -> Array:
 
 
 def free_motion(scene: Scene, modes: FreeModes, duration: float) -> ConductorMotion:
-    """Simulate a conductor over the coils of a scene in six degrees of freedom, until contact, loss or the end.
-
-    The `scene` has an absolute start, `modes` are of its floater over its coils, in the room of `room_over`; it lasts
-    for a `duration` (s).
-    """
+    """Simulate a conductor over a `scene`'s coils, in the room of `modes`, for `duration` (s) or to contact or loss."""
     begun, floater, start = process_time(), scene.floater, scene.start
     assert isinstance(start, AbsoluteStart)
     supply, (box, floor) = Supply(scene.coils), room_over(scene)

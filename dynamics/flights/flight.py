@@ -183,10 +183,7 @@ class Flight:
         return equations, ends if self.memory is None else [*ends, *events.range_events(self.memory, position, rotor)]
 
     def jacobi(self, values: Array, times: Array, states: Array) -> Array:
-        """Terms (k, n) of the Jacobi integral at scaled times (n,) and states (n, s), with the plate where it is then.
-
-        `values` are the runtime parameters (p,) of all of them.
-        """
+        """Terms (k, n) of J at scaled times (n,), states (n, s), by parameters `values` (p,), the plate as it is."""
         function, found = self.part(self.degree(values)).jacobi, []
         pars = np.repeat(values[: max(function.nparams, len(Parameter)), None], min(len(times), AT_ONCE), axis=1)
         pars[Parameter.PLATE_SPEED] = 0.0
@@ -276,10 +273,7 @@ class Course:
         return self.time[0] * self.flight.scales.time
 
     def enter_ball(self, offset: Array | None = None) -> None:
-        """Begin in a ball, a small one if it will do.
-
-        A body that is not round, and begins at an `offset` (3,) m from an equilibrium, gets one about that.
-        """
+        """Begin in a ball, a small one if it will do; of a body not round about an equilibrium `offset` (3,) m away."""
         if not (balls := self.flight.balls):
             return
         about = self.flight.whole.turning and offset is not None
@@ -325,10 +319,7 @@ class Course:
             self.changes = FieldChanges(known.count + 1, known.energy + jump, known.total + abs(jump), error)
 
     def travel(self, progress: Callable[[float], None] | None, checkpoint: Checkpoint | None) -> float:
-        """Go on, from a checkpoint if there is something, until something ends it: simulated seconds per second.
-
-        Compilation is left out. A keyboard interrupt is an end, too.
-        """
+        """Go on, from a checkpoint if there is one, to an end or an interrupt: simulated seconds per second."""
         flight, began = self.flight, perf_counter() - self.flight.compile_seconds
         if (kept := checkpoint.read() if checkpoint else None) is not None:
             self.restore(kept)
@@ -565,10 +556,7 @@ def check_free(name: str, scene: Scene, position: Array, time: float = 0.0, orie
 
 
 def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """The nearest stable equilibrium, or else the nearest that only the plate destabilises, or something else slowly.
-
-    The floater's own eddy currents do so slowly, in minutes.
-    """
+    """The nearest stable equilibrium, else one that only the plate destabilises, else one that grows in minutes."""
     stable = [e for e in equilibria if e.stable] or [e for e in equilibria if e.without and e.without.stable]
     return next(iter(stable or (e for e in equilibria if e.growth_per_s < SLOWLY)), None)
 

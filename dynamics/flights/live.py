@@ -62,10 +62,7 @@ class LiveFlight:
         return self._course.flight.scales.unpack(self._course.state).to_lab(self.scene.angle(self.time))
 
     def onward(self, seconds: float) -> Piece:
-        """Integrate on so long (s), or to contact or loss, after which nothing is left to integrate.
-
-        Raises InputError: `seconds` is not positive; IntegrationError: the state became infinite.
-        """
+        """Integrate on so long (s), or to contact or loss. Raises InputError (not positive), IntegrationError."""
         if not seconds > 0:
             raise InputError(f"Input seconds must be positive; instead received {seconds}.")
         course, unit = self._course, self._course.flight.scales.time

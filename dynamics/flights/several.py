@@ -213,10 +213,7 @@ class JointFlight(Flight):
         return min(found, default=None)
 
     def fly(self, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None) -> Together:
-        """Simulate until the end, contact or loss; `checkpoint` is where the motion is kept while it lasts.
-
-        Raises IntegrationError: the state became infinite.
-        """
+        """Simulate until the end, contact or loss, kept at `checkpoint` meanwhile. Raises IntegrationError."""
         self.course.sample(self.interval(self.course.duration))
         speed = self.course.travel(progress, checkpoint)
         return Together(tuple(self.course.trajectories(speed)), self.course.ended_by, self.course.which)

@@ -198,10 +198,7 @@ def flight_kind(flight: Trajectory) -> str:
 
 
 def _swings(flight: Trajectory, samples: Indices) -> bool:
-    """Whether the oscillation grew more than the mean distance changed until it was largest, but for the last samples.
-
-    Where there are too few it is not known, and said not to.
-    """
+    """Whether the oscillation grew more than the mean distance changed until it was largest; not of too few samples."""
     if len(samples) < FEWEST * WINDOWS:
         return False
     means, sizes = (trend[:-1] for trend in _trends(flight, samples))

@@ -87,10 +87,7 @@ def with_coils(scene: Scene, table: FieldFormula) -> Interaction:
 
 @dataclass(frozen=True, eq=False)
 class CoilForce:
-    """Force and torque of coils off the axis, or with currents that change, on the floater's dipole.
-
-    A floater of another shape than a sphere has its dipole here.
-    """
+    """Force and torque of coils off the axis, or with currents that change, on the floater's dipole."""
 
     coils: tuple[Coil, ...]
     nearest: float  # as of `BesideCoils`

@@ -135,10 +135,7 @@ def dissipative(force: Vector, torque: Vector, motion: Motion) -> Added:
 
 
 def conservative(energy: Callable[[Vector, Vector, Vector], hy.expression], motion: Motion) -> Added:
-    """An effect that has an energy, a function of scaled position, moment direction and the rotor's field (T) there.
-
-    Force and torque are its derivatives, the field's own change with the position included.
-    """
+    """An effect by derivatives in `motion` of its `energy`, of scaled position, moment and the rotor's field (T)."""
     names = [f"{vector}_{k}" for vector in ("place", "pointing", "flux") for k in range(3)]
     given = hy.make_vars(*names)
     value = energy(given[:3], given[3:6], given[6:])

@@ -96,10 +96,7 @@ def round_attitude(moment: Vector, spin: Vector, rotor: Turn) -> Attitude:
 
 
 def turning_attitude(quaternion: Vector, spin: Vector, rotor: Turn, given: Given) -> Attitude:
-    """That of any body, from its `quaternion` (4,) and its `spin` (3,) along its own axes, seen from a `rotor`.
-
-    `given` are the runtime parameters.
-    """
+    """That of any body: `quaternion` (4,), `spin` (3,) along its axes, seen from a `rotor`, by parameters `given`."""
     w, *vector = quaternion
     axes = rotation_of(quaternion)
     ratios = [given[p] for p in (Parameter.INERTIA_X, Parameter.INERTIA_Y, Parameter.INERTIA_Z)]

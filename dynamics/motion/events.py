@@ -42,10 +42,7 @@ def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events
 
 
 def range_events(memory: PlateMemory, position: Vector, turn: Turn = STEADY) -> Events:
-    """Where the floater leaves the range of a plate's table, by the six faces of it in pairs.
-
-    The table is that of `memory`; `position` and `turn` are as of `flight_events`.
-    """
+    """Ends of the range of the table of `memory`, by its faces in pairs; `position`, `turn` as of `flight_events`."""
     region = memory.table.region
     away = [x - float(c) for x, c in zip(seen_by_plate(memory.plate, position, turn), region.center, strict=True)]
     half = (region.upper - region.lower) / 2
@@ -134,10 +131,7 @@ def rotor_gap(scene: Scene, position: Array, orientation: Array | None = None) -
 
 @dataclass(frozen=True)
 class Leg:
-    """A stretch in which plate, drive and tables of currents go on steadily, SI units.
-
-    All but `end` is as at t = 0, if they always did.
-    """
+    """A stretch in which plate, drive and currents go on steadily; all but `end` as at t = 0, had they always. SI."""
 
     end: float
     depth: float  # of the plate

@@ -339,10 +339,7 @@ UNIT: Numbers = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class FloaterCurrents:
-    """The floater's own eddy currents; how strong and how slow they are, the runtime parameters say.
-
-    These are of a ball of the floater's radius, and the rest is by such a ball's.
-    """
+    """The floater's own eddy currents, by those of a ball of its radius, which the runtime parameters tell."""
 
     name: str = FLOATER_CURRENTS
     delays: Numbers = (1.0,)

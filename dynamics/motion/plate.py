@@ -70,10 +70,7 @@ class PlateMemory:
         return max(self.table.errors.total, self.share.error) + self.neglected
 
     def left_by_rotor(self, angular_velocity: float) -> RotorShare:
-        """States q that a rotor turning so fast (rad/s) leaves in the plate, in the form of its share r.
-
-        Those of a rotor of the rate `ENDLESS` are means over a turn alone.
-        """
+        """States q left by a rotor that turns so fast (rad/s), in the form of r; at `ENDLESS` means over a turn."""
         series = self.share.series.copy()
         followed = 1 / (1 + 1j * angular_velocity * np.arange(1, len(series) // 2 + 1)[:, None] / self.table.rates)
         amplitudes = (series[1::2] - 1j * series[2::2]) * followed[:, :, None]
@@ -299,10 +296,7 @@ class PlateForce:
         return np.asarray(currents @ self.memory.table.weights)
 
     def remembered(self, count: int, shift: complex = 0.0) -> NDArray[Any]:
-        """(states, n, n): the plate's states at n instants of a turn, from its signals at them, all periodic.
-
-        Of motions that are periodic times e^{λτ}, λ = `shift`; real where that is 0.
-        """
+        """(states, n, n): the plate's states at n instants by its signals, periodic, or e^{λτ} times it, λ `shift`."""
         decay = self.rates[:, None]
         harmonics = np.fft.fft(np.eye(count), axis=0)
         factors = decay / (decay + shift + 1j * self.values[Parameter.RATE] * np.fft.fftfreq(count, 1 / count))

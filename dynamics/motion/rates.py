@@ -137,19 +137,13 @@ class Rates:
 
     @cached_property
     def rough(self) -> "Rates":
-        """The same by the same code with a field of few moments, and without the numbers of effects that have some.
-
-        Of mutual magnetisation the moment that the rotor's field induces in the floater stays.
-        """
+        """By the same code, a field of few moments and no numbers of effects; B induces a moment still."""
         found = copy(self)
         found._rough, found._field, found._last = True, self._rough_field, NOWHERE
         return found
 
     def _about(self, position: Array, turn: Array, values: Array, times: int = 1) -> Array:
-        """Parameters (p, n) with those of the field and of effects about scaled positions (n, 3).
-
-        `turn` is moments (n, 3), or quaternions (n, 4) of a turning body. Positions repeat so many `times`.
-        """
+        """Parameters (p, n) of field and effects about scaled positions, so many `times`, and moments or turns."""
         count = len(position)
         rows = np.broadcast_to(values, (count, len(Parameter)))
         if self._each:

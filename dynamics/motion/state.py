@@ -325,10 +325,7 @@ def rotation_slopes(quaternions: Array) -> Array:
 
 
 def quaternions_of(matrices: Array) -> Array:
-    """(..., 4) unit quaternions of rotations (..., 3, 3), w first and not negative.
-
-    By the largest eigenvector of a symmetric matrix (I. Y. Bar-Itzhack, J. Guid. Control Dyn. 23 (2000) 1085).
-    """
+    """(..., 4) of rotations, w first, not negative (I. Y. Bar-Itzhack, J. Guid. Control Dyn. 23 (2000) 1085)."""
     m = np.asarray(matrices, float)
     squares = np.empty((*m.shape[:-2], 4, 4))
     squares[..., 0, 0] = np.trace(m, axis1=-2, axis2=-1)
