@@ -111,10 +111,7 @@ Rotor = tuple[Magnet, ...]
 
 
 def horizontal(displacement: float, body: float | Solid, *material: float | None) -> Rotor:
-    """One cube magnetised along +x, `displacement` off the axis along +x; its edge, or a body in its place.
-
-    Of its `material` the remanence (T), the recoil permeability and, if it is another, that across the easy axis.
-    """
+    """One cube (edge, or a body) `displacement` off along its +x; `material`: remanence (T), and μr along, across."""
     return (_magnet(body, X, material, center=displacement * X),)
 
 

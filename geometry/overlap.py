@@ -168,11 +168,7 @@ def closing_shifts(magnets: Sequence[Magnet]) -> Array:
 
 
 def separate_pieces(conductors: Sequence[Conductor]) -> list[tuple[Conductor, ...]]:
-    """The conductors in groups among which no current can flow.
-
-    Conductors that touch and have the same conductivity are one piece of metal, as a shaft with its flange; all others
-    are taken as insulated from each other by their surfaces.
-    """
+    """Conductors in groups that no current joins: those of one conductivity that touch are one, others insulated."""
     groups: list[list[Conductor]] = []
     for new in conductors:
         joined, others = [new], list[list[Conductor]]()

@@ -118,7 +118,7 @@ def hanging_distance(scene: Scene, table: FieldTable) -> float:
 
 
 def distance_error(scene: Scene, table: FieldTable, family: Family, point: BranchPoint) -> float:
-    """Error of the distance on the axis, m, of a `point` of a `scene`'s `family` by those of `table`, to first order."""
+    """Error of the distance on the axis, m, of a `point` of a `scene`'s `family`, to first order by that of `table`."""
     here = replace(scene, frequency=point.parameter)
     scales = Scales.of(here)
     values = parameters(here, scales, frozen_spin=True)

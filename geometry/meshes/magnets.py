@@ -122,10 +122,7 @@ def mesh_magnets(
 
 
 def _meshed_apart(*given: Any) -> Any:
-    """The mesh of `_meshed`, finished; with layers as it was before, as pickle loses what elements they were cut from.
-
-    Then a copy is finished, to crash here if it does.
-    """
+    """`_meshed`, finished; with layers only a copy is, to crash here if it does: they do not survive pickle."""
     mesh, (_, bodies, _, _, settings, _) = _meshed(*given), given
     if _layered(bodies, settings):
         _finished(pickle.loads(pickle.dumps(mesh)), bodies, settings)

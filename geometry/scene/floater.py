@@ -62,11 +62,7 @@ class Floater:
     def composed(
         cls, pieces: Sequence[FloaterPart], moments_of_inertia: tuple[float, float, float] | None = None
     ) -> Self:
-        """A floater of pieces whose centre of mass may be anywhere.
-
-        `pieces`: in the scene file's frame; `moments_of_inertia`: kg m² about the file's axes through the centre of
-        mass, in place of those of the pieces.
-        """
+        """A floater of pieces in the file's frame, wherever their centre of mass; or with moments of inertia, kg m²."""
         masses, magnets = np.array([piece.mass for piece in pieces]), [piece.magnet for piece in pieces]
         center = masses @ [centroid(magnet.body) for magnet in magnets] / masses.sum()
         moment = np.sum([magnet.moment for magnet in magnets], axis=0)

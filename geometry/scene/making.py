@@ -115,10 +115,7 @@ def _digest(path: Path, state: tuple[int, ...]) -> str:
 
 
 def _with_paths(keys: Any, folder: Path, known: Scene | None, found: dict[str, list[str]], place: str = "") -> Any:
-    """Keys whose files are paths from a folder, which are `found` by their keys.
-
-    Beside a known scene a name means one of its files: that which is `folder / name` or ends so. No disk is asked.
-    """
+    """Keys whose files are paths from a folder, `found` by key; beside a known scene those of it that end so."""
     if isinstance(keys, list):
         return [_with_paths(entry, folder, known, found, f"{place}[{k}]") for k, entry in enumerate(keys)]
     if not isinstance(keys, Mapping):
