@@ -140,7 +140,7 @@ def unmeshed(error: LostError, name: str) -> ComputationError:
 
 
 def rule_in_solid(brep: str, order: int, smallest: float = SMALLEST) -> tuple[Array, Array]:
-    """Points and weights, mm, mm³, in the solid `brep` for about an `order`; its `smallest` element. Raises MeshError."""
+    """Points and weights, mm, mm³, in the solid `brep` for about an `order`; its `smallest` element. MeshError."""
     solid = read_brep(brep)
     unit = float(solid.mass) ** (1 / 3)
     sizes = {"maxh": 0.6 * unit, "minh": smallest * unit, "curvaturesafety": ROUND, "grading": 0.6}
