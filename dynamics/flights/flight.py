@@ -374,7 +374,7 @@ class Course:
         event, steps, times, states = propagated(part.integrator, self.values, self.time, self.state, grid)
         self.sound = False
         self.time, self.state = part.integrator.dtime, part.integrator.state.copy()
-        self.steps, self.ended_by = self.steps + steps, DURATION
+        self.steps, self.ended_by, self.which = self.steps + steps, DURATION, ()
         if event is not None:
             self.ended_by, *which = part.meanings[event].split()
             self.which = tuple(map(int, which))
