@@ -46,8 +46,8 @@ class Compared:
     name: str
     levitation: Levitation
     found: Equilibrium | None  # on the branch on which the floater levitates by the best model
-    branch: tuple[BranchPoint, ...] = ()  # through it by frequency, without the plate
-    stable: tuple[float, float] | None = None  # the range of stable frequencies there, Hz
+    branch: tuple[BranchPoint, ...]  # through it by frequency, without the plate
+    stable: tuple[float, float] | None  # the range of stable frequencies there, Hz
 
     def row(self) -> dict[str, Any]:
         row: dict[str, Any] = {"name": self.name, "stable_range_hz": self.stable}
@@ -65,7 +65,7 @@ class Compared:
 
 
 def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:
-    """Levitation distances (mm) by the point dipole, that of the true moment and the `best` model, without the plate.
+    """Levitation distances (mm) by `dipole`, dipole of the `true_moment` and the `best` model, without the plate.
 
     Of the dipoles' equilibria those nearest to where the floater levitates by the best model, of this `name`, or else
     where it does by the dipole; a model without any has None. None where neither has one.
@@ -94,12 +94,11 @@ def field_rtol(scene: Scene) -> float:
     return PART_RTOL if any(isinstance(magnet.body, Part) for magnet in scene.rotor) else Models.rtol
 
 
-def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compared]:
-    """A scene by dipole, dipole of the true moment, closed form, finite elements, and with mutual magnetisation.
+def compared(scene: Scene, requested: Models, spin: float) -> list[Compared]:
+    """A `scene` with body `spin` by dipole, dipole of the true moment, closed form, finite elements, and all of it.
 
-    With body `spin`, tolerances and plate as `requested`; a map of the field takes the place of finite elements. What
-    mutual magnetisation cannot be computed for is left out with a message. Raises EquilibriumError: the rotor is at
-    rest.
+    Tolerances and plate are as `requested`; a map of the field takes the place of finite elements. What mutual
+    magnetisation cannot be computed for is left out with a message. Raises EquilibriumError: the rotor is at rest.
     """
     if not scene.floater.round:
         note("All models have the mean of the floater over turns about its moment.")
@@ -130,22 +129,16 @@ def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compare
                 plan = PlatePlan(model, edges, requested.plate_rtol, region)
                 levitation.plate = levitation.plate_about(np.zeros(3), plan)
         chosen = _nearest(worth_a_row(levitation.equilibria), found[0].found if found else None)
-        found.append(_with_branch(Compared(name, levitation, chosen)))
+        here = _nearest(levitation.without_plate.equilibria, chosen)
+        points = branch_of(levitation, here, "The range of stable frequencies is") if here else ()
+        run = nearest_range(points, scene.frequency)
+        stable = None if run is None else (run.low.parameter, run.high.parameter)
+        found.append(Compared(name, levitation, chosen, points, stable))
     return found[::-1]
 
 
 def _nearest(equilibria: Sequence[Equilibrium], to: Equilibrium | None) -> Equilibrium | None:
-    """The one nearest to another, or, where there is no other, where the floater levitates; None without any."""
     return nearest_of(equilibria, to.position) if to else most_like_levitation(equilibria)
-
-
-def _with_branch(one: Compared) -> Compared:
-    """The same with the branch of its equilibrium, where gravity is along the axis, so that there is one."""
-    if (here := _nearest(one.levitation.without_plate.equilibria, one.found)) is None:
-        return one
-    points = branch_of(one.levitation, here, "The range of stable frequencies is")
-    run = nearest_range(points, one.levitation.scene.frequency)
-    return replace(one, branch=points, stable=None if run is None else (run.low.parameter, run.high.parameter))
 
 
 def compared_dataset(scene: Scene, rows: Sequence[Compared], frequencies: Array | None = None) -> xr.Dataset:
@@ -158,11 +151,13 @@ def compared_dataset(scene: Scene, rows: Sequence[Compared], frequencies: Array 
         low, high = min(*ends, scene.frequency), max(*ends, scene.frequency)
         low, high = low * (1 - BESIDE), high * (1 + BESIDE)
         frequencies = low + (high - low) * np.linspace(0.0, 1.0, GRID) ** 2  # dense at the fold, where branches turn
-    scenes = [(replace(row.levitation.scene, plate=None), row.levitation.rates, row.branch) for row in rows]
-    points = [on_branch(*scene, frequencies) for scene in scenes]
-    nothing = np.nan, np.nan, False
-    at = [[(-p.position[2], p.growth_per_s, levitates(p)) if p else nothing for p in row] for row in points]
-    branch = np.array(at)
+    branch = np.full((len(rows), len(frequencies), 3), np.nan)
+    branch[..., 2] = False
+    for row, values in zip(rows, branch, strict=True):
+        alone = replace(row.levitation.scene, plate=None)
+        for k, p in enumerate(on_branch(alone, row.levitation.rates, row.branch, frequencies)):
+            if p:
+                values[k] = -p.position[2], p.growth_per_s, levitates(p)
     found = [row.found for row in rows]
     modes = [e.frequencies_hz if e else () for e in found]
     spectrum = np.array([*zip_longest(*modes, fillvalue=np.nan)], float).reshape(-1, len(rows)).T

@@ -111,8 +111,7 @@ def _ringing(times: Array, values: Array) -> list[float]:
     errors = np.sqrt(noise * np.diag(np.linalg.pinv(whole.T @ whole)))
     if np.hypot(a, b) < CLEAR * np.hypot(*errors[1:3]):
         return [float(values.mean()), float(np.sqrt(np.var(values) / len(times))), *[np.nan] * 4]
-    hertz = 2 * np.pi
-    return [float(x) for x in (center, errors[0], turn / hertz, errors[3] / hertz, best.x[1], errors[4])]
+    return [*map(float, (center, errors[0], *np.array([turn, errors[3]]) / (2 * np.pi), best.x[1], errors[4]))]
 
 
 class _Rows:
@@ -136,20 +135,18 @@ class _Rows:
         if errors and len(errors) < len(self.measures):
             raise InputError("Input data must have standard deviations of all measures or of none; instead of some.")
         self.measured = np.stack([table[name] for name in self.measures], axis=1)
-        self.given = bool(errors)
+        self.given, self.there = bool(errors), np.isfinite(self.measured)
         self.deviations = np.ones_like(self.measured)
         if errors:
             self.deviations = np.stack([table[f"{name}{ERROR}"] for name in self.measures], axis=1)
-            if not np.all(self.deviations[np.isfinite(self.measured)] > 0):
+            if not np.all(self.deviations[self.there] > 0):
                 raise InputError("Input data must have positive standard deviations; instead some are not.")
-        self.there = np.isfinite(self.measured)
         if self.there.sum() <= len(free) - bool(errors):
             raise InputError(
                 f"Input data must have more values than there are free numbers; instead {self.there.sum()} values are "
                 f"to give {len(free)} numbers."
             )
-        none = np.zeros((len(self.there), 0))
-        self.set = np.stack([table[name] for name in self.keys], axis=1) if self.keys else none
+        self.set = np.array([table[name] for name in self.keys]).reshape(len(self.keys), len(self.there)).T
         self.searches = []
         for row in self.set:
             one = changed(scene, dict(zip(self.keys, row.tolist(), strict=True)))

@@ -88,7 +88,7 @@ class Gradient:
 
         There is none by a key, or no equations, where it is not known: see `reasons`.
         """
-        base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), known.currents is not None)
+        base = self._around(known, known.currents is not None)
         implicit = Implicit(known, base.setting)
         if implicit.at_fold:
             self.reasons["fold"] = "at a fold an equilibrium has no derivatives"
@@ -109,16 +109,16 @@ class Gradient:
                 found[key] = replace(found[key], without=fixed.by(bare))
         return found, implicit, base
 
-    def _by_mean(self, known: Equilibrium) -> bool:
-        return of_whole_body(self.levitation.scene, self.levitation.rates, known)
+    def _around(self, known: Equilibrium, with_plate: bool = False) -> NearbyScenes:
+        by_mean = of_whole_body(self.levitation.scene, self.levitation.rates, known)
+        return NearbyScenes(self.levitation, self.scene, by_mean, with_plate)
 
     def end_by(self, point: BranchPoint, key: str) -> tuple[float, float]:
         """Derivative of the frequency of a range's end, at which the scene is, by a number, and its estimated error."""
         if key == "frequency_hz":
             return 0.0, 0.0
         if not self._end:
-            known = equilibrium_at(self.levitation, point)
-            base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), False)
+            base = self._around(known := equilibrium_at(self.levitation, point))
             implicit = Implicit(known, base.setting)
             self._end.append((known, base, implicit, base.around("frequency_hz")))
         known, base, implicit, by_frequency = self._end[0]
@@ -132,7 +132,7 @@ class Gradient:
 
             def excess(tangent: Tangent, by: str) -> float:
                 if point.kind != CONTACT:
-                    return float(np.real(derivative(known, tangent, "growth")))
+                    return float(derivative(known, tangent, "growth"))
                 moved = tangent.of(lambda e: rotor_gap(self.scene, e.position, e.state.orientation))
                 pose = known.position, known.state.orientation
                 return float(moved) + float(base.of_scenes(by, lambda scene: rotor_gap(scene, *pose)))
@@ -194,8 +194,8 @@ class Gradient:
         """
         assert tangent.lower is not None
         levitation, bare = self.levitation, known.without or known
-        values, lower = (derivatives_of(known, one, names) for one in (tangent, tangent.lower))
-        without = values if tangent.without is None else derivatives_of(bare, tangent.without, names)
+        values, lower = ([derivative(known, one, name) for name in names] for one in (tangent, tangent.lower))
+        without = values if tangent.without is None else [derivative(bare, tangent.without, name) for name in names]
         relative = tangent.unsolved + self._tabled(bare)
         if (mutual := levitation.answers[0]) is not None:
             place = bare.position[None]
@@ -233,20 +233,18 @@ class Gradient:
         lost = np.full(len(keys), np.nan)
         here = known.without or known
         every = [e for e in self.levitation.without_plate.equilibria if e.kind == known.kind != LOCKED]
-        beyond = [e for e in every if e.distance > here.distance and axial_stiffness(e) < 0]
+        beyond = [e for e in every if e.distance > here.distance and _axial_stiffness(e) < 0]
         if not beyond or known.stability == "unstable":
-            why = "an energy of escape is of what levitates, with an unstable equilibrium farther off"
-            self.reasons["escape"] = why
+            said = "an energy of escape is of what levitates, with an unstable equilibrium farther off"
+            self.reasons["escape"] = said
             return np.nan, lost, lost
         there = min(beyond, key=lambda e: e.distance)
-        base = NearbyScenes(self.levitation, self.scene, self._by_mean(known), False)
-        ends = [Implicit(e, base.setting) for e in (there, here)]
+        base = self._around(known)
         first, last = (base.setting.jacobi(State(*(v[None] for v in e.state.vectors))) for e in (there, here))
-        found = []
-        for key in keys:
-            nearby = base.around(key)
-            found.append(ends[0].jacobi_by(nearby) - ends[1].jacobi_by(nearby))
-        value, lower = np.array(found).T
+        beyond_by, here_by = (
+            np.array([Implicit(e, base.setting).jacobi_by(base.around(key)) for key in keys]) for e in (there, here)
+        )
+        value, lower = (beyond_by - here_by).T
         return first - last, value, TRUNCATED * np.abs(value - lower) + self._tabled(here, there) * np.abs(value)
 
 
@@ -267,8 +265,7 @@ def range_ends(gradient: Gradient, keys: Sequence[str]) -> tuple[Array, Array, A
         raise EquilibriumError(
             "The equilibrium is in no range of stable frequencies, whose ends would have derivatives."
         )
-    ends = run.low, run.high
-    found = np.full((2, len(keys), 2), np.nan)
+    ends, found = (run.low, run.high), np.full((2, len(keys), 2), np.nan)
     for row, point in zip(found, ends, strict=True):
         if point.kind == BORDER:
             gradient.reasons[BORDER] = f"nothing ends at {point.parameter:.4g} Hz, beyond which nobody looked"
@@ -291,7 +288,7 @@ def equilibrium_at(levitation: Levitation, point: BranchPoint) -> Equilibrium:
     return Equilibrium(state, point.spin, residual=0.0, position_error=0.0, kind=kind, **motion)
 
 
-def axial_stiffness(fixed: Equilibrium) -> float:
+def _axial_stiffness(fixed: Equilibrium) -> float:
     """Force back along the axis by displacement, where all else follows in balance; scaled."""
     other = [0, 1, 3, 4]
     followed = np.linalg.solve(fixed.slope[np.ix_(other, other)], fixed.slope[other, 2])
@@ -299,7 +296,7 @@ def axial_stiffness(fixed: Equilibrium) -> float:
 
 
 def answer_of(known: Equilibrium, name: str) -> ArrayLike:
-    """An answer of `ANSWERS`, SI units and degrees."""
+    """An answer of `ANSWERS` or `MORE`, SI units and degrees."""
     if name in ("mode_growth", "mode_frequency"):
         modes = {mode.name: (mode.growth_per_s, mode.frequency_hz) for mode in known.modes}
         return np.array([modes.get(mode, (np.nan, np.nan))[name == "mode_frequency"] for mode in MODES])
@@ -311,31 +308,16 @@ def answer_of(known: Equilibrium, name: str) -> ArrayLike:
     return getattr(known, name + ("_deg" if ANSWERS[name][0] == "deg" else ""))  # type: ignore[no-any-return]
 
 
-def derivative(known: Equilibrium, tangent: Tangent, name: str) -> ArrayLike:
-    """Derivative of an answer of `ANSWERS` along the way of an equilibrium."""
+def derivative(known: Equilibrium, tangent: Tangent, name: str) -> Array:
+    """Derivative of an answer of `ANSWERS` or `MORE` along the way (`tangent`) of an equilibrium that is `known`."""
     if name in ("mode_growth", "mode_frequency"):
-        rates = [tangent.modes.get(mode, complex(np.nan, np.nan)) for mode in MODES]
-        return np.real(rates) if name == "mode_growth" else np.imag(rates) / (2 * np.pi)
+        rates = np.array([tangent.modes.get(mode, complex(np.nan, np.nan)) for mode in MODES])
+        return rates.real if name == "mode_growth" else rates.imag / (2 * np.pi)
     if name == "growth":
-        return tangent.modes[max(known.modes, key=lambda mode: mode.growth_per_s).name].real
+        return np.array(tangent.modes[max(known.modes, key=lambda mode: mode.growth_per_s).name].real)
     if name == "plate_damping":
-        bare = tangent if tangent.without is None else tangent.without
-        return np.subtract(derivative(known, bare, "mode_growth"), derivative(known, tangent, "mode_growth"))
+        return derivative(known, tangent.without or tangent, "mode_growth") - derivative(known, tangent, "mode_growth")
     return tangent.of(lambda equilibrium: answer_of(equilibrium, name))
-
-
-def derivatives_of(known: Equilibrium, tangent: Tangent, names: Sequence[str]) -> list[Array]:
-    """Derivatives of several answers of `ANSWERS` and `MORE`, those of the motion alone at once."""
-    plain = [name for name in names if name not in ("growth", "mode_growth", "mode_frequency", "plate_damping")]
-    sizes = [np.size(answer_of(known, name)) for name in plain]
-    row = tangent.of(lambda e: np.concatenate([[], *(np.ravel(answer_of(e, name)) for name in plain)]))
-    parts = dict(zip(plain, np.split(row, np.cumsum(sizes)), strict=False))
-    return [
-        parts[name].reshape(np.shape(answer_of(known, name)))
-        if name in parts
-        else np.asarray(derivative(known, tangent, name))
-        for name in names
-    ]
 
 
 @documented

@@ -63,8 +63,7 @@ class Levitation:
         self.spin = finite("spin", spin)
         self.searched = True  # whether the equilibria were searched for; else they were carried here from scenes nearby
         self._tables = SharedTables()
-        # The plate's currents for all of a trajectory's way, where it left the range of `plate`.
-        self.wider: PlateMemory | None = None
+        self.wider: PlateMemory | None = None  # `plate` for all of a trajectory's way, where that left its range
         self.requested_plate: PlateAround | None = None  # what the last table of the plate was made of
         self.no_wider = ""  # why they could not be known, if so
         self._nearest: Array | None = None  # to the plate, of a trajectory that had begun without its currents
@@ -167,17 +166,15 @@ class Levitation:
         make = partial(cached_mutual_table, *bodies, note)
         return self._tables.table(mutual_key(*bodies), "mutual", "Mutual magnetisation of rotor and floater", make), why
 
-    def _has_metal(self) -> bool:
-        """Whether metal turns with the rotor, once it and the floater are found fit for a table of losses."""
-        scene, pieces = self.scene, pieces_of(self.scene.rotor, self.scene.conductors)
-        if pieces:
-            check_metal(pieces, scene.fastest, scene.floater.radius)
+    def _check_metal(self) -> bool:
+        if pieces := pieces_of(self.scene.rotor, self.scene.conductors):
+            check_metal(pieces, self.scene.fastest, self.scene.floater.radius)
         return bool(pieces)
 
     @cached_property
     def losses(self) -> RotorLosses | None:
         """The losses in the rotor's metal, None without any. Raises InputError where it turns too fast."""
-        if not self._has_metal():
+        if not self._check_metal():
             return None
         make = partial(cached_rotor_losses, self.scene, note)
         return self._tables.table(losses_key(self.scene), "rotor losses", "Eddy currents in the rotor", make)
@@ -185,7 +182,7 @@ class Levitation:
     @cached_property
     def interaction(self) -> Interaction:
         """The rotor's field with what else acts on the floater. Raises InputError where that cannot be known."""
-        self._has_metal()  # refused before the field's table is made, which takes minutes
+        self._check_metal()  # refused before the field's table is made, which takes minutes
         return self._with_effects(self.table)
 
     def _with_effects(self, table: RotorField) -> Interaction:
@@ -203,13 +200,10 @@ class Levitation:
 
     @property
     def rates(self) -> Rates:
-        """The equations of motion in the rotor's field, compiled."""
-
-        def made() -> Rates:
-            first = self._tables.once(f"code {code_of(self.interaction)}", lambda: Rates(self.interaction))
-            return first.elsewhere(self.interaction)
-
-        return self._tables.once(f"rates {self.equations_key}", made)
+        """The equations of motion in the rotor's field, compiled once for all scenes whose equations are alike."""
+        code = f"code {code_of(self.interaction)}"
+        first = partial(self._tables.once, code, lambda: Rates(self.interaction))
+        return self._tables.once(f"rates {self.equations_key}", lambda: first().elsewhere(self.interaction))
 
     # Equilibria
 
@@ -236,8 +230,6 @@ class Levitation:
         return self._searched(self.field(model), f"alone {plans.equations_key(self.scene, models)}", unwatched)
 
     def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
-        """All equilibria in a table, from the cache if they were searched for before."""
-
         def remembered(search: Callable[[], FixedPoints], kind: str) -> FixedPoints:
             # no number in a key stands for how a map is fitted, or what magnets a field followed to these
             if self.scene.field_map or isinstance(interaction_of(table).field, ChangedTable):
@@ -282,10 +274,7 @@ class Levitation:
 
     @cached_property
     def branch(self) -> tuple[BranchPoint, ...]:
-        """Equilibria without plate against the frequency, from where a trajectory begins to a fold or contact.
-
-        None where it does not begin at an equilibrium, or gravity is not along the axis.
-        """
+        """Equilibria without plate against the frequency through the one, if any, at which a trajectory begins."""
         moved = self.absolute or self.scene.other_coils
         chosen = None if moved else _first(self.without_plate.equilibria)
         if chosen is None or chosen.kind == LOCKED:  # no branch of these is followed
@@ -309,13 +298,12 @@ class Levitation:
         """Refuse a plate in the way of a floater after a step of the drive, where it would levitate at all."""
         if self.scene.plate is None or not self.scene.drive or not self.branch:
             return
-        times, rates, _ = self.scene.knots
-        for time, frequency in zip(times[1:], rates[1:] / (2 * np.pi), strict=True):
-            there = on_branch(self.mean.still, self.mean.rates, self.branch, np.array([frequency]))[0]
+        plate, (times, rates, _) = self.scene.plate, self.scene.knots
+        known = on_branch(self.mean.still, self.mean.rates, self.branch, rates[1:] / (2 * np.pi))
+        for time, there in zip(times[1:], known, strict=True):
             if there is not None:
-                down = self.scene.plate.body.center - self.scene.plate.depth(time) * np.eye(3)[2]
-                plate = replace(self.scene.plate, body=moved(self.scene.plate.body, down))
-                plans.check_room(replace(self.scene, plate=plate), there.position, f" at {frequency:g} Hz")
+                lowered = replace(plate, body=moved(plate.body, plate.body.center - plate.depth(time) * np.eye(3)[2]))
+                plans.check_room(replace(self.scene, plate=lowered), there.position, f" at {there.parameter:g} Hz")
 
     # The plate's currents
 
@@ -404,10 +392,10 @@ class Levitation:
     @property
     def flight_table(self) -> RotorField:
         """The rotor's field for the motion: beside a plate, whose own table reaches no farther, with fewer terms."""
-        table = self.table
-        scene, place = self.scene, None if self.wider or self.plate is None else self._flight_place
+        table, place = self.table, None if self.wider or self.plate is None else self._flight_place
         if place is None or not isinstance(table, RotorTable):
             return table
+        scene = self.scene
         return rotor_nearby(table, scene.rotor, tuple(place.tolist()), scene.floater.radius, self.models.rtol)
 
     @property
@@ -419,12 +407,6 @@ class Levitation:
         if self.wider is None:
             return quiet.equilibria
         return with_plate(quiet.still, quiet.interaction, quiet.without_plate, self.wider, quiet.rates).equilibria
-
-    def _decides_flight(self, duration: float, plate: PlateMemory | None) -> tuple[Any, ...]:
-        """All that decides a trajectory over a `plate`: tables by their inputs, as their last bits are of one run."""
-        tables = self.equations_key, key_of("equilibria", self.spin)
-        of_plate = (plate.model, plate.table.region, self.requested_plate and self.requested_plate.key) if plate else ()
-        return self.scene, duration, self.models, *tables, *of_plate
 
     def flight(self, duration: float, checkpoint: Checkpoint | None = None, cached: bool = False) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
@@ -445,8 +427,7 @@ class Levitation:
             return self.simulated[duration]
         self._check_drive()
         self._ahead = duration
-        kept = checkpoint.read() if checkpoint else None
-        if kept is not None and self.plate is not None:
+        if checkpoint and (kept := checkpoint.read()) is not None and self.plate is not None:
             bounds = self.plate.table.region
             if not np.array_equal(kept["region"], [bounds.lower, bounds.upper]):
                 self._widen(Region(*kept["region"]))
@@ -456,7 +437,11 @@ class Levitation:
             with progress("Motion") as bar:
                 how: dict[str, Any] = {"progress": bar, "memory": plate, "checkpoint": checkpoint}
                 fly = partial(simulate, self.scene, table, duration, known, **how)
-                simulated = FLIGHTS.cached(self._decides_flight(duration, plate), fly, note)[0] if cached else fly()
+                # what decides it: tables by their inputs, as their last bits are of one run
+                made_of = self.requested_plate and self.requested_plate.key
+                of_plate = (plate.model, plate.table.region, made_of) if plate else ()
+                decides = duration, self.models, self.equations_key, key_of("equilibria", self.spin), *of_plate
+                simulated = FLIGHTS.cached((self.scene, *decides), fly, note)[0] if cached else fly()
             left = simulated.left_plate_table
             beyond = left and self.follow(simulated.lab.position[-1:], simulated.time[-1:])
             if not beyond and (left or not self._plate_matters(simulated)):
@@ -471,7 +456,7 @@ class Levitation:
         return simulated
 
     def live_flight(self) -> LiveFlight:
-        """A live simulation, from where the scene says. Raises what `flight` raises."""
+        """A live simulation. Raises what `flight` raises."""
         if (memory := self.plate) is not None:
             begins = initial_state(self.scene, self.table, self.known_for_flight, memory)[0].position
             if not memory.table.in_range(memory.plate.box.to_body(begins))[0]:
@@ -511,8 +496,7 @@ class Levitation:
     def _widen(self, region: Region) -> None:
         """Have the plate's table for a region, plate's frame, with more error than asked for where it must be."""
         known, place = self.plate, self._flight_place
-        assert known is not None
-        assert place is not None
+        assert known is not None and place is not None  # noqa: PT018
         plan = PlatePlan(known.model, known.neglected, self.models.plate_rtol, region)
         try:
             self.wider = self.plate_about(place, plan)

@@ -60,28 +60,22 @@ def _simulate_together(levitations: Sequence[Levitation], duration: float) -> No
     groups: dict[tuple[object, ...], list[Levitation]] = {}
     for one in levitations:
         with suppress(SpinlevError):
-            still = one.scene.plate is None or one.models.plate_model == "none"
-            still &= not one.scene.other_coils
+            scene, floater = one.scene, one.scene.floater
+            still = (scene.plate is None or one.models.plate_model == "none") and not scene.other_coils
             if still and is_long(one.interaction):
-                floater = one.scene.floater
-                key = (
-                    one.equations_key,
-                    "" if floater.is_sphere else key_of("equilibria", floater.bodies, floater.round),
-                    one.interaction_model,
-                    bool(np.any(one.scene.gravity[:2])),
-                    bool(one.scene.drive),
-                )
-                groups.setdefault(key, []).append(one)
+                shape = "" if floater.is_sphere else key_of("equilibria", floater.bodies, floater.round)
+                kind = one.interaction_model, bool(np.any(scene.gravity[:2])), bool(scene.drive)
+                groups.setdefault((one.equations_key, shape, *kind), []).append(one)
     for alike in groups.values():
-        ready = []
+        ready, starts = list[Levitation](), []
         for one in alike if len(alike) > 1 else ():
             with suppress(SpinlevError):
                 known = () if one.absolute else one.equilibria
-                ready.append((one, initial_state(one.scene, one.interaction, known)[0]))
+                starts.append(initial_state(one.scene, one.interaction, known)[0])
+                ready.append(one)
         with suppress(SpinlevError):
-            starts = [start for _, start in ready]
-            simulated = simulate_together([one.scene for one, _ in ready], alike[0].interaction, starts, duration)
-            for (one, _), flight in zip(ready, simulated, strict=True):
+            simulated = simulate_together([one.scene for one in ready], alike[0].interaction, starts, duration)
+            for one, flight in zip(ready, simulated, strict=True):
                 if flight is not None:
                     one.simulated[duration] = flight
 
@@ -155,9 +149,8 @@ class Question:
                 jobs[k] = partial(self._answer, point, one, dipoles)
                 made.append(one)
                 # Trajectories begin at equilibria, or have a plate whose table is made about one.
-                requested = self.ask == "equilibria" or (
-                    self.ask == "flight" and (one.scene.plate is not None or not one.absolute)
-                )
+                begins = self.ask == "flight" and (one.scene.plate is not None or not one.absolute)
+                requested = self.ask == "equilibria" or begins
                 place = tuple(axis.index(point[name]) for name, axis in axes.items())
                 for role, each in enumerate((one, *dipoles)):
                     if requested and each.scene.frequency and each.scene.floater.is_sphere:
@@ -178,7 +171,7 @@ class Question:
         size = min(max(-(-len(order) // PARTS), 6), LARGEST[self.ask])
         return [order[k : k + size] for k in range(0, len(order), size)]
 
-    def _answer(self, point: Point, levitation: Levitation, dipoles: Sequence[Levitation] = ()) -> xr.Dataset:
+    def _answer(self, point: Point, levitation: Levitation, dipoles: Sequence[Levitation]) -> xr.Dataset:
         answer = ANSWERS[self.ask](self, levitation)
         if dipoles:
             answer = answer.assign(_beside(levitation, dipoles))

@@ -281,17 +281,18 @@ def curve_dataset(curves: Mapping[str, Sequence[ForceCurve]]) -> xr.Dataset:
     """Axial force along the curves of lateral balance, by model."""
     rows = [(model, number, curve) for model, found in curves.items() for number, curve in enumerate(found)]
     sizes, point, place = [len(curve.position) for *_, curve in rows], ("curve_point",), ("curve_point", "axis")
-    positions, moments, forces = (
-        np.concatenate([np.zeros((0, *shape)), *(getattr(curve, name) for *_, curve in rows)])
-        for name, shape in (("position", (3,)), ("moment", (3,)), ("magnetic_force", ()))
-    )
-    data = {
+    data: dict[str, Any] = {
         "curve_model": (point, np.repeat([model for model, *_ in rows] or [""], sizes or [0])),
         "curve_number": (point, np.repeat([number for _, number, _ in rows] or [0], sizes or [0])),
-        "curve_position": variable(place, positions, "m", "position, rotor's frame"),
-        "curve_moment": variable(place, moments, "1", "direction of the moment"),
-        "curve_force": variable(point, forces, "N", "axial magnetic force"),
     }
+    for name, of, dims, unit, label in (
+        ("position", "position", place, "m", "position, rotor's frame"),
+        ("moment", "moment", place, "1", "direction of the moment"),
+        ("force", "magnetic_force", point, "N", "axial magnetic force"),
+    ):
+        none = np.zeros((0, 3) if dims is place else 0)
+        values = np.concatenate([none, *(getattr(curve, of) for *_, curve in rows)])
+        data[f"curve_{name}"] = variable(dims, values, unit, label)
     return xr.Dataset(data, {"axis": list(AXIS)})
 
 

@@ -177,10 +177,7 @@ def computed(by: Workers, study: Study, points: Sequence[Point], missing: Set[in
 
 
 def attempts(compute: Compute, prepared: Prepared | None, missing: Set[int], points: Batch) -> Iterator[Attempt]:
-    """Results of the `missing` ones of numbered `points` that are computed together, or why there is none.
-
-    `compute` and `prepared` are of the study.
-    """
+    """Results of the `missing` ones of numbered `points`, by `compute` and `prepared` of a study, or why none is."""
     requested = list(points.values())
     jobs: Sequence[Callable[[], xr.Dataset]] = [partial(compute, point) for point in requested]
     if prepared is not None and len(requested) > 1:
@@ -256,10 +253,7 @@ def answered(requesting: str, job: Any, batch: Batch) -> list[Attempt] | None:
 
 
 def _workers_of_us(client: Client, address: str) -> list[str]:
-    """Addresses of the workers of this version of the program, none while there are no workers.
-
-    Raises InputError where there are workers, but no such.
-    """
+    """Addresses of the workers of this version, none while there are no workers. InputError where all are of others."""
     versions = client.run(program, on_error="return")
     of_us = [worker for worker, answer in versions.items() if answer == program()]
     others = sorted(set(versions) - set(of_us))

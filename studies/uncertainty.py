@@ -22,6 +22,11 @@ DRAWS, SEED = 200, 20250701  # of the check, by default
 FEW_DRAWS = 20  # of commands where a plate's currents act: each takes half a second
 PERCENTILES = (5.0, 95.0)
 CHECKED = 0.2  # Relative difference of the two error bars from which on the first order is said not to do
+SAID = {
+    "distance": ("distance", 1e3, " mm"),
+    "polar_angle": ("polar angle", 1.0, "°"),
+    "growth": ("growth rate", 1.0, " s⁻¹"),
+}
 
 
 def error_bars(
@@ -85,7 +90,7 @@ def _row(
     for row, name in zip(shares, ANSWERS, strict=True):
         for k, key in enumerate(keys):
             if key in tangents:
-                row[k] = np.asarray(derivative(known, tangents[key], name), float) * wide[k] / np.sqrt(3)
+                row[k] = derivative(known, tangents[key], name) * wide[k] / np.sqrt(3)
     sample = [np.full((len(drawn), *value.shape), np.nan) for value in values]
     if implicit is None or len(tangents) < len(keys):
         return values, shares, sample
@@ -170,15 +175,12 @@ def uncertainty_job(levitation: Levitation, out: Path) -> Answer:
                 by = {key: share / scale for key, share in shares}
                 row[f"{name}{end}"] = {"error": error, "drawn_error": drawn, "share": by}
         rows.append(row | {"lost": float(one["lost"])})
-    first = found.isel(equilibrium=0)
+    first, values = found.isel(equilibrium=0), {"uncertainty": rows, "draws": int(found.attrs["draws"])}
     if not np.isfinite(first["distance_error"]):
-        lines = [f"Within the tolerances: not known, as {found.attrs['not_known']}."]
-        return {"uncertainty": rows, "draws": int(found.attrs["draws"])}, lines
-    growth = ("growth", "growth rate", 1.0, " s⁻¹")
-    shown_as = (("distance", "distance", 1e3, " mm"), ("polar_angle", "polar angle", 1.0, "°"), growth)
+        return values, [f"Within the tolerances: not known, as {found.attrs['not_known']}."]
     said = [
         f"{words} {scale * float(first[name]):.4g} ± {scale * float(first[f'{name}_error']):.2g}{unit}"
-        for name, words, scale, unit in shown_as
+        for name, (words, scale, unit) in SAID.items()
     ]
     largest = first["key"].values[int(np.argmax(np.abs(first["distance_share"].values)))]
     lines = [f"Within the tolerances (standard deviations): {', '.join(said)}. Most of it by {largest}."]
@@ -189,4 +191,4 @@ def uncertainty_job(levitation: Levitation, out: Path) -> Answer:
             f"Of {found.attrs['draws']} draws {lost:.0%} have no such equilibrium; the others' distances scatter "
             f"{ratio:.2g} times as much as the first order says."
         )
-    return {"uncertainty": rows, "draws": int(found.attrs["draws"])}, lines
+    return values, lines

@@ -63,7 +63,7 @@ def spoken_time(seconds: float) -> str:
 
 
 def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out: Sequence[LeftOut] = ()) -> str:
-    """Levitation distance and stability in a `levitation`, by its `equilibria` and what was `left_out`."""
+    """Distance and stability in a `levitation`, by its `equilibria` and what was `left_out`."""
     if not (useful := worth_a_row(equilibria)):
         reason = "there is no equilibrium"
         if equilibria:
@@ -84,8 +84,7 @@ def headline(levitation: Levitation, equilibria: Sequence[Equilibrium], left_out
     decay = "is undamped"
     if first.growth_per_s < -first.growth_error_per_s:
         change = 0.0 if alone is None else abs(first.growth_per_s - alone.growth_per_s)
-        by_plate = change > CLEAR * abs(first.growth_per_s)
-        cause = "eddy currents in the plate" if by_plate else "air drag"
+        cause = "eddy currents in the plate" if change > CLEAR * abs(first.growth_per_s) else "air drag"
         decay = f"decays at {-first.growth_per_s:.2g} s⁻¹ by {cause}"
     return f"Stable levitation {_place(first)}{of_kind}. Least stable mode: {mode}, {decay}."
 
@@ -117,7 +116,6 @@ def _least_stable(equilibrium: Equilibrium) -> str:
 
 
 def mode_words(name: str) -> str:
-    """The name of a mode as it is printed."""
     return MODE_NAMES.get(name, name)
 
 
@@ -149,10 +147,9 @@ def equilibria_rows(levitation: Levitation, equilibria: Sequence[Equilibrium]) -
 
 def equilibria_words(levitation: Levitation, survey: Survey) -> list[str]:
     """The headline, the equilibria as a table, and what was left out."""
-    found, left_out = survey.equilibria, survey.left_out
-    table = aligned(equilibria_rows(levitation, found), ">" * (len(COLUMNS) - 1) + "<")
-    said = left_out_words(levitation, left_out)
-    return [headline(levitation, found, left_out), *(f"  {line}" for line in table), *said]
+    table = aligned(equilibria_rows(levitation, survey.equilibria), ">" * (len(COLUMNS) - 1) + "<")
+    said = headline(levitation, survey.equilibria, survey.left_out)
+    return [said, *(f"  {line}" for line in table), *left_out_words(levitation, survey.left_out)]
 
 
 def left_out_words(levitation: Levitation, left_out: Sequence[LeftOut]) -> list[str]:
@@ -203,7 +200,7 @@ def comparison_words(compared: Mapping[str, Any] | None, plate: bool = False) ->
 
 
 def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:
-    """Kind of a trajectory; one that lasted, but had begun at an unstable equilibrium, is no stable one."""
+    """Its kind; a trajectory that lasted, but had begun at an unstable equilibrium, is no stable one."""
     kind = flight_kind(flight)
     return kind if kind != STABLE or levitation.absolute or levitation.quiet.stability.stable else GROWING
 
@@ -236,10 +233,8 @@ def drive_words(levitation: Levitation, flight: Trajectory) -> list[str]:
         return []
     momentum, work = flight.given[-1]
     torque, power = (float(given) / max(flight.levitated_s, 1e-300) for given in (momentum, work))
-    lines = [
-        f"Motor, beside the rotor's own inertia and friction: {torque:.2g} N m and {power:.2g} W on the mean, "
-        f"{work:.2g} J in all."
-    ]
+    said = f"{torque:.2g} N m and {power:.2g} W on the mean, {work:.2g} J in all."
+    lines = [f"Motor, beside the rotor's own inertia and friction: {said}"]
     if stable := nearest_range(levitation.branch, levitation.scene.frequency):
         ends = [f"{end.parameter:.2f} Hz ({ENDS[end.kind]})" for end in (stable.low, stable.high)]
         plate = " without the plate" if levitation.scene.plate else ""
@@ -248,7 +243,6 @@ def drive_words(levitation: Levitation, flight: Trajectory) -> list[str]:
 
 
 def plate_words(levitation: Levitation) -> list[str]:
-    """Error of the plate's response, where it is larger than asked for."""
     memory, requested = levitation.flight_plate, levitation.models.plate_rtol
     if memory is None or memory.error <= requested:
         return []

@@ -24,21 +24,21 @@ from ..cli.options import FieldModel, InteractionModel, Models, PlateModel
 from ..levitation import Levitation
 from ..study import Point
 
+# Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given
 EDGE, REMANENCE, PERMEABILITY = 10e-3, 1.305, 1.05
-"""Of the rotor's cubes: m; T, the middle of 1.29 to 1.32; recoil permeability usual for NdFeB, which is not given."""
 FLOATER = Floater(6.35e-3, REMANENCE, PERMEABILITY, 7500.0)
 WEIGHT = FLOATER.mass * 9.81  # Of the floater, N
 PLATE_SIZE, PLATE_CONDUCTIVITY = (0.1, 0.24, 0.03), 3.5e7  # Of the aluminium plate: edges, m; S/m
 CONTACT = EDGE / 2 + FLOATER.radius  # Distance on the axis at which floater and a cube that is not tilted touch, m
+# Frequencies that are looked at, Hz: the article's floaters levitated from below 50 Hz to what its motor gave
 LOWEST, HIGHEST = 40.0, 250.0
-"""Frequencies that are looked at, Hz: the article's floaters levitated from below 50 Hz to what its motor gave."""
 FLIGHT = 250.0  # The longest trajectory of the experiment, s
-RTOL = 1e-4
-"""Relative accuracy of B asked of the finite elements, from contact on: it moves the equilibria by less than 1 µm."""
+RTOL = 1e-4  # Relative accuracy of B by finite elements, from contact on: it moves equilibria by less than 1 µm
 MODELS = ("dipole", "fem")
 INTERACTION = 1e-7 * FLOATER.moment * REMANENCE * EDGE**3 / MU_0  # G = μ0 m_f m_r / 4π, N m⁴
-FARTHEST = 0.12
-"""From contact to here roots of the force are looked for, m; nearer, the side mode's radius has no bound."""
+FARTHEST = (
+    0.12  # From contact to here roots of the force are looked for, m; nearer, the side mode's radius has no bound
+)
 
 
 @dataclass(frozen=True)
@@ -53,15 +53,14 @@ class Configuration:
     levitated: tuple[float, ...]  # those of them that levitated in the experiment
 
 
+X, Z, TILT = (tuple(np.arange(*ends, dtype=float).tolist()) for ends in ((1, 9), (10, 21, 2), (5, 50, 5)))
 CONFIGURATIONS = {
-    "horizontal": Configuration(horizontal, "δx", "mm", 1e-3, tuple(map(float, range(1, 9))), (1.0, 2.0, 3.0, 4.0)),
-    "vertical": Configuration(
-        vertical, "δz", "mm", 1e-3, tuple(map(float, range(10, 21, 2))), (10.0, 12.0, 14.0, 16.0)
-    ),
-    "tilt": Configuration(tilt, "δθ", "°", np.pi / 180, tuple(map(float, range(5, 50, 5))), (5.0, 10.0, 15.0, 20.0)),
+    "horizontal": Configuration(horizontal, "δx", "mm", 1e-3, X, X[:4]),
+    "vertical": Configuration(vertical, "δz", "mm", 1e-3, Z, Z[:4]),
+    "tilt": Configuration(tilt, "δθ", "°", np.pi / 180, TILT, TILT[:4]),
 }
+# One rotor of each configuration, for the quick settings of studies
 QUICK = {"horizontal": (1.0,), "vertical": (14.0,), "tilt": (10.0,)}
-"""One rotor of each configuration, for the quick settings of studies."""
 QUICK_ROTORS = (("horizontal", 2.0), ("vertical", 14.0), ("tilt", 10.0))
 
 
@@ -73,8 +72,7 @@ def rotor_label(configuration: str, value: float) -> str:
 
 def label_of(configuration: str) -> str:
     """A configuration's parameter with its unit, for an axis."""
-    kind = CONFIGURATIONS[configuration]
-    return f"{kind.symbol} ({kind.unit})"
+    return f"{CONFIGURATIONS[configuration].symbol} ({CONFIGURATIONS[configuration].unit})"
 
 
 def levitated_rotors(quick: bool) -> list[Point]:
@@ -101,9 +99,10 @@ def rotor_scene(
     permeability: float = PERMEABILITY,
     floater: Floater = FLOATER,
 ) -> Scene:
-    """A rotor of the article above its floater, without a plate, with Stokes' `drag` or in vacuum.
+    """A rotor of the article above its `floater`, with Stokes' `drag` or in vacuum, without a plate.
 
-    Displacement `value` in mm or tilt in degrees, `frequency` in Hz, the cubes' `remanence` in T.
+    Of a `configuration` displacement or tilt are the `value` (mm or °), `frequency` in Hz; the cubes' `remanence` in T
+    and recoil `permeability`.
     """
     kind = CONFIGURATIONS[configuration]
     magnets = kind.make(kind.scale * value, EDGE, remanence, permeability)
@@ -125,7 +124,7 @@ def plate_with_face(face: float) -> Plate:
 def levitation_of(
     scene: Scene, model: FieldModel, rtol: float = RTOL, interaction: InteractionModel = "rigid"
 ) -> Levitation:
-    """A scene in one model's field, its plate left out."""
+    """A `scene` in the field of a `model` to `rtol`, with an `interaction`, its plate left out."""
     return Levitation(scene, Models(model, "none", rtol, interaction=interaction))
 
 
@@ -210,7 +209,6 @@ def parts(configuration: str, value: float, d: Array, a: Array | float) -> Array
     parameter = CONFIGURATIONS[configuration].scale * value
 
     def cube(angle: float, away: Array, offset: Array | float) -> Array:
-        """Of a cube tilted by an angle, so far away along the axis from a floater at a lateral offset."""
         u, cosine, sine = offset / away, np.cos(angle), np.sin(angle)
         field = cosine - 3 * u * (u * cosine - sine), 2 * sine - 3 * u * cosine
         factors = 2 * sine - 4 * u * cosine, (5 * u**2 - 1) * cosine - 4 * u * sine
@@ -235,9 +233,8 @@ def balanced(configuration: str, value: float, frequency: float, load: float) ->
     enough = excess(grid) >= 0
     steps = np.flatnonzero(enough[:-1] != enough[1:])
     roots = [float(scipy.optimize.brentq(excess, grid[k], grid[k + 1])) for k in steps[-2:]]
-    if not len(roots):
-        return np.nan, np.nan
-    return (np.nan, roots[0]) if len(roots) == 1 else (roots[0], roots[1])
+    stable, unstable = [np.nan, np.nan, *roots][-2:]
+    return stable, unstable
 
 
 def analytic_distance(configuration: str, value: float, frequency: ArrayLike) -> Array:

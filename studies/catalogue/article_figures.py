@@ -23,8 +23,7 @@ from . import article, showing
 from .article import force, side_radius
 
 # On-axis and off-axis field at several places of the floater against the parameter of each of the article's rotors.
-DISTANCES = np.array([15e-3, 20e-3, 25e-3, 30e-3, 40e-3])
-"""Places of the floater on the axis below the rotor, m; the article's text does not give its own."""
+DISTANCES = np.array([15e-3, 20e-3, 25e-3, 30e-3, 40e-3])  # Below the rotor, m; the article does not give its own
 FIELD_MODELS = ("article", "dipole", "cuboid", "fem")
 FIELD_COLUMNS: Columns = {
     "off_axis": (("distance",), "T", "field across the axis"),
@@ -139,8 +138,8 @@ ROTOR = {"configuration": "horizontal", "value": 1.0}  # Of the article's figure
 COARSE = {"frequencies_hz": [170.0], "spacing": 5e-4}
 FINE = {"frequencies_hz": [165.0, 170.0, 185.0, 200.0], "spacing": 1e-4}
 FORCE_MODELS = ("semi-analytic", "small angles", "dipole", "fem")
+# θ at the tipping point nearest to the rotor, °, in the article's text, and where that calls it almost zero, m
 REPORTED_ANGLE, REPORTED_DISTANCE = 9.0, 0.04
-"""θ at the tipping point nearest to the rotor, °, in the article's text, and where that calls it almost zero, m."""
 BOTH, ONE = ("frequency", "distance"), ("frequency",)
 FORCE_COLUMNS: Columns = {
     "attracting": (BOTH, "N", "force by the on-axis field, upwards"),
@@ -172,8 +171,7 @@ def force_curve(point: Point) -> xr.Dataset:
 
 
 def _along_curve(levitation: Levitation, grid: Array) -> Array:
-    """The first four columns (4, n) on the curve that holds the stable equilibrium; NaN beyond its ends."""
-    # along the axis the moment comes nearest to upright on the curve that holds the stable equilibrium
+    """The first four columns (4, n) on the curve of the stable equilibrium, where the moment is nearest to upright."""
     model, curves = sources(levitation.table), levitation.without_plate.curves
     curve = max(curves, key=lambda curve: float(curve.moment[:, 2].max()))
     parts = article.FLOATER.moment * curve.moment * model.evaluate(curve.position)[1][:, :, 2]
@@ -199,17 +197,10 @@ def _balance_points(distance: Array, magnetic: Array, angle: Array) -> tuple[flo
     return stable, far, near, float(theta(near)), float(theta(stable))
 
 
-STYLES = {
-    "fem": ("-", "finite elements"),
-    "dipole": ("--", "point dipole"),
-    "semi-analytic": (":", "article, semi-analytic"),
-    "small angles": ("-.", "article, small angles"),
-}
-POINTS = {
-    "near_tipping": ("<", "near tipping point"),
-    "equilibrium": ("o", "stable"),
-    "far_tipping": (">", "far tipping point"),
-}
+STYLES = {"fem": ("-", "finite elements"), "dipole": ("--", "point dipole")}
+STYLES |= {"semi-analytic": (":", "article, semi-analytic"), "small angles": ("-.", "article, small angles")}
+POINTS = {"near_tipping": ("<", "near tipping point"), "equilibrium": ("o", "stable")}
+POINTS["far_tipping"] = (">", "far tipping point")
 
 
 @drawn
@@ -295,10 +286,10 @@ FORCE_CURVE = Study(
 
 
 # The circle on which the floater goes with the rotor: its radius in the finite magnets' field, simulated, by formula.
+# Speed upwards with which the trajectory begins, m/s; its duration, s; samples of its last turns that are kept
 KICK, SECONDS, SAMPLES = 0.01, 2.0, 400
-"""Speed upwards with which the trajectory begins, m/s; its duration, s; samples of its last turns that are kept."""
+# Of the trajectory of `ROTOR` in the article's figure: Hz, and how many of its last turns are shown
 SIMULATED_HZ, TURNS = 170.0, 3
-"""Of the trajectory of `ROTOR` in the article's figure: Hz, and how many of its last turns are shown."""
 TYPICAL = (0.1, 0.3)  # Radii that the article calls typical, mm
 SIDE_COLUMNS: Columns = {
     "radius": (("frequency",), "m", "radius of the floater's circle"),

@@ -37,15 +37,14 @@ from . import article
 from .floater_shape import CUBE, SPHERE, body_of
 from .showing import by_rotor, configuration_panels, each, text_table
 
+# From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m
 NEARER, FARTHER, SIDEWAYS = 4e-3, 8e-3, 6e-3
-"""From where it would levitate without a plate: so much nearer to the rotor, farther from it, and to the side, m."""
 LEAN = np.radians(60.0)  # Largest angle of the moment to the axis
 SPIN = 0.2  # Largest spin about its own moment, over the rotor's
 SPEED = 0.02  # Standard deviation of each component of the velocity with which a hand lets go, m/s
-BELOW = 0.018
-"""Face of the plate below where the floater levitates without it, m: 35 mm below the rotor is 10 to 20 of these."""
+BELOW = 0.018  # Face of the plate below where it levitates without it, m: 35 mm below the rotor is 10 to 20 of these
+# The plate goes down after (s), by (m), at (m/s: the article's), and the trajectory goes on for (s)
 SETTLED, LOWERED, LOWERING_SPEED, AFTER = 1.0, 0.055, 0.01, 1.0
-"""The plate goes down after (s), by (m), at (m/s: the article's), and the trajectory goes on for (s)."""
 PLATE_RTOL = 1e-2  # Of the plate's tables: capture is decided by the field's attraction, the plate only brakes
 
 
@@ -80,10 +79,7 @@ def place_of(configuration: str, measure: float, part: float) -> Place:
 
 @cache
 def plate_under(place: Place, lowered: bool = False) -> PlateMemory:
-    """The currents in a place's plate, taken as an infinite slab, wherever launches begin.
-
-    Where it is `lowered` it goes down once the floater has settled.
-    """
+    """The currents in a place's plate, an infinite slab which may be `lowered`, wherever launches begin."""
     scene, plate = place.scene, place.scene.plate
     assert plate is not None
     if lowered:
@@ -96,23 +92,21 @@ def plate_under(place: Place, lowered: bool = False) -> PlateMemory:
 
 
 def launches(place: Place, count: int, seed: list[int]) -> tuple[dict[str, Array], State]:
-    """Launches drawn evenly over heights, a disc, a cap of directions and spins; let go with a hand's speed.
+    """A `count` of launches drawn evenly over heights, a disc, a cap of directions and spins; let go by a hand.
 
-    Returns of a `count` of them below a `place` how each is let go (n,) by the names of `COLUMNS`, and its state (n, 3)
-    at t = 0, along the rotor's axes. The same `seed` gives the same launches, to the last bit.
+    How each is let go below a `place` (n,) by the names of `COLUMNS`, and its state (n, 3) at t = 0, along the rotor's
+    axes. The same `seed` gives the same launches, to the last bit.
     """
     draws = np.random.default_rng(seed)
     height, area, cap, along = draws.uniform(size=(4, count))
     place_angle, moment_angle = draws.uniform(0, 2 * np.pi, (2, count))
     velocity = draws.normal(0, SPEED, (count, 3))
-    farther = -NEARER + (NEARER + FARTHER) * height
-    sideways, spin = SIDEWAYS * np.sqrt(area), SPIN * (2 * along - 1)
+    how = {"farther": -NEARER + (NEARER + FARTHER) * height, "sideways": SIDEWAYS * np.sqrt(area)}
     cosine = 1 - (1 - np.cos(LEAN)) * cap  # even over the sphere's cap
-    position = _cylindrical(sideways, place_angle, -place.distance - farther)
+    how |= {"lean": np.arccos(cosine), "spin": SPIN * (2 * along - 1)}
+    position = _cylindrical(how["sideways"], place_angle, -place.distance - how["farther"])
     moment = _cylindrical(np.sqrt(1 - cosine**2), moment_angle, cosine)
-    turning = (spin * place.scene.angular_velocity)[:, None] * moment
-    how = {"farther": farther, "sideways": sideways, "lean": np.arccos(cosine), "spin": spin}
-    return how, State(position, velocity, moment, turning)
+    return how, State(position, velocity, moment, (how["spin"] * place.scene.angular_velocity)[:, None] * moment)
 
 
 def _cylindrical(radius: Array, angle: Array, height: Array) -> Array:
@@ -120,22 +114,21 @@ def _cylindrical(radius: Array, angle: Array, height: Array) -> Array:
 
 
 def seed_of(configuration: str, measure: float, part: float, batch: int) -> list[int]:
-    """A seed of its own for each batch of launches below a rotor (as of `place_of`)."""
+    """A seed for each `batch` of launches below a rotor, by `configuration`, `measure` and `part` as of `place_of`."""
     return [crc32(f"{configuration} {measure:g} {part:.6f}".encode()), batch]
 
 
-CAPTURED, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)
-"""Up at the end; touched the plate; touched the rotor; far away; never simulated, as no frequency is stable."""
+CAPTURED, PLATE, ROTOR, LOST, NO_EQUILIBRIUM = range(5)  # Numbers of these words
 WORDS = ("captured", "touched the plate", "touched the rotor", "lost to the side", "no stable frequency")
 OTHERS = {word.replace(" ", "_"): word for word in WORDS[1:]}
 PARTS = (1 / 6, 1 / 2, 5 / 6)  # Places in the range of stable frequencies
 TOGETHER, BATCHES = 2000, 5  # Trajectories of a point, and points for each rotor and frequency: 10 000 in all
 CHECKED = 8  # Launches of each rotor and frequency that are simulated on while the plate goes down
 FEW = 24  # Launches of a point in the quick setting
+# Floaters and their heights over their diameters, see `body_of`
 SHAPES = {SPHERE: (SPHERE, 1.0), "disc": ("cylinder", 0.5), "rod": ("cylinder", 2.0), CUBE: (CUBE, 1.0)}
-"""Floaters and their heights over their diameters, see `body_of`."""
+# The launches of those that are no spheres, and how many there are of each
 SHAPED, OF_SHAPE = {"configuration": "vertical", "measure": 14.0, "part": 0.5, "batch": 0, "checked": 0}, 400
-"""The launches of those that are no spheres, and how many there are of each."""
 FLIGHTS = ("flight",)
 COLUMNS: Columns = {
     "rotor_frequency": ((), "Hz", "frequency of the rotor"),
@@ -163,13 +156,12 @@ def capture_points(quick: bool) -> list[Point]:
     At last floaters of other shapes, of which quick settings have the cube.
     """
     rotors = [(name, value) for name, kind in article.CONFIGURATIONS.items() for value in kind.tested]
-    every = [
-        (*rotor, part, batch, TOGETHER, 0 if batch else CHECKED)
-        for batch, rotor, part in product(range(BATCHES), rotors, PARTS)
-    ]
+    every = product(range(BATCHES), rotors, PARTS)
+    requested = [(*rotor, part, batch, TOGETHER, 0 if batch else CHECKED) for batch, rotor, part in every]
+    shapes, count = list(SHAPES)[1:], OF_SHAPE
+    if quick:
+        requested, shapes, count = [(*rotor, 0.5, 0, FEW, 0) for rotor in article.QUICK_ROTORS], [CUBE], FEW
     names = ("configuration", "measure", "part", "batch", "flights", "checked")
-    requested = [(*rotor, 0.5, 0, FEW, 0) for rotor in article.QUICK_ROTORS] if quick else every
-    shapes, count = ([CUBE], FEW) if quick else (list(SHAPES)[1:], OF_SHAPE)
     others = [{**SHAPED, "flights": count, "shape": shape} for shape in shapes]
     return [*(dict(zip(names, values, strict=True)) for values in requested), *others]
 
@@ -191,9 +183,9 @@ def capture(point: Point) -> xr.Dataset:
     low = ended.last.position[:, 2] < -(place.distance + BELOW) / 2
     outcome = np.where(ended.ended_by == CONTACT, np.where(low, PLATE, ROTOR), LOST)
     outcome[ended.ended_by == DURATION] = CAPTURED
-    found |= {"rotor_frequency": place.scene.frequency, "distance": place.distance, "low": place.low}
-    found |= {"high": place.high, "levitated": ended.levitated_s, "outcome": outcome.astype(float)}
-    found |= {**how, "left_plate_table": ended.left_plate_table.astype(float)}
+    found |= {"rotor_frequency": place.scene.frequency, **{k: getattr(place, k) for k in ("distance", "low", "high")}}
+    found |= {**how, "levitated": ended.levitated_s, "outcome": outcome.astype(float)}
+    found["left_plate_table"] = ended.left_plate_table.astype(float)
     if point["checked"]:
         first = states[: point["checked"]]
         later = _simulated(place, first, SETTLED + LOWERED / LOWERING_SPEED + AFTER, lowered=True)
@@ -216,7 +208,6 @@ def share(hits: ArrayLike) -> tuple[float, float, float]:
 
 
 def share_text(hits: ArrayLike) -> str:
-    """The same in per cent, with half of the interval as its error."""
     value, low, high = share(hits)
     error = (high - low) / 2
     digits = max(1, math.ceil(-math.log10(100 * error))) if np.isfinite(error) else 1
@@ -239,8 +230,7 @@ def each_place(result: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     return found
 
 
-SHOWN = ("δx = 2 mm", "δz = 14 mm", "δz = 18 mm", "δθ = 10°")
-"""Rotors of which it is drawn from where they capture."""
+SHOWN = ("δx = 2 mm", "δz = 14 mm", "δz = 18 mm", "δθ = 10°")  # Rotors of which it is drawn from where they capture
 BINS = 6
 
 
@@ -258,7 +248,6 @@ def share_figure(axes: Axes, own: xr.Dataset) -> None:
 
 
 def _shares(axes: Axes, x: ArrayLike, hits: Sequence[ArrayLike], color: str, label: str) -> None:
-    """Shares in per cent with Wilson's intervals."""
     values, low, high = 100 * np.array([share(each) for each in hits]).T
     bars = np.maximum([values - low, high - values], 0)
     axes.errorbar(x, values, bars, fmt="o-", ms=4, capsize=2, color=color, label=label, clip_on=False)
@@ -290,8 +279,8 @@ def place_figure(result: xr.Dataset) -> Figure:
 
 
 def _capture_lines(result: xr.Dataset) -> list[str]:
-    found, rows = each_place(result), []
-    for (label, one), numbers in zip(found, capture_numbers(result)["shares"], strict=True):
+    found, known, rows = each_place(result), capture_numbers(result), []
+    for (label, one), numbers in zip(found, known["shares"], strict=True):
         after = f"{int(one['stayed'])} of {int(one['settled'])}" if one["settled"] else ""
         seen = "levitated" if numbers["levitated_in_article"] else "did not levitate"
         rest = sorted(((numbers[key], word) for key, word in OTHERS.items()), key=lambda other: -other[0])
@@ -308,8 +297,8 @@ def _capture_lines(result: xr.Dataset) -> list[str]:
             f"{int(beyond.sum())} of {count} trajectories, {captured} of them captured, were for a while beyond the "
             "range of the plate's table, where the field of its currents is a continuation of unknown error."
         )
-    settled, stayed = (int(result[name].sum()) for name in ("settled", "stayed"))
-    if settled:
+    if settled := known["simulated_on"]:
+        stayed = known["still_levitating"]
         lines.append(
             f"Of {settled} captured floaters {stayed} still levitate after the plate was lowered (10 mm/s over 55 mm): "
             f"{share_text(np.arange(settled) >= stayed)} are lost."
@@ -323,23 +312,14 @@ def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
     for _, one in each_place(result):
         value, low, high = share(one["outcome"] == CAPTURED)
         frequency, name, measure = (one[key].item() for key in ("rotor_frequency", "configuration", "measure"))
-        rows.append({
-            "configuration": name,
-            "value": measure,
-            "shape": one["shape"].item(),
-            "levitated_in_article": measure in article.CONFIGURATIONS[name].levitated,
-            "frequency_hz": None if np.isnan(frequency) else frequency,
-            "flights": one.sizes["trial"],
-            "captured": value,
-            "captured_error": (high - low) / 2,
-            "left_plate_table": float((one["left_plate_table"] == 1).mean()),
-            **{key: float((one["outcome"] == k).mean()) for k, key in enumerate(OTHERS, 1)},
-        })  # fmt: skip
-    return {
-        "shares": rows,
-        "simulated_on": int(result["settled"].sum()),
-        "still_levitating": int(result["stayed"].sum()),
-    }
+        seen = measure in article.CONFIGURATIONS[name].levitated
+        row = {"configuration": name, "value": measure, "shape": one["shape"].item(), "levitated_in_article": seen}
+        row |= {"frequency_hz": None if np.isnan(frequency) else frequency, "flights": one.sizes["trial"]}
+        row |= {"captured": value, "captured_error": (high - low) / 2}
+        row["left_plate_table"] = float((one["left_plate_table"] == 1).mean())
+        rows.append(row | {key: float((one["outcome"] == k).mean()) for k, key in enumerate(OTHERS, 1)})
+    on, still = (int(result[name].sum()) for name in ("settled", "stayed"))
+    return {"shares": rows, "simulated_on": on, "still_levitating": still}
 
 
 STUDY = Study(

@@ -40,8 +40,7 @@ from .experiment_model import (
 )
 from .showing import records, text_table, uncertain
 
-KEPT = 1000  # Draws of the posterior that are kept
-TOGETHER = 500  # Draws that are evaluated in one call
+KEPT, TOGETHER = 1000, 500  # Draws of the posterior that are kept; draws that are evaluated in one call
 DONE = 0.1  # What the evidence that remains may add to its logarithm
 COLUMNS: Columns = {
     "posterior": (("draw", "unknown"), "see unit", "draw of the posterior"),
@@ -75,10 +74,8 @@ def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, 
         return float(sum(value[0] for value in known.values()))
 
     generator = np.random.default_rng(seed)
-    sampler = NestedSampler(
-        likelihood, lambda shares: shares, len(UNKNOWNS),  # shares of the priors
-        nlive=live, bound="multi", sample="rwalk", walks=walks, rstate=generator,
-    )  # fmt: skip
+    how: Any = {"nlive": live, "bound": "multi", "sample": "rwalk", "walks": walks, "rstate": generator}
+    sampler = NestedSampler(likelihood, lambda shares: shares, len(UNKNOWNS), **how)  # shares of the priors
     sampler.run_nested(dlogz=DONE, print_progress=False)
     found = sampler.results
     weights = np.exp(found.logwt - logsumexp(found.logwt))
@@ -93,10 +90,7 @@ def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, 
 
 
 def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) -> dict[str, Any]:
-    """Evidences of the `models` by the `facts`: from `draws` of the prior (a power of two), by names of `COLUMNS`.
-
-    The draws are Sobol's sequence of this `seed`.
-    """
+    """Evidences of `models` by `facts` from `draws` (a power of two) of the prior by Sobol's sequence of a `seed`."""
     shares = np.clip(scipy.stats.qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws), 1e-12, 1 - 1e-12)
     pieces = np.array_split(shares, max(1, draws // TOGETHER))
     parts = [log_likelihoods(models, prior_values(part), facts) for part in pieces]
@@ -122,10 +116,10 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
 
 
 SYNTHETIC = "made-up facts"
+# Unknowns of which facts are made up: off the prior's middle by up to 1.5 of its deviations
 TRUTH: dict[str, float] = {u.name: (u.first + u.second) / 2 if u.prior == EVEN else u.first for u in UNKNOWNS}
 TRUTH |= {"displacement": 1.2, "tilt": 1.6, "stack": 14.2, "stack_tilt": 1.0}
 TRUTH |= {"magnets": 7.5e5, "steel": 3.0, "motion": 9.0}
-"""Unknowns of which facts are made up: off the prior's middle by up to 1.5 of its deviations."""
 FLIGHTS: tuple[model.Flight, ...] = (
     *(("single", 1.0, frequency, LONGEST) for frequency in np.arange(95.0, 185.0, 10.0)),
     *(("stack", 14.0, frequency, LONGEST) for frequency in np.arange(52.0, 68.0, 3.0)),
@@ -154,6 +148,7 @@ VARIANTS = {
     "without air": ("floater", "rotor", "mutual"),
     SYNTHETIC: EVERYTHING,
 }  # Effects in the motion of each variant; the last one is fitted to made-up facts of known unknowns
+# Nodes of a rotor, whether there is steel, rotors of designs, degrees of surrogates, live points, walks, draws
 SETTINGS: Mapping[bool, Point] = {
     False: {
         "heights": 12, "spins": 5, "steel": True, "single": 64, "stack": 36, "better": 8,
@@ -164,7 +159,6 @@ SETTINGS: Mapping[bool, Point] = {
         "single_degree": 2, "stack_degree": 2, "better_degree": 0, "live": 50, "walks": 8, "draws": 1 << 11,
     },
 }  # fmt: skip
-"""Nodes of a rotor, whether there is steel, rotors of designs, degrees of surrogates, live points, walks, draws."""
 SEED = 42
 
 
@@ -182,14 +176,11 @@ def _designs(settings: Point, mutual: bool) -> dict[tuple[str, str], list[Point]
     counts = {("single", "cuboid"): "single", ("stack", "cuboid"): "stack", ("single", "fem"): "better"}
     counts |= {("single", "mutual"): "better"} if mutual else {}
     nodes = {"heights": settings["heights"], "spins": settings["spins"]}
-    return {
-        (kind, field): [
-            {"rotor": kind, "model": field, "number": number, **nodes, "steel": settings["steel"] and kind == "single"}
-            for number in range(settings[count])
-        ]
-        for (kind, field), count in counts.items()
-        if settings[count]
-    }
+    found = dict[tuple[str, str], list[Point]]()
+    for (kind, field), count in counts.items():
+        own, steel = {"rotor": kind, "model": field}, settings["steel"] and kind == "single"
+        found[kind, field] = [{**own, "number": k, **nodes, "steel": steel} for k in range(settings[count])]
+    return {name: points for name, points in found.items() if points}
 
 
 def experiment(point: Point) -> xr.Dataset:
@@ -203,12 +194,10 @@ def experiment(point: Point) -> xr.Dataset:
         facts = synthetic_facts(models)
     found = posterior(models, facts, settings["live"], settings["walks"], SEED)
     found |= evidences(models, facts, settings["draws"], SEED)
-    found |= {
-        "surrogate_error": [surrogate.errors for surrogate in models.surrogates.values()],
-        "surrogate_rotors": [surrogate.rotors for surrogate in models.surrogates.values()],
-        "truth": [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in NAMES],
-        "says": [fact.says for fact in facts.values()],
-    }
+    of = models.surrogates.values()
+    found |= {"surrogate_error": [one.errors for one in of], "surrogate_rotors": [one.rotors for one in of]}
+    found["truth"] = [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in NAMES]
+    found["says"] = [fact.says for fact in facts.values()]
     labels = {"fact": list(facts), "other_fact": list(facts), "unknown": list(NAMES)}
     labels |= {"rotor_kind": list(models.surrogates), "fitted": list(FITTED)}
     return xr.Dataset(columns(COLUMNS, found), labels).expand_dims(variant=[name])
@@ -239,14 +228,10 @@ def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
         return xr.Dataset({"design_rotors": rotors})
     says = {k: v for part in variants for k, v in zip(part["fact"].values, part["says"].values[0], strict=True)}
     joined = xr.concat([part.drop_vars("says") for part in variants], "variant", data_vars="all", join="outer")
-    return joined.assign(
-        design_rotors=rotors,
-        says=("fact", [str(says[name]) for name in joined["fact"].values]),
-        prior=("unknown", [u.prior for u in UNKNOWNS]),
-        unit=("unknown", [u.unit for u in UNKNOWNS]),
-        why=("unknown", [u.why for u in UNKNOWNS]),
-        prior_numbers=(("unknown", "number"), [[u.first, u.second] for u in UNKNOWNS]),
-    )
+    known: dict[str, Any] = {k: ("unknown", [getattr(u, k) for u in UNKNOWNS]) for k in ("prior", "unit", "why")}
+    numbers = ("unknown", "number"), [[u.first, u.second] for u in UNKNOWNS]
+    said = "fact", [str(says[name]) for name in joined["fact"].values]
+    return joined.assign({**known, "design_rotors": rotors, "says": said, "prior_numbers": numbers})
 
 
 SHOWN = ["displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "spin"]  # Unknowns of the corner
@@ -371,8 +356,7 @@ def _experiment_lines(result: xr.Dataset) -> list[str]:
     unknowns = []
     known = zip(result["unknown"].values, result["unit"].values, quantiles(one), prior_quantiles(result), strict=True)
     for name, unit, now, before in known:
-        width = (now[2] - now[0]) / (before[2] - before[0])
-        away = 2 * (now[1] - before[1]) / (before[2] - before[0])
+        width, away = (now[2] - now[0]) / (wide := before[2] - before[0]), 2 * (now[1] - before[1]) / wide
         learned = width < LEARNED or abs(away) > LEARNED
         unknowns.append((f"{name} ({unit})", *now, f"{width:.2f}", f"{away:+.1f}", "learned" if learned else ""))
     evidence, first = [], float(one["log_evidence"])

@@ -29,7 +29,7 @@ from ...dynamics.motion.state import Parameter, Scales
 from ...fem.cache import TableKind
 from ...fem.rotor_metal import RotorLosses, cached_rotor_losses
 from ...geometry.common import MAGNET_CONDUCTIVITY, Array
-from ...geometry.magnets import Magnet, horizontal, tilt, vertical
+from ...geometry.magnets import Conductor, Magnet, horizontal, tilt, vertical
 from ...geometry.scene.contents import Drag, Scene
 from ...geometry.solids import moved
 from ..cli.options import FieldModel
@@ -74,16 +74,15 @@ def scene_of(inputs: Mapping[str, float], permeability: float = 1.0) -> Scene:
     return Scene(100.0, tuple(magnets), floater, Drag(0.0, 0.0), gravity=gravity)
 
 
+# What may make a normal mode grow: currents in the floater, the rotor's magnets and the holder's steel, and air
 EFFECTS = ("floater", "magnets", "steel", "air")
-"""What may make a normal mode grow: currents in the floater, the rotor's magnets and the holder's steel, and air."""
-MOTIONS = ("precession", "side")
-"""Normal modes that currents may make grow: a turning of the moment, and a circle about the axis."""
+MOTIONS = ("precession", "side")  # Modes that currents may make grow: the moment turns, or it circles about the axis
+# Of a node: frequency of the rotor, Hz; ds/dt by the floater's currents and by air, 1/s; distance from the axis, m;
+# frequency of the axial mode, Hz; growth without losses, 1/s; frequency of two modes, Hz, and growth by each effect
 QUANTITIES = (
     *("frequency", "eddy", "air", "circle", "bounce", "bare"),
     *(f"{motion} {name}" for motion in MOTIONS for name in ("frequency", *EFFECTS)),
 )
-"""Of a node: frequency of the rotor, Hz; ds/dt by the floater's currents and by air, 1/s; distance from the axis, m;
-frequency of the axial mode, Hz; growth without losses, 1/s; frequency of two modes, Hz, and growth by each effect."""
 ITERATIONS, CLOSE = 40, 1e-10
 OFF = [Parameter.LINEAR_DRAG, Parameter.TILT_DRAG, Parameter.SPIN_DRAG, Parameter.TILT_EDDY, Parameter.SPIN_EDDY]
 AIR, EDDY = OFF[:3], OFF[3:]
@@ -188,8 +187,7 @@ def _without(values: Array, off: Sequence[int]) -> Array:
 
 SPINS = (-0.12, 0.6)  # Ends of the body spins
 SEED, LONGEST_DESIGN = 20250701, 256
-CONTACT = 11.35e-3
-"""Distance from which parts of the way are counted, m: that on the axis at which floater and cube touch."""
+CONTACT = 11.35e-3  # Distance on the axis at which floater and cube touch, from which parts of the way are counted, m
 NODES = TableKind("experiment", tuple[Array, float], "Nodes of one rotor in the design of an experiment")
 DESIGN: Columns = {
     "node": (("height", "body_spin", "quantity"), "see quantity", "what is known of a node"),
@@ -207,7 +205,7 @@ class PosedLosses:
     magnets: tuple[Magnet, ...]  # the cubes as they are
 
     def dissipation(self, positions: ArrayLike, moments: ArrayLike) -> Array:
-        """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m, summed over the magnets."""
+        """D (n, 6, 6) of dipoles (n, 3) A m² at (n, 3) m."""
         places, dipoles = np.asarray(positions, float), np.asarray(moments, float)
         total = np.zeros((len(places), 6, 6))
         for magnet in self.magnets:
@@ -231,13 +229,12 @@ def design_row(point: Point, cached: bool = True) -> xr.Dataset:
     Over `height` and `body_spin` its nodes (NaN where nothing levitates), with `hanging`, the distance at which the
     attraction alone carries the weight, and its inputs.
     """
-    kind = KINDS[point["rotor"]]
+    kind, model = KINDS[point["rotor"]], point["model"]
     inputs = design_inputs(point["rotor"], point["number"])
     spins, steps = np.linspace(*SPINS, point["spins"]), np.arange(point["heights"]) + 0.5
     part = kind.near + (kind.far - kind.near) * (1 - np.cos(np.pi * steps / len(steps))) / 2
 
     def make() -> tuple[Array, float]:
-        model = point["model"]
         scene = scene_of(inputs, 1.0 if model == "cuboid" else 1.05)
         field: FieldModel = "cuboid" if model == "cuboid" else "fem"
         levitation = levitation_of(scene, field, interaction="mutual" if model == "mutual" else "rigid")
@@ -251,17 +248,14 @@ def design_row(point: Point, cached: bool = True) -> xr.Dataset:
 
 
 def losses_of(scene: Scene, steel: bool) -> tuple[Dissipation, Dissipation | None]:
-    """Losses of a scene's magnets and, if asked for, of the block that balances a displaced cube."""
-    magnet, block = _canonical_losses(scene.rotor[0].recoil_permeability, steel)
-    return PosedLosses(magnet, scene.rotor), block
+    """Losses of a scene's magnets and, if asked for, of the block of `steel` that balances a displaced cube."""
+    permeability = scene.rotor[0].recoil_permeability
+    magnet = PosedLosses(_canonical_losses(permeability, MAGNET_CONDUCTIVITY, ()), scene.rotor)
+    return magnet, _canonical_losses(permeability, None, (SPACER,)) if steel else None
 
 
 @cache
-def _canonical_losses(permeability: float, steel: bool) -> tuple[RotorLosses, RotorLosses | None]:
-    cube = replace(horizontal(0.0, EDGE, REMANENCE, permeability)[0], conductivity=MAGNET_CONDUCTIVITY)
-    alone = Scene(100.0, (cube,), FLOATER, Drag(0.0, 0.0))
-    magnet = cached_rotor_losses(alone, lambda _: None)[0]
-    if not steel:
-        return magnet, None
-    block = replace(alone, rotor=(replace(cube, conductivity=None),), conductors=(SPACER,))
-    return magnet, cached_rotor_losses(block, lambda _: None)[0]
+def _canonical_losses(permeability: float, conductivity: float | None, blocks: tuple[Conductor, ...]) -> RotorLosses:
+    cube = replace(horizontal(0.0, EDGE, REMANENCE, permeability)[0], conductivity=conductivity)
+    alone = Scene(100.0, (cube,), FLOATER, Drag(0.0, 0.0), conductors=blocks)
+    return cached_rotor_losses(alone, lambda _: None)[0]

@@ -35,17 +35,14 @@ STRENGTHS = {"single": (4.0, 13.0), "stack": (2.0, 28.0)}  # Ends of what `stren
 WITH_STRENGTH = -0.78  # The frequency goes about as this power of it
 FASTEST = 300.0  # Nodes of faster rotors are left out, Hz: no fact asks for more than 200
 STABLE = 0.02  # Growth without losses that is taken as none, 1/s
+# Squared distances of axial and lateral mode from precession, over the frequency, from which on growth is its own
 APART = 0.03, 0.004
-"""Squared distances of axial and lateral mode from precession, over the frequency, from which on growth is its own."""
 
 
 def strength(name: str, inputs: Array) -> Array:
-    """How strong the field on the axis is (n,), as the tilt (°) of a lone cube that levitates at the same frequency.
-
-    `inputs` (n, input) are those of the kind of rotor of this `name`. A second cube's field falls off as its distance
-    grows; fitted to 10, 14 and 20 mm, good to 5 %.
-    """
+    """Field on the axis (n,) of a kind of rotor, as the tilt (°) of a lone cube that levitates at that frequency."""
     known = dict(zip(KINDS[name].box, inputs.T, strict=True))
+    # a second cube's falls off as its distance grows; fitted to 10, 14 and 20 mm, good to 5 %
     second = 13.5 * np.exp(-0.112 * (known["stack"] - 14.0)) if "stack" in known else 0.0
     return np.asarray(np.clip(known["on_axis"] + second, *STRENGTHS[name]))
 
@@ -61,11 +58,10 @@ def coordinates(name: str, inputs: Array) -> Array:
 def targets(name: str, design: xr.Dataset) -> Array:
     """What is fitted (rotor, height, spin, fitted) of a design's nodes: smooth functions, NaN where one has no sense.
 
-    The frequency goes as [(1 - part)(1 - spin)]^(-1/2), and a power of `strength`: its logarithm is fitted
-    without these.  "meeting" is the square of the distance of axial mode and precession over the frequency squared,
-    negative where they have met and grow;
-    "lateral" that of the side motion from the rotor.  Growth by currents is over the drift by those in the floater,
-    that of the side motion over drift by (1 - spin) times the root of "lateral".
+    The frequency goes as [(1 - part)(1 - spin)]^(-1/2) and a power of `strength`, its logarithm is fitted without
+    these.  "meeting" is the square of the distance of axial mode and precession over the frequency squared, negative
+    where they have met and grow; "lateral" that of the side motion from the rotor.  Growth by currents is over drift by
+    those in the floater, that of the side motion over drift by (1 - spin) times the root of "lateral".
     """
     nodes = dict(zip(QUANTITIES, np.moveaxis(design["node"].values, -1, 0), strict=True))
     part, spins = design["part"].values[:, :, None], design["body_spin"].values
@@ -195,8 +191,8 @@ STEPS = 40  # Places on the way to the fold
 LONGEST = 250.0
 SLOWEST = 1e-7  # Drift slower than this, 1/s, is a balance
 TURNS = 4  # Corrections of the spin at a height, of which each leaves a tenth of its error or less
+# A floater is lost where twice the axial mode is so near to precession (Hz) for so long (s), see docs/learned.md
 WINDOW, DWELL = 0.2, 10.0
-"""A floater is lost where twice the axial mode is so near to precession (Hz) for so long (s), see docs/learned.md."""
 NARROWEST = 1e-4  # Of "lateral": nearer to zero the side motion is lost before it grows by currents
 Course = Mapping[str, Array]  # What becomes of n trajectories, by name, see `simulated`
 
@@ -204,14 +200,10 @@ Course = Mapping[str, Array]  # What becomes of n trajectories, by name, see `si
 def simulated(
     surrogate: Surrogate, inputs: Array, frequency: Array, spin: Array, strengths: Array, longest: Array
 ) -> Course:
-    """Trajectories of n rotors, in the units of the surrogate's scenes.
+    """Trajectories of n rotors of a `surrogate`'s kind, in the units of its scenes, with `inputs` (n, input).
 
-    Parameters
-    ----------
-    surrogate, inputs : of their kind, and (n, input) of the rotors
-    frequency, spin : (n,) Hz, and of the body at release
-    strengths : (n, 4) of the floater's currents, the magnets', the steel's and air, over the surrogate's
-    longest : (n,) how long they are followed, s
+    At a `frequency` (n,) Hz and a `spin` (n,) of the body at release, followed for the `longest` time (n,) s;
+    `strengths` (n, 4) are of the floater's currents, the magnets', the steel's and air, over the surrogate's.
 
     Returns
     -------
@@ -274,7 +266,7 @@ def simulated(
 
 
 def _first(values: Array, where: NDArray[np.bool_]) -> Array:
-    """The first value (n,) of each row (n, k) at which something holds; that of the beginning where it never does."""
+    """The value (n,) of each row (n, k) where something is first so; that of the beginning where it never is."""
     return np.asarray(np.take_along_axis(values, np.argmax(where, axis=1)[:, None], 1)[:, 0])
 
 
@@ -290,12 +282,12 @@ TIMES = 0.1  # Of the logarithm of computed times
 SOFT = 0.003  # Of the logarithm of frequencies, which the article gives in whole Hz
 REPORTED = 0.1  # Of the logarithm of a made-up time
 DAY, SHORTEST = 86400.0, 3.0  # Longest trajectory of the experiment, and the shortest that counts, s
+# Probability that all launches fail below a rotor that can levitate a floater: about half are captured (`capture`)
 NOT_CAPTURED = 0.05
-"""Probability that all launches fail below a rotor that can levitate a floater: about half are captured (`capture`)."""
 Values = Mapping[str, Array]
 Flight = tuple[str, float, float, float]  # Kind of rotor, its δx or δz (mm), frequency (Hz) and longest time (s)
+# Strengths, and the effect that each belongs to
 PARTS = (("floater", "floater"), ("magnets", "rotor"), ("steel", "rotor"), ("air", "air"))
-"""Strengths, and the effect that each belongs to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,8 +365,8 @@ def _rotor(values: Values, kind: str, distance: float) -> dict[str, Array]:
         along = np.cos(np.radians(values["direction"]))
         return {"displacement": values["displacement"] * along, "tilt": values["tilt"]}
     if distance == 14.0:
-        own = {"displacement": "stack_displacement", "tilt": "stack_tilt", "stack": "stack"}
-        return {name: values[of] for name, of in own.items()}
+        moved, tilt, stack = (values[name] for name in ("stack_displacement", "stack_tilt", "stack"))
+        return {"displacement": moved, "tilt": tilt, "stack": stack}
     every = values[f"tilt_{distance:g}"]
     return {"displacement": 0 * every, "tilt": every, "stack": np.full_like(every, distance)}
 
@@ -411,15 +403,13 @@ def ended(flight: Flight, way: str, lasted: float | None = None) -> Likelihood:
         found = trials.ends(flight)[way]
         if lasted is None:
             return found
-        off = _logarithm(trials.courses[flight]["fall"]) - np.log(lasted)
-        return np.asarray(found * np.exp(-0.5 * (off / REPORTED) ** 2))
+        return found * _likely(_logarithm(trials.courses[flight]["fall"]), np.log(lasted), REPORTED)
 
     return likelihood
 
 
-def _third(trials: Trials) -> Array:
-    ratio = 115.0 / 50.0 * np.exp(trials.courses[LOWEST]["margin"] - trials.courses[LOW]["margin"])
-    return np.asarray(np.exp(-0.5 * ((ratio - 3.0) / 0.3) ** 2))
+def _likely(value: Array, reported: float, deviation: float) -> Array:
+    return np.asarray(np.exp(-0.5 * ((value - reported) / deviation) ** 2))
 
 
 def _circle(trials: Trials) -> Array:
@@ -455,7 +445,9 @@ FACTS = {
     "24 h at 60 Hz": Fact("δz = 14 mm levitated for 24 hours at 60 Hz", (ENDLESS,), ended(ENDLESS, "stays")),
     "below 50 Hz": Fact("levitation below 50 Hz (δz = 10 mm)", (LOWEST,), lambda t: 1 - t.ends(LOWEST)["nothing"]),
     "a third": Fact(
-        "the lowest frequency is lowered by a factor of 3 (δz = 10 mm against δx = 1 mm)", (LOW, LOWEST), _third
+        "the lowest frequency is lowered by a factor of 3 (δz = 10 mm against δx = 1 mm)",
+        (LOW, LOWEST),
+        lambda t: _likely(2.3 * np.exp(t.courses[LOWEST]["margin"] - t.courses[LOW]["margin"]), 3.0, 0.3),
     ),
     "peak": Fact("levitation time declines faster above its peak than it rises below", (LOW, BEYOND), _peak),
     "side circle": Fact(
@@ -464,18 +456,17 @@ FACTS = {
     "never at 18 mm": _never(18.0),
     "never at 20 mm": _never(20.0),
 }
-EVEN, NORMAL, LOG = "even", "normal", "positive"
-"""Kinds of priors: even between two ends; normal with mean and deviation; logarithm normal, by median and deviation."""
+EVEN, NORMAL, LOG = "even", "normal", "positive"  # Kinds of priors, see `Unknown`
 
 
 class Unknown(NamedTuple):
     """One number that is not known."""
 
-    name: str  # its name in results, its unit, and what figures call it
+    name: str  # in results; its unit, and what figures call it
     unit: str
     symbol: str
-    prior: str  # kind
-    first: float  # ends; mean and deviation; or median and deviation of the logarithm
+    prior: str  # even between two ends; normal with mean and deviation; logarithm normal, by median and deviation
+    first: float
     second: float
     why: str  # where the range comes from
 
@@ -488,7 +479,7 @@ def quantile(prior: str, first: float, second: float, share: Array) -> Array:
     return np.asarray(first + deviation if prior == NORMAL else first * np.exp(deviation))
 
 
-ROWS: tuple[tuple[str, str, str, str, float, float, str], ...] = (
+ROWS = (
     ("displacement", "mm", "δx", NORMAL, 1.0, 0.3, "1 mm stated; 'sub-millimeter precision is required'"),
     ("tilt", "deg", "tilt of δx", NORMAL, 0.0, 2.0, "printed holder, glue, and magnetisation against the cube"),
     ("direction", "deg", "direction of δx", NORMAL, 0.0, 10.0, "of the displacement against the magnetisation"),

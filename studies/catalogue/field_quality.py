@@ -99,9 +99,8 @@ def _validity_lines(result: xr.Dataset) -> list[str]:
     distance, rows = 1e3 * result["distance"].values, []
 
     def reach(error: Array, level: float) -> str:
-        """The distance beyond which the error stays below a level, with a sign where that is not in the range."""
         found = last_crossing(distance, error, level)
-        if np.isnan(found):
+        if np.isnan(found):  # beyond the range
             return f">{distance[-1]:.1f}"
         return f"<{found:.1f}" if found == distance[0] else f"{found:.1f}"
 
@@ -143,13 +142,12 @@ DIPOLE_VALIDITY = study_of_one(
 
 # Rotors whose field is hard to compute, and how fine an independent solution must be to judge a table of them.
 CUBE = (EDGE, EDGE, EDGE)
-CONTACT = FLOATER.radius
-"""The floater's radius (m): it touches a face of the cube when their centres are 11.35 mm apart."""
+CONTACT = FLOATER.radius  # m; it touches a face of the cube when their centres are 11.35 mm apart
 OTHER_MESH = MeshSettings(ball_radius=1.2, magnet_size=0.6, hp_layers=2, hp_factor=0.2, curve_order=8)
+# Near an edge of a very permeable magnet the field grows as r^-1/3, not as log r
 MORE_LAYERS = replace(OTHER_MESH, hp_layers=4, hp_factor=0.15, magnet_size=0.4)
-"""Near an edge of a very permeable magnet the field grows as r^-1/3, not as log r."""
+# Small elements in the air between magnets, where layers at their edges must match
 BESIDE_EACH_OTHER = replace(OTHER_MESH, magnet_size=0.8, air_size=0.4)
-"""Small elements in the air between magnets, where layers at their edges must match."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +163,6 @@ class HardCase:
 
     @property
     def clearance(self) -> float:
-        """Distance from the faces from which on the tolerance holds, m."""
         return Accuracy(nearest=self.nearest).clearance(self.magnets)
 
 
@@ -219,8 +216,8 @@ CASES = {
 RTOL = 1e-5
 FARTHEST = 1.0
 DEGREE = 33  # Of the reference's expansions
+# Of the reference's open boundary: a ball of 1.2 radii leaves (1/1.2)^(2 · 20 + 1), 6e-4 of what degree 20 adds
 BOUNDARY_DEGREE = 20
-"""Of the reference's open boundary: a ball of 1.2 radii leaves (1/1.2)^(2 · 20 + 1), 6e-4 of what degree 20 adds."""
 OBLIQUE_NODES = 192  # Of the reference's rules for boxes that touch without being parallel
 FINER_CELLS = 0.8  # Of the reference's expansions of round magnets: they converge from nearer on than the table's
 PLACES = 12  # Distances from the faces, from the case's own nearest one to `FARTHEST`
@@ -261,10 +258,10 @@ def case_errors(case: HardCase, places: int) -> xr.Dataset:
     before, truth = reference(case, np.concatenate(points))
     ends = np.cumsum([len(p) for p in points])[:-1]
     rows = []
-    for places_there, lower, exact in zip(points, np.split(before, ends), np.split(truth, ends), strict=True):
-        scale = typical_field(case.magnets, places_there)
-        true, own = (np.linalg.norm(b - exact, axis=1) / scale for b in (field.evaluate(places_there)[0], lower))
-        stated = field.absolute_error(places_there)[0] / scale + ROUND_OFF
+    for there, lower, exact in zip(points, np.split(before, ends), np.split(truth, ends), strict=True):
+        scale = typical_field(case.magnets, there)
+        true, own = (np.linalg.norm(b - exact, axis=1) / scale for b in (field.evaluate(there)[0], lower))
+        stated = field.absolute_error(there)[0] / scale + ROUND_OFF
         rows.append((true.max(), stated.max(), own.max(), (true / (stated + own)).max()))
     found = {key: field.provenance[key] for key in ("order", "unknowns")}
     found |= dict(zip(ERRORS, np.array(rows).T, strict=True)) | {"distance": distance, "seconds": seconds}
@@ -294,13 +291,14 @@ def reference(case: HardCase, points: Array) -> tuple[Array, Array]:
     nodes = OBLIQUE_NODES if oblique_contact([magnet.box for magnet in case.magnets]) else None
     cells = [cells_of(piece.body, FINER_CELLS * case.clearance) for whole in pieces for piece in whole]
     closed = added_by_closed_form(pieces, case.magnets, carriers, DEGREE, nodes, cells)
-    fields = []
-    for order in (case.order - 1, case.order):
+
+    def total(order: int) -> Array:
         refinement = Refinement(order, case.mesh, BOUNDARY_DEGREE)
         found = solve_rotor(case.magnets, refinement, "split", DEGREE, pieces, carriers=carriers, cells=cells)
         parts = found.expansions([a + b for a, b in zip(closed, found.coefficients, strict=True)])
-        fields.append(remanent + sum(part.evaluate(points)[0] for part in parts))
-    return fields[0], fields[1]
+        return np.asarray(remanent + sum(part.evaluate(points)[0] for part in parts))
+
+    return total(case.order - 1), total(case.order)
 
 
 LINES = {

@@ -48,8 +48,7 @@ COLUMNS: Columns = {
     "low_kind": (("model",), "", "what is at the lower end"),
     "high_kind": (("model",), "", "what is at the upper end"),
 }
-RTOL, COARSE = 1e-5, 1e-4
-"""Accuracy of the finite elements, and of those whose distance from them is the error estimate."""
+RTOL, COARSE = 1e-5, 1e-4  # Accuracy of finite elements, and of those whose distance from them is the error estimate
 ROUND_OFF = 1e-10  # Relative error of what needs no finite elements
 
 
@@ -80,8 +79,8 @@ def dipole_vs_fem(point: Point) -> xr.Dataset:
     found: dict[str, Any] = {"frequency": grid}
     for name in QUANTITIES:
         found |= {name: [rows[m][name] for m in MODELS], f"{name}_error": [errors[m][name] for m in MODELS]}
-    for end in ("low", "high"):
-        found[f"{end}_kind"] = [getattr(ranges[model], end).kind for model in MODELS]
+    kinds = [(ranges[model].low.kind, ranges[model].high.kind) for model in MODELS]
+    found["low_kind"], found["high_kind"] = zip(*kinds, strict=True)
     return recorded(point, COLUMNS, found, {"model": list(MODELS), "mode": list(MODES)})
 
 
@@ -101,8 +100,8 @@ CAUSES = {
     "mutual magnetisation": ("fem", "mutual"),
 }  # What lies between two models
 TOTAL = ("article", "mutual")
+# Upper ends that are no loss of stability
 ENDS = {"contact": ("v", "contact with the rotor"), "border": ("^", "beyond this frequency")}
-"""Upper ends that are no loss of stability."""
 
 
 def change(result: xr.Dataset, name: str, models: tuple[str, str]) -> tuple[xr.DataArray, xr.DataArray]:
@@ -221,12 +220,9 @@ FORCE_PARTS = ("rigid", "floater_answer", "rotor_answer", "total")
 def floater_permeability(scene: Scene, distances: Sequence[float] | None = None, quick: bool = False) -> xr.Dataset:
     """Rigid dipole against mutual magnetisation, on the axis below the rotor and at the stable equilibrium.
 
-    At `distances` below the rotor's origin (m; by default from contact to 50 mm; `quick` has fewer, and fewer nodes).
-    The moment points as it does in synchronous motion (body spin 0, torques balanced) at that distance, followed from
-    the stable equilibrium (along -x if there is none), fixed where no balance is near.
-
-    Over `distance` force and torque by part with error, and the relative error of the rigid dipole; over `level` and
-    `quantity` the distance from which on that is good to the level; and the shift of the equilibrium.
+    At `distances` below the origin of the `scene`'s rotor (m; by default from contact to 50 mm; `quick` has fewer, and
+    fewer nodes). The moment points as it does in synchronous motion (body spin 0, torques balanced) there, followed
+    from the stable equilibrium (along -x if there is none), fixed where no balance is near.
     """
     rotors = [ChargeResponse(scene.rotor, nodes) for nodes in ((10, 14) if quick else (16, 24))]
     alone = Levitation(scene, Models("auto", "none", 1e-4 if quick else 1e-6, interaction="rigid"))
@@ -272,10 +268,7 @@ def missed(rotors: Sequence[ChargeResponse], floater: Floater, places: Array, di
 
 
 def sufficient(dataset: xr.Dataset) -> xr.Dataset:
-    """Distance from which on the rigid dipole is good to each level, NaN if that is beyond the last one.
-
-    Between computed distances by interpolation of logarithms; the error is added to what is missed.
-    """
+    """Distance from which on the rigid dipole is good to each level with its error, NaN if beyond the last one."""
     rising, quantities = dataset.sortby("distance"), ["force", "torque"]
     shares = [(rising[f"{name}_missed"] + rising[f"{name}_missed_error"]).values for name in quantities]
     rows = [[showing.last_crossing(rising["distance"].values, share, level) for level in LEVELS] for share in shares]
@@ -320,11 +313,8 @@ def shifted(rotors: Sequence[ChargeResponse], scene: Scene, balance: Balance, st
     return xr.Dataset(columns(SHIFTED, found), {"axis": list(AXIS)})
 
 
-LABELS = {
-    "floater_answer": "floater magnetised by the rotor",
-    "rotor_answer": "rotor magnetised by the floater",
-    "total": "both",
-}
+LABELS = {"floater_answer": "floater magnetised by the rotor", "rotor_answer": "rotor magnetised by the floater"}
+LABELS["total"] = "both"
 
 
 @drawn

@@ -82,11 +82,9 @@ def shape_figure(panel: Axes, rotor: xr.Dataset) -> None:
     panel.fill_between(aspect, low, high, color=PALETTE[0], alpha=0.2, lw=0, label="stable: discs and rods")
     for end in (low, high):
         panel.plot(aspect, end, "o-", color=PALETTE[0], ms=3, lw=1)
-    for shape, marker, color in ((CUBE, "s", PALETTE[1]), (SPHERE, "o", "k")):
-        one = parts[shape]
-        ends = [float(one[name].values[0]) for name in ("low", "high")]
-        where = [1.0, 1.0] if shape == SPHERE else [1.12, 1.12]
-        panel.plot(where, ends, marker + "-", color=color, mfc="white", ms=5, lw=1, label=f"stable: {shape}")
+    for shape, style, color, place in ((CUBE, "s-", PALETTE[1], 1.12), (SPHERE, "o-", "k", 1.0)):
+        ends = [float(parts[shape][name].values[0]) for name in ("low", "high")]
+        panel.plot([place] * 2, ends, style, color=color, mfc="white", ms=5, lw=1, label=f"stable: {shape}")
     panel.set_xscale("log")
     panel.set_xticks([0.25, 0.5, 1, 2, 4], ["1:4", "1:2", "1:1", "2:1", "4:1"])
     panel.minorticks_off()

@@ -174,8 +174,9 @@ def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     return xr.concat(cases, "case", data_vars="all", coords="different", compat="equals", join="outer")
 
 
-MARKS = "voX^|"  # Of the outcomes, and what these are called in a legend
-MEANINGS = ("touches the rotor", "lost at the fold", "lost in oscillations", "levitates for 250 s", "no equilibrium")
+# Of the outcomes, and what these are called in a legend
+MARKS = {"v": "touches the rotor", "o": "lost at the fold", "X": "lost in oscillations", "^": "levitates for 250 s"}
+MARKS["|"] = "no equilibrium"
 BANDS = {
     "displacement": "displacement ±0.2 mm, ±0.5 mm or ±0.5°",
     "spin": "spin at release ±0.1",
@@ -217,7 +218,7 @@ def times_figure(panel: Axes, rotor: xr.Dataset) -> None:
             panel.plot(frequency, time.sel(variant=name), dashes, color="0.25", lw=1, label=label)
     nominal, outcome = (rotor[name].sel(variant="nominal") for name in ("levitation_time", "outcome"))
     panel.plot(frequency, nominal, color=PALETTE[0], lw=1.6, label="nominal")
-    for number, (mark, words) in enumerate(zip(MARKS, MEANINGS, strict=True)):
+    for number, (mark, words) in enumerate(MARKS.items()):
         if (outcome == number).any():
             panel.plot(frequency, nominal.where(outcome == number), mark, color=PALETTE[0], ms=3.5, label=words)
     for there, end in REPORTED.get(rotor["case"].item(), {}).items():
@@ -236,7 +237,7 @@ def flights_figure(result: xr.Dataset) -> Figure:
         for k, color in zip(shown, PALETTE, strict=False):
             time, distance = nominal["flight_time"][k], 1e3 * nominal["flight_distance"][k]
             panel.plot(time, distance, color=color, label=f"{frequency[k]:.3g} Hz")
-            panel.plot(time[-1], distance[-1], MARKS[int(nominal["outcome"][k])], color=color, ms=4)
+            panel.plot(time[-1], distance[-1], list(MARKS)[int(nominal["outcome"][k])], color=color, ms=4)
         if len(shown):
             panel.legend(ncols=2)
         low, high = panel.get_ylim()

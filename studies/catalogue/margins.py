@@ -76,13 +76,9 @@ def parameters_of(configuration: str) -> list[Known]:
 
 
 def scene_of(configuration: str, measure: float, frequency: float = 100.0) -> Scene:
-    """The scene of a rotor (mm or °) of μr = 1 in vacuum with all else as it should be, at a frequency in Hz."""
-    cube = {"edge_mm": 10.0, "remanence_T": article.REMANENCE, "recoil_permeability": 1.0}
-    rotor = {
-        "configuration": configuration,
-        parameters_of(configuration)[0].key.removeprefix("rotor."): measure,
-        **cube,
-    }
+    """The scene of a rotor of a `configuration` and `measure`, of μr = 1, in vacuum at a `frequency` in Hz."""
+    rotor: dict[str, Any] = {"edge_mm": 10.0, "remanence_T": article.REMANENCE, "recoil_permeability": 1.0}
+    rotor |= {"configuration": configuration, parameters_of(configuration)[0].key.removeprefix("rotor."): measure}
     ball = sphere(diameter_mm=12.7, remanence_T=article.REMANENCE, density_kg_m3=7500.0)
     still = {"linear_N_s_m": 0.0, "angular_N_m_s": 0.0}
     return written_scene(frequency_hz=frequency, rotor=rotor, floater=ball, drag=still)
@@ -171,8 +167,7 @@ def sensitivity(point: Point) -> xr.Dataset:
 
 
 MIDDLE = QUANTITIES[3]
-SCALES = {"lowest": (1.0, "Hz"), "highest": (1.0, "Hz"), MIDDLE: (1e3, "mm")}
-"""Quantities of the report, with scale and unit."""
+SCALES = {"lowest": (1.0, "Hz"), "highest": (1.0, "Hz"), MIDDLE: (1e3, "mm")}  # Of the report, with scale and unit
 PERCENTILES = (5, 95)
 BANDS = f"{PERCENTILES[0]} to {PERCENTILES[1]} % of the rotors"
 
@@ -221,10 +216,9 @@ def _bands_figure(result: xr.Dataset, quantities: Sequence[str], words: str) -> 
 
 
 def _sensitivity_lines(result: xr.Dataset) -> list[str]:
-    rotors = [(head, rotor.isel(case=0)) for head, rotor in showing.by_rotor(result)]
     names = [known.words for known in PARAMETERS.values()]
     slopes, bands, leading, leans = [], [], [], []
-    for head, one in rotors:
+    for head, one in showing.rotor_cases(result):
         slope, doubt = (one[name].sel(parameter="measure").values for name in ("derivative", "derivative_error"))
         slopes.append((head, *map(showing.uncertain, slope[:2], doubt[:2]), *(1e3 * slope[2:])))
         bands.append((head, *("{:.2f} ({:.2f} to {:.2f})".format(*band(one, name)) for name in SCALES)))

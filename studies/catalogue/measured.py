@@ -28,7 +28,7 @@ from ...fem.plate.floating import FloatingModes, Levitated, floating_modes, mode
 from ...fem.plate.slab import Slab, drag_and_lift
 from ...geometry.common import MU_0, Array
 from ...geometry.meshes.plate import MeshRule, plate_mesh
-from ...geometry.scene.contents import Coil, Plate, Scene
+from ...geometry.scene.contents import Plate, Scene
 from ...geometry.scene.making import assemble, sphere
 from ...geometry.shapes import Box, Sphere, ring
 from ..figures.style import PALETTE, drawn, panels
@@ -71,15 +71,10 @@ def resting_height(scene: Scene, modes: FloatingModes) -> float:
 
 def in_phase(scene: Scene, phase: float) -> Scene:
     """The scene with another phase (rad) of all currents at the start."""
-    return _with_coils(scene, *(replace(coil, phase=phase) for coil in scene.coils))
-
-
-def _with_coils(scene: Scene, *coils: Coil) -> Scene:
-    return replace(scene, coils=coils)
+    return replace(scene, coils=tuple(replace(coil, phase=phase) for coil in scene.coils))
 
 
 def _modes(scene: Scene, order: int, heights: tuple[float, float] | None = None) -> FloatingModes:
-    """Modes of a scene's disc over its coils by finite elements of an order, and of one order less for the error."""
     (disc,), coils = scene.floater.bodies, scene.coils
     over = Levitated(disc, ALUMINIUM, coils, conductor.Supply(coils).shares, coils[0].frequency)
     return floating_modes(over, heights or conductor.heights_over(scene), order=order)
@@ -87,24 +82,25 @@ def _modes(scene: Scene, order: int, heights: tuple[float, float] | None = None)
 
 def _sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple[str, float]]:
     """What changes of one thing do to the height at rest, m; those that need other modes if not `quick`."""
-    floater, (inner, outer), base = scene.floater, scene.coils, resting_height(scene, modes)
+    floater, coils, base = scene.floater, scene.coils, resting_height(scene, modes)
     raised = modes.heights[0] + 1e-4, modes.heights[1] + 1e-4
     changes: dict[str, tuple[Scene, FloatingModes]] = {
         "conductivity of the disc +1 %": (scene, replace(modes, rates=1 / 1.01 * modes.rates)),
         "disc 10 K warmer": (scene, replace(modes, rates=(1 + 10 * WARMING) * modes.rates)),
         "mass of the disc -1 %": (replace(scene, floater=replace(floater, density=0.99 * floater.density)), modes),
-        "both currents +1 %": (_with_coils(scene, *(replace(c, current=1.01 * c.current) for c in scene.coils)), modes),
+        "both currents +1 %": (replace(scene, coils=tuple(replace(c, current=1.01 * c.current) for c in coils)), modes),
         "windings 0.1 mm higher in their frame": (scene, replace(modes, heights=raised)),
         "phase of the current at the start +90°": (in_phase(scene, np.pi / 2), modes),
     }
     found = [(name, resting_height(*changed) - base) for name, changed in changes.items()]
     if quick:
         return found
+    wider = replace(coils[0], radius=coils[0].radius + 1e-4), *coils[1:]
     variants = {
         "finite elements of order 3 instead of 4": scene,
         "thickness of the disc +1 %": team28(3.03),
-        "radius of the inner coil +0.1 mm": _with_coils(scene, replace(inner, radius=inner.radius + 1e-4), outer),
-        "windings a tenth as wide": _with_coils(scene, *(replace(c, width=c.width / 10) for c in scene.coils)),
+        "radius of the inner coil +0.1 mm": replace(scene, coils=wider),
+        "windings a tenth as wide": replace(scene, coils=tuple(replace(c, width=c.width / 10) for c in coils)),
     }
     rests = [resting_height(other, _modes(other, 3, modes.heights)) for other in variants.values()]
     before = [base, *[rests[0]] * (len(rests) - 1)]  # the others are compared on the same order
@@ -138,8 +134,8 @@ def swing_errors(time: Array, height: Array) -> Array:
     return np.asarray(np.std(swings, axis=0))
 
 
-def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of problem 28, and the trajectory's data."""
+def team28_rows(quick: bool) -> tuple[list[Row], xr.Dataset]:
+    """Rows of problem 28, and the trajectory."""
     scene = team28()
     modes = _modes(scene, 3 if quick else 4)
     half = float(scene.floater.bodies[0].half_edges[2])
@@ -161,14 +157,11 @@ def team28_rows(quick: bool) -> tuple[list[Row], dict[str, Any]]:
         ("TEAM 28: period", "measurement", period, our_period, of_period, "s", read_period, drawn),
         ("TEAM 28: decay rate", "measurement", decay, our_decay, of_decay, "1/s", read_decay, drawn),
     ]
-    changes, shifts = zip(*_sensitivities(scene, modes, quick), strict=True)
-    data = {
-        "change": list(changes), "shift": np.array(shifts), "missing": rest - computed,
-        "time": time, "measured_height": measured, "computed_height": below[best], "phase": phases,
-        "rms": np.array(errors), "height": computed, "energy_error": max(motion.energy_error for motion in motions),
-        "seconds": max(motion.seconds for motion in motions), "heat": motions[best].heat[-1],
-    }  # fmt: skip
-    return rows, data
+    data = columns(TRAJECTORY, (measured, below[best], *zip(*_sensitivities(scene, modes, quick), strict=True), errors))
+    axes = {"time": variable(("time",), time, "s", "time"), "phase": variable(("phase",), phases, "rad", "phase")}
+    said = {"height": computed, "missing": rest - computed, "heat": float(motions[best].heat[-1])}
+    said |= {name: float(max(getattr(motion, name) for motion in motions)) for name in ("energy_error", "seconds")}
+    return rows, xr.Dataset(data, axes, said)
 
 
 def spinning_sphere(quick: bool) -> list[Row]:
@@ -185,14 +178,14 @@ def losses(quick: bool) -> list[Row]:
     """What a dipole loses beside a sphere and in a tube."""
     rows: list[Row] = []
     radius, frequency, inner, outer = 0.01, 50.0, 0.01, 0.0125
-    place = 1.6 * radius
-    for name, kind, exact, body, metal, at in (
-        ("beside a sphere", "closed form", sphere_reaction(radius, ALUMINIUM, frequency, place), Sphere(radius),
-         ALUMINIUM, place),
-        ("in a copper tube", "series", tube_reaction(inner, outer, COPPER, frequency),
-         ring(outer, inner, 14 * inner), COPPER, 0.0),
-    ):  # fmt: skip
-        made = plate_reaction(Plate(body, metal), [[0.0, 0.0, at]], frequency, 1e-3)
+    place, tube = 1.6 * radius, Plate(ring(outer, inner, 14 * inner), COPPER)
+    beside = sphere_reaction(radius, ALUMINIUM, frequency, place), Plate(Sphere(radius), ALUMINIUM), place
+    within = tube_reaction(inner, outer, COPPER, frequency), tube, 0.0
+    for name, kind, (exact, body, at) in (
+        ("beside a sphere", "closed form", beside),
+        ("in a copper tube", "series", within),
+    ):
+        made = plate_reaction(body, [[0.0, 0.0, at]], frequency, 1e-3)
         size, found = float(made.error_estimate[0] * abs(exact)), complex(made.tensors[0, 2, 2])
         rows.append((f"dipole {name}, 50 Hz: loss", kind, -exact.imag, -found.imag, size, "T/(A m²)", *EXACT))
     return rows
@@ -216,11 +209,10 @@ def falling_magnet() -> tuple[Row, conductor.ConductorMotion]:
         motion = conductor.conductor_motion(scene, modes, 10.0)
         middle = np.abs(motion.height) < inner / 2
         speeds.append(float(np.ptp(motion.height[middle]) / np.ptp(motion.time[middle])))
-    weight, moment = scene.floater.mass * GRAVITY, scene.floater.moment
-    exact = brentq(lambda v: moment**2 * tube_drag(inner, outer, COPPER, v) - weight, 1e-3, 1.0)
+    exact = _falling(scene.floater.moment, scene.floater.mass, inner, outer)
     name = "magnet that falls in a copper tube: terminal speed"
     uneven = float(np.ptp(motion.velocity[middle, 2])) / 2  # along an endless tube the speed is the same
-    return (name, "series", float(exact), speeds[1], abs(speeds[1] - speeds[0]) + uneven, "m/s", *EXACT), motion
+    return (name, "series", exact, speeds[1], abs(speeds[1] - speeds[0]) + uneven, "m/s", *EXACT), motion
 
 
 SMCO = (0.85, 1.05)  # Remanence of SmCo₅, T, by the makers' data; the one that fell was not measured
@@ -233,24 +225,22 @@ def measured_fall(quick: bool) -> list[Row]:
     """
     radius, height, mass, inner, outer = 6e-3, 10e-3, 9.3e-3, 6.5e-3, 7.5e-3
 
-    def speed(remanence: float) -> float:
-        moment = remanence / MU_0 * np.pi * radius**2 * height
-
-        def excess(v: float) -> float:
-            return moment**2 * tube_drag(inner, outer, COPPER, v, (radius, height)) - mass * GRAVITY
-
-        return float(brentq(excess, 1e-3, 1.0))
-
-    slow, fast = speed(SMCO[1]), speed(SMCO[0])
+    fast, middle, slow = (
+        _falling(remanence / MU_0 * np.pi * radius**2 * height, mass, inner, outer, (radius, height))
+        for remanence in (SMCO[0], sum(SMCO) / 2, SMCO[1])
+    )
     name = "SmCo magnet that falls in a copper tube: speed"
     read = 0.05 / 12.3**2, "half of the last digit of the published time, which has no error"
-    return [(name, "measurement", 1.0 / 12.3, speed(sum(SMCO) / 2), (fast - slow) / 2, "m/s", *read)]
+    return [(name, "measurement", 1.0 / 12.3, middle, (fast - slow) / 2, "m/s", *read)]
+
+
+def _falling(moment: float, mass: float, inner: float, outer: float, size: tuple[float, float] | None = None) -> float:
+    """Terminal speed, m/s, of a dipole, or a cylinder of a radius and a height, in a copper tube of two radii."""
+    return float(brentq(lambda v: moment**2 * tube_drag(inner, outer, COPPER, v, size) - mass * GRAVITY, 1e-3, 1.0))
 
 
 @dataclass(frozen=True)
-class _Moving:
-    """∂A/∂x of a vertical dipole of 1 A m²."""
-
+class _Moving:  # ∂A/∂x of a vertical dipole of 1 A m²
     position: Array
     step: float = 1e-5  # m; its square is 1e-6 of the height's
 
@@ -341,14 +331,8 @@ TEAM28_NAME = "TEAM problem 28"
 
 def compute(point: Point) -> xr.Dataset:
     """What is computed and what was measured of one experiment."""
-    if point["experiment"] == TEAM28_NAME:
-        rows, data = team28_rows(point["quick"])
-        axes = {"time": variable(("time",), data["time"], "s", "time"),
-                "phase": variable(("phase",), data["phase"], "rad", "phase")}  # fmt: skip
-        said = {name: float(data[name]) for name in ("height", "missing", "energy_error", "seconds", "heat")}
-        more = xr.Dataset(columns(TRAJECTORY, data), axes, said)
-    else:
-        rows, more = EXPERIMENTS[point["experiment"]](point["quick"]), xr.Dataset()
+    name, quick = point["experiment"], point["quick"]
+    rows, more = team28_rows(quick) if name == TEAM28_NAME else (EXPERIMENTS[name](quick), xr.Dataset())
     return more.assign(columns(COLUMNS, [[row[k] for row in rows] for k in range(len(COLUMNS))]))
 
 

@@ -131,15 +131,10 @@ def plate_damping(point: Point) -> xr.Dataset:
     row: dict[str, Any] = {name: point[name] for name in ("value", "sweep", "configuration")}
     row |= {"growth_without": [mode.growth_per_s for mode in start.modes], "rotor_frequency": alone.scene.frequency}
     if found := article.over_plate(alone, start, case.plate(start.position), case.model, RTOL):
-        beside, there, error = found
+        beside, there, row["error"] = found
         assert beside.plate is not None
-        row |= {
-            "growth": [mode.growth_per_s for mode in there.modes],
-            "frequency": [mode.frequency_hz for mode in there.modes],
-            "shift": there.position - start.position,
-            **plate_action(beside.scene, beside.plate, there),
-            "error": error,
-        }
+        row |= {"shift": there.position - start.position, **plate_action(beside.scene, beside.plate, there)}
+        row["growth"], row["frequency"] = zip(*((m.growth_per_s, m.frequency_hz) for m in there.modes), strict=True)
     data = columns(COLUMNS, row, mode=len(MODES), axis=len(AXIS))
     said = {"weight_N": alone.scene.floater.mass * 9.81, "plate_rtol": RTOL}
     return xr.Dataset(data, {"mode": list(MODES), "axis": list(AXIS)}, said).expand_dims("case")
@@ -185,7 +180,6 @@ def growth_figure(result: xr.Dataset, sweeps: Sequence[str]) -> Figure:
 
 
 def _damped(axes: Axes, x: ArrayLike, growth: xr.DataArray, error: ArrayLike, style: str, **look: Any) -> None:
-    """Damping rates with their errors, and as crosses the growth rates of what is not damped, on one log axis."""
     axes.errorbar(x, -growth.where(growth < 0), np.abs(growth) * error, fmt=style, ms=4, **look)
     axes.plot(x, growth.where(growth >= 0), "x", color=look["color"], ms=5)
     axes.set_yscale("log")
@@ -235,12 +229,11 @@ def _damping_lines(result: xr.Dataset) -> list[str]:
     rows = []
     for sweep in (*PLACES, *(place + REAL_PLATE for place in PLACES), "frequency", *ROTORS):
         for one in each_case(part_of(result, sweep)):
-            where, value = f"plate {1e3 * DISTANCE:g} mm below", float(one["value"])
+            where, value = f"plate {sweep}, face at {1e3 * float(one['value']):.1f} mm", float(one["value"])
             if sweep in ROTORS:
-                rotor = article.rotor_label(one["configuration"].item(), value)
-                where = f"{rotor}, plate {sweep.split(', ')[1]}"
-            elif sweep != "frequency":
-                where = f"plate {sweep}, face at {1e3 * value:.1f} mm"
+                where = f"{article.rotor_label(one['configuration'].item(), value)}, plate {sweep.split(', ')[1]}"
+            elif sweep == "frequency":
+                where = f"plate {1e3 * DISTANCE:g} mm below"
             cells, worst = ["no equilibrium", "", *[""] * len(MEANS)], float(one["growth"].max("mode"))
             if np.isfinite(worst):
                 mode = mode_words(one["mode"].values[int(one["growth"].argmax("mode"))])
@@ -297,24 +290,22 @@ CONDUCTIVITY = 3.526e7
 COIL = Racetrack(np.array([0.194, 0.100, 0.099]), (0.2, 0.2), 0.1, 0.025, 0.05, 2742.0)
 FREQUENCIES = (50.0, 200.0)
 CURVES = ("50 Hz, ωt = 0", "50 Hz, ωt = 90°", "200 Hz, ωt = 0", "200 Hz, ωt = 90°")
-FACES = (np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 18.0, 126.0, 294.0]), np.array([0.0, 19.0]))
-"""Faces of plate and hole across each axis, mm."""
+FACES = *(np.array([0.0, 18.0, 126.0, 294.0]),) * 2, np.array([0.0, 19.0])  # Of plate and hole across each axis, mm
 DRAWN = 97  # Places of the line at which it is computed to be drawn
 REACH = 1500.0  # Distance from the plate to the outer boundary, mm
 
 
-def team7_mesh(frequency: float, cell: float = 70.0, skin_share: float = 2.0, growth: float = 2.0) -> ConductorMesh:
-    """Structured mesh, finer at the plate's faces by the skin depth of a `frequency` (Hz).
+CELL, SKIN_SHARE, GROWTH = 70.0, 2.0, 2.0  # Largest cell, mm; part of the skin depth at a face, growing so much a mm
 
-    The largest `cell` in the plate is in mm; cells at a face have `skin_share` of the skin depth, and `growth` more a
-    mm away.
-    """
-    skin = skin_share * 1e3 * skin_depth(CONDUCTIVITY, frequency)
+
+def team7_mesh(frequency: float) -> ConductorMesh:
+    """Structured mesh, finer at the plate's faces by the skin depth of a `frequency` (Hz)."""
+    skin = SKIN_SHARE * 1e3 * skin_depth(CONDUCTIVITY, frequency)
 
     def size(coordinate: Array, faces: Array) -> Array:
-        near = growth * np.abs(coordinate[:, None] - faces).min(axis=1)
+        near = GROWTH * np.abs(coordinate[:, None] - faces).min(axis=1)
         inside = (coordinate > faces[0]) & (coordinate < faces[-1])
-        return np.asarray(np.where(inside, np.minimum(cell, skin + near), cell / 2 + near))
+        return np.asarray(np.where(inside, np.minimum(CELL, skin + near), CELL / 2 + near))
 
     lines = [graded_partition([f[0] - REACH, *f, f[-1] + REACH], partial(size, faces=f)) for f in FACES]
     plate = Block("plate", np.array([f[0] for f in FACES]), np.array([f[-1] for f in FACES]))

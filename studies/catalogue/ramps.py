@@ -39,17 +39,18 @@ def ramps(point: Point) -> xr.Dataset:
     stable = article.stable_frequencies(bare, alone.rates)
     low, high = stable.low.parameter, stable.high.parameter
     inside = min(INSIDE, (high - low) / 3)
-    lost, ended, work = np.full((2, len(RATES)), np.nan), np.full((2, len(RATES)), "", "U8"), np.zeros((2, len(RATES)))
-    for way, begin, end in ((0, low + inside, low - BELOW), (1, high - inside, high + ABOVE)):
+    rows = []
+    for begin, end in ((low + inside, low - BELOW), (high - inside, high + ABOVE)):
         start = at_frequency(bare, alone.rates, stable.near(begin), begin)
-        for k, rate in enumerate(RATES):
+        for rate in RATES:
             seconds = abs(end - begin) / rate
             scene = replace(kicked(whole.scene, start, KICK), drive=(DriveStep(end, seconds),))
             flight = simulate(scene, whole.interaction, seconds)
             assert flight.given is not None
-            lost[way, k] = np.nan if flight.lost_at_hz is None else flight.lost_at_hz
-            ended[way, k], work[way, k] = flight.ended_by, flight.given[-1, 1]
-    found = low, high, stable.low.kind, stable.high.kind, lost, ended, work
+            lost = np.nan if flight.lost_at_hz is None else flight.lost_at_hz
+            rows.append((lost, str(flight.ended_by), flight.given[-1, 1]))
+    flights = (np.reshape(column, (2, len(RATES))) for column in zip(*rows, strict=True))
+    found = low, high, stable.low.kind, stable.high.kind, *flights
     return recorded(point, COLUMNS, found, {"way": list(WAYS), "rate": ("rate", list(RATES), {"units": "Hz/s"})})
 
 

@@ -62,14 +62,13 @@ LASTING: Columns = {
 def map_points(quick: bool) -> list[Point]:
     """Rotors by their measures and models; trajectories and the plate for those whose levitation is known."""
     rotors = {name: (value,) for name, value in article.QUICK_ROTORS} if quick else MEASURES
-    return [
-        {
-            "configuration": c, "measure": m, "model": model, "with_plate": (2 if quick else 5) if known else 0,
-            **({} if quick else {"flights": known, "interaction": "auto"}),
-        }
-        for c, measures in rotors.items() for m in measures for model in article.MODELS
-        for known in [model == "fem" and m in article.CONFIGURATIONS[c].levitated]
-    ]  # fmt: skip
+    points: list[Point] = []
+    for c, m, model in ((c, m, model) for c, some in rotors.items() for m in some for model in article.MODELS):
+        known = model == "fem" and m in article.CONFIGURATIONS[c].levitated
+        more = {} if quick else {"flights": known, "interaction": "auto"}
+        with_plate = (2 if quick else 5) if known else 0
+        points.append({"configuration": c, "measure": m, "model": model, "with_plate": with_plate, **more})
+    return points
 
 
 def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
@@ -83,11 +82,11 @@ def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
         ranges = []
     rows, kinds = np.full((5, MOST), np.nan), np.full((2, MOST), "", dtype="U12")
     for k, run in enumerate(ranges[:MOST]):
-        ends = run.low, run.high
+        low, high = run.low, run.high
         # at a fold, or where the floater touches the rotor, no mode is the least stable but by round-off
-        leading = run.high.leading_hz if run.high.kind in (OSCILLATORY, REAL) else np.nan
-        rows[:, k] = [*(e.parameter for e in ends), *(e.distance for e in ends), leading]
-        kinds[:, k] = [e.kind for e in ends]
+        leading = high.leading_hz if high.kind in (OSCILLATORY, REAL) else np.nan
+        rows[:, k] = low.parameter, high.parameter, low.distance, high.distance, leading
+        kinds[:, k] = low.kind, high.kind
     plate = np.full((TRIED, 4), np.nan)
     if ranges and point["with_plate"]:
         plate[: point["with_plate"]] = _with_plate(levitation, ranges[0], point["with_plate"])
@@ -210,8 +209,7 @@ STABILITY_MAP = Study(
 # magnets do, and for displaced cubes one that also has the steel with which the article balances them.
 # Closed form of μr = 1, rigid floater with its own currents, real air.
 VARIANTS = ("does not conduct", "magnets conduct", "magnets and spacers conduct")
-STEEL_CONDUCTIVITY, STEEL_DENSITY, MAGNET_DENSITY = 1.4e6, 7900.0, 7500.0
-"""Of non-magnetic steel (AISI 304), S/m and kg/m³; of NdFeB."""
+STEEL_CONDUCTIVITY, STEEL_DENSITY, MAGNET_DENSITY = 1.4e6, 7900.0, 7500.0  # Of AISI 304, S/m and kg/m³; of NdFeB
 STEPS, LONGEST = 16, 3600.0  # Frequencies of trajectories; how long they are followed, s
 COLUMNS: Columns = {
     "low": ((), "Hz", "lowest stable frequency without losses"),
@@ -231,10 +229,8 @@ NUMBERS |= {f"{name}_hz": name for name in ENDS}
 
 
 def spacer(displacement: float) -> Conductor:
-    """A steel block as wide and deep as the cube, behind it, that puts the centre of mass on the axis.
-
-    With a displacement x and half an edge a the balance is ρ_m 2a x = ρ_s t (a - x + t/2) for its thickness t.
-    """
+    """A steel block as wide and deep as the cube, behind it, that puts the centre of mass on the axis."""
+    # with a displacement x and half an edge a the balance is ρ_m 2a x = ρ_s t (a - x + t/2) for its thickness t
     gap, load = article.EDGE / 2 - displacement, MAGNET_DENSITY / STEEL_DENSITY * article.EDGE * displacement
     thickness = np.sqrt(gap**2 + 2 * load) - gap
     center = np.array([-gap - thickness / 2, 0.0, 0.0])

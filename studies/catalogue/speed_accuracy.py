@@ -50,8 +50,7 @@ class Method(NamedTuple):
 
     family: str  # methods that differ only in one number, joined by a line in the figure
     problem: str  # "exact" (μr = 1) or "permeable" (μr = 1.05)
-    # takes the magnets and returns the table and its number of unknowns
-    build: Callable[[Magnets], tuple[FieldTable, int]]
+    build: Callable[[Magnets], tuple[FieldTable, int]]  # the table and its number of unknowns, from the magnets
 
 
 def _moments(degree: int, magnets: Magnets) -> tuple[FieldTable, int]:
@@ -140,12 +139,12 @@ TIMED_POINTS = 100_000
 
 
 class Measured(NamedTuple):
-    """One method: field and gradient at the points, and what they cost."""
+    """One method's field and gradient at the points, the largest error of B that it states (d,), and `COSTS`."""
 
     field: Array  # (d, n, 3) T and (d, n, 3, 3) T/m
     gradient: Array
-    stated: Array  # (d,) largest error of B that the table states
-    costs: dict[str, float]  # by name, see `COSTS`
+    stated: Array
+    costs: dict[str, float]
 
 
 COSTS: Columns = {
@@ -164,12 +163,10 @@ ERRORS: Columns = {
 
 
 def cube(problem: str) -> tuple[Magnet, ...]:
-    """The article's cube with the permeability of a problem."""
     return horizontal(0.0, EDGE, REMANENCE, PERMEABILITIES[problem])
 
 
-def sphere_points() -> Array:
-    """Points (d, 200, 3) m at the distances, all around the cube."""
+def sphere_points() -> Array:  # (d, 200, 3) m at the distances, all around the cube
     return np.array(DISTANCES)[:, None, None] * _directions(5, 200)
 
 
@@ -195,10 +192,8 @@ def measure(name: str, quick: bool, timed_points: int = TIMED_POINTS) -> Measure
 
 def _at_points(table: FieldTable) -> tuple[Array, Array, Array]:
     """B (d, n, 3), its gradient (d, n, 3, 3) and the largest relative error (d,) of B that is stated."""
-    points = sphere_points()
-    every, shape = points.reshape(-1, 3), points.shape
-    b, g = table.evaluate(every)
-    return b.reshape(shape), g.reshape(*shape, 3), table.relative_error(every)[0].reshape(shape[:2]).max(axis=1)
+    b, g = table.evaluate(points := sphere_points())
+    return b, g, table.relative_error(points)[0].max(axis=1)
 
 
 def _peak_memory() -> float:
@@ -235,7 +230,7 @@ ROUND_OFF = 1e-13  # What is stated of a model that has no error but that
 def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float | None = None) -> xr.Dataset:
     """Errors of B and of its gradient by method and distance, beside time, unknowns and memory.
 
-    Of the methods `names` (None: all), against a reference of tolerance `truth` (None: the study's own).
+    All or `quick`, or of `names`, against a reference of tolerance `truth` (None: the study's own).
     """
     import magpylib
 
