@@ -53,6 +53,7 @@ class Page:
         self.flying, self.ended = False, False
         self.drawn: tuple[str, str] = ("", "")
         self.lines: list[Array] = []
+        # what the page's reader can do, by its name in page.js
         self.does: dict[str, Callable[..., None]] = {
             "move": lambda name, value: self._become("changed", name, round(float(value), 9)),
             "choose": lambda name, value: self._become("with_query", {name: value}),
@@ -65,7 +66,6 @@ class Page:
             "put": lambda x, z: self._wish("put", (x, 0.0, z)),
             "reset": self._land,
         }
-        """What the page's reader can do, by its name in page.js."""
 
     def begin(self, preview: Shown | None, asked: Mapping[str, str]) -> None:
         """Show the state with its preview, if that is known, or another with what is `asked` in the page's address."""
@@ -86,15 +86,10 @@ class Page:
         self.begun, state = True, self.state
         names = ["dipole", "cuboid", "surface", "fem", *(["map"] if state.scene.field_map else [])]
         names += [state.model] if state.model not in names else []
-        self.tell(
-            controls={
-                "sliders": [vars(control) for control in controls(state)],
-                "models": {name: f"Field: {work.MODEL_WORDS.get(name, 'chosen by accuracy')}" for name in names},
-                "model": state.model,
-                "plate_models": PLATES if state.scene.plate is not None else {},
-                "plate_model": state.plate_model,
-            }
-        )
+        shown: dict[str, Any] = {"sliders": [vars(control) for control in controls(state)]}
+        shown["models"] = {name: f"Field: {work.MODEL_WORDS.get(name, 'chosen by accuracy')}" for name in names}
+        shown["plate_models"] = PLATES if state.scene.plate is not None else {}
+        self.tell(controls={**shown, "model": state.model, "plate_model": state.plate_model})
 
     def _become(self, method: str, *arguments: Any) -> None:
         """Ask for another state, by a method of the state at that time; of moves of one slider the last counts."""
@@ -109,7 +104,6 @@ class Page:
         return self.shown.places if self.shown else []
 
     def _became(self, is_other: bool, found: tuple[PageState, Shown | str]) -> None:
-        """The state is another: show its preview, and ask for all of it when it rests."""
         self.state, preview = found
         self.slow.stop()
         if is_other or not self.begun:
@@ -162,9 +156,8 @@ class Page:
     def _rest(self) -> None:
         self.tell(address=self.state.query())
         if self.shown and not all(one.known for one in self.shown.models):  # the plate can take far longer
-            self.slow.ask(
-                "preview", lambda: (work.preview, self.state, self.near, True), partial(self._answered, False)
-            )
+            receive = partial(self._answered, False)
+            self.slow.ask("preview", lambda: (work.preview, self.state, self.near, True), receive)
         self.slow.ask("", lambda: (work.complete, self.state), partial(self._answered, True))
         if not work.has_map(self.state):
             self._forget_map(NO_MAP)
@@ -244,21 +237,17 @@ class Page:
         """A floater that is dragged moves on; where it cannot be the page waits, so that the reason can be read."""
         self._take_off()
         call = work.wish, what, [1e-3 * float(part) for part in vector]
+        self.flyer.ask(object(), lambda: call, partial(self._flown, put=what == "put"))
 
-        def wished(frame: Frame) -> None:
-            self._flown(frame)
-            if what == "put":
-                self.tell(playing=not frame["message"])
-
-        self.flyer.ask(object(), lambda: call, wished)
-
-    def _flown(self, frame: Frame, piece: bool = False) -> None:
+    def _flown(self, frame: Frame, piece: bool = False, put: bool = False) -> None:
         self._sample(frame["samples"])
         self.ended = bool(frame["ended"])
         self.tell(
             says=frame["message"] or frame["ended"] or f"t = {frame['samples'][0, -1]:.4g} s",
             pose={**frame["pose"], "flying": True, "piece": piece, "ended": self.ended},
         )
+        if put:
+            self.tell(playing=not frame["message"])
 
     def _lost(self, message: str) -> None:
         self.tell(playing=False)

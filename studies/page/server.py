@@ -109,8 +109,7 @@ class LivePage:
         if self._over.is_set():
             return
         limits: dict[str, Any] = {"max_header_size": HEADER, "max_body_size": BODY}
-        limits |= {"idle_connection_timeout": PATIENCE, "body_timeout": PATIENCE}
-        http = _Lines(self._gate, **limits)
+        http = _Lines(self._gate, **limits, idle_connection_timeout=PATIENCE, body_timeout=PATIENCE)
         http.add_socket(self._listening)
         try:
             await self._over.wait()
@@ -125,8 +124,7 @@ def serve(scene: Scene, source: str = "scene", host: str = LOOPBACK, port: int =
     """Listen for browsers that ask for pages about a `scene`, which `run` serves; no files but its own are ever opened.
 
     `source` is its name in messages, `host` an address of this machine, `port` 0 for any that is free; `framed` pages
-    may be in a notebook. Raises InputError: a host or a port that cannot be, or a scene of which trajectories alone are
-    computed; ComputationError: the port is taken, or the address is not this machine's.
+    may be in a notebook. Raises InputError: a host, port or scene that cannot be; ComputationError: it cannot listen.
     """
     check_coils(levitating_scene(scene))
     check_between("port", port, PORTS)
@@ -170,22 +168,20 @@ class _Gate(Application):
             self.preview = preview(begin)
         self._token = token.encode()
         self._names = {name.lower() for name in ("localhost", host, socket.gethostname(), socket.getfqdn())}
-        self.guests: WeakSet[Any] = WeakSet()
-        """Streams of connections that were let in."""
+        self.guests: WeakSet[Any] = WeakSet()  # streams of connections that were let in
 
     def log_request(self, handler: RequestHandler) -> None:
         """Nothing: an address has the token."""
 
     def find_handler(self, request: HTTPServerRequest, **arguments: Any) -> Any:
         if status := self._refusal(request):
-            return self.get_handler_delegate(request, _Refused, {"status": status})
+            return self.get_handler_delegate(request, _Program, {"status": status})
         if request.path in PAGES:
             connection: Any = request.connection
             self.guests.add(connection.stream)
         return super().find_handler(request, **arguments)
 
     def _refusal(self, request: HTTPServerRequest) -> int:
-        """The status with which a request is sent away; 0 for one that is answered."""
         # Another name may lead to this machine, so that its owner's pages can read ours (DNS rebinding).
         try:
             name = urlsplit(f"//{request.host}").hostname or ""
@@ -209,6 +205,9 @@ class _Answer(RequestHandler):
 
 
 class _Program(_Answer):
+    def initialize(self, status: int = 200) -> None:
+        self.status = status
+
     def set_default_headers(self) -> None:
         ancestors = self.application.ancestors
         self.set_header("Content-Security-Policy", CONTENT + ancestors)
@@ -218,6 +217,12 @@ class _Program(_Answer):
         if ancestors == "'none'":
             self.set_header("X-Frame-Options", "DENY")
 
+    def prepare(self) -> None:
+        if self.status in REFUSALS:
+            self.set_status(self.status)
+            self.set_header("Content-Type", "text/plain; charset=utf-8")
+            self.finish(REFUSALS[self.status])
+
     def get(self) -> None:
         self.set_header("Content-Type", f"{PROGRAMS[self.request.path]}; charset=utf-8")
         self.finish(program(self.request.path))
@@ -225,20 +230,8 @@ class _Program(_Answer):
     head = get
 
 
-class _Refused(_Program):
-    def initialize(self, status: int) -> None:
-        self.status = status
-
-    def prepare(self) -> None:
-        self.set_status(self.status)
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish(REFUSALS[self.status])
-
-
 class _Line(_Answer, WebSocketHandler):
-    """Between a page in a browser and what is computed for it."""
-
-    page: Page | None = None
+    page: Page | None = None  # in a browser, for which this computes
 
     def check_origin(self, origin: str) -> bool:
         return True  # as the gate has found

@@ -26,8 +26,7 @@ MEASURES = {
     "tilt": ("angle_deg", "Tilt (°)", 0.0, 45.0),
 }  # What moves a rotor of the article
 PLATE_REACH = 20.0  # How far a plate whose middle is level with the rotor's can be moved, mm
-SIZES = {"edge_mm": "edge (mm)", "diameter_mm": "diameter (mm)", "height_mm": "height (mm)"}
-"""Titles of the sizes that rotor and floater may have, for their shape."""
+SIZES = {"edge_mm": "edge (mm)", "diameter_mm": "diameter (mm)", "height_mm": "height (mm)"}  # Of rotor and floater
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +67,7 @@ class PageState:
     def query(self) -> str:
         """The state as the text behind the question mark of an address."""
         parts = {"model": self.model, "plate_model": self.plate_model, "spin": json.dumps(self.spin)}
-        return urlencode(parts | dict(_flat(self.keys)))
+        return urlencode(parts | _flat(self.keys))
 
     def with_query(self, asked: Mapping[str, str]) -> "PageState":
         """The state of an address: of a whole scene, or one that changes what it names; its rotor or plate is whole.
@@ -113,15 +112,14 @@ def first_state(scene: Scene, source: str = "scene") -> PageState:
     return PageState(scene, model, "none" if scene.plate is None else "auto", source=source)
 
 
-def _flat(keys: Mapping[str, Any], table: str = "") -> list[tuple[str, str]]:
-    """Dotted keys and their values as texts; lists stay whole."""
-    found = []
+def _flat(keys: Mapping[str, Any], table: str = "") -> dict[str, str]:
+    """Values as texts by dotted keys; lists stay whole."""
+    found = dict[str, str]()
     for key, value in keys.items():
-        name = f"{table}.{key}".lstrip(".")
         if isinstance(value, Mapping):
-            found += _flat(value, name)
+            found |= _flat(value, f"{table}{key}.")
         else:
-            found.append((name, value if isinstance(value, str) else json.dumps(value)))
+            found[f"{table}{key}"] = value if isinstance(value, str) else json.dumps(value)
     return found
 
 

@@ -53,11 +53,11 @@ MODEL_WORDS = {
 PLATE_WORDS = {"none": "without the plate's eddy currents", "slab": "over the plate as an infinite slab"}
 PLATE_WORDS |= dict.fromkeys(("reduced", "fem"), "over the finite plate")
 HALVINGS = 6  # of a step of the map, until where its region of stability ends is known
+# Trajectories of the article whose frequency it gives: Hz, mm and what became of them
 ARTICLE_FLIGHTS = {
     "horizontal": ((115.0, 1.0, "fell"), (140.0, 1.0, "levitated for 250 s"), (150.0, 1.0, "lost in oscillations")),
     "vertical": ((60.0, 14.0, "levitated for 24 h"),),
 }
-"""Trajectories of the article whose frequency it gives: Hz, mm and what became of them."""
 MODE_COLUMNS = ("normal mode", "frequency (Hz)", "growth rate (s⁻¹)")
 FILES = {
     "toml": ("scene.toml", "text/plain"),
@@ -186,8 +186,8 @@ def _shown(state: PageState, known: Mapping[str, Levitation]) -> Shown:
         conditions.append("finite elements with mutual magnetisation of rotor and floater")
     modes = [(mode_words(m.name), f"{m.frequency_hz:.6g}", f"{m.growth_per_s:.6g}") for m in leading]
     z, x = np.meshgrid(*(np.arange(low, high + PIXEL / 2, PIXEL) for low, high in SLICE[::-1]), indexing="ij")
+    places = 1e-3 * np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
     with np.errstate(divide="ignore"):
-        places = 1e-3 * np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
         size = np.log10(np.linalg.norm(drawn_field(state.scene, first.table)(places), axis=1))
     # A byte a pixel: a slice is sent with every step of a slider.
     levels = np.clip(np.nan_to_num((size - WEAKEST) / -WEAKEST * 254, neginf=0.0), 0, 254)
@@ -248,8 +248,7 @@ def article_points(state: PageState) -> dict[str, Any]:
 def regions(state: PageState, spans: Sequence[tuple[float, float]], model: FieldModel, points: int) -> Regions:
     """Where something levitates stably without plate over `spans` of frequency (Hz) and measure (mm or °).
 
-    For a `state`, by a `model` of the field at so many `points` along each axis; magnets that move against each other
-    have the closed form. Raises ComputationError: the scene has no such map.
+    Of a `state`, by a `model` of the field at `points` along each axis. Raises ComputationError: it has no such map.
     """
     configuration = state.keys["rotor"]["configuration"]
     axes, key = [np.linspace(*span, points) for span in spans], f"rotor.{MEASURES[configuration][0]}"
@@ -288,13 +287,13 @@ def regions(state: PageState, spans: Sequence[tuple[float, float]], model: Field
 def _ends(found: EquilibriumMap) -> dict[tuple[tuple[int, int], ...], float]:
     """Where the stable equilibrium of a point of a map ends on the way (0 to 1) to a neighbour that has none."""
     stable = found.number[1] > 0
+    beside = np.pad(~stable, 1)  # nothing but False around the map
     pairs = [
-        (one, other)
-        for one in zip(*(index.tolist() for index in np.nonzero(stable)), strict=True)
-        for step in ((1, 0), (-1, 0), (0, 1), (0, -1))
-        if min(other := (one[0] + step[0], one[1] + step[1])) >= 0
-        and other[0] < stable.shape[0] and other[1] < stable.shape[1] and not stable[other]
-    ]  # fmt: skip
+        ((i, j), (i + down, j + right))
+        for i, j in np.argwhere(stable).tolist()
+        for down, right in ((1, 0), (-1, 0), (0, 1), (0, -1))
+        if beside[i + down + 1, j + right + 1]
+    ]
     if not pairs:
         return {}
     # Of several stable equilibria at a point the first (the list is reversed, and a later key replaces an earlier one).
@@ -321,11 +320,10 @@ def _ends(found: EquilibriumMap) -> dict[tuple[tuple[int, int], ...], float]:
     return dict(zip(pairs, ((low + high) / 2).tolist(), strict=True))
 
 
+# A moment of a trajectory: `samples` (3, n) since the last, time s, height mm, polar angle °; the floater's `pose`: its
+# position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's `angle`
+# (rad), how far the `plate` is lowered (mm); how the trajectory has `ended`; a `message` of what was wrong with a wish
 Frame: TypeAlias = "dict[str, Any]"
-"""A moment of a trajectory: `samples` (3, n) since the last, time s, height mm, polar angle °; the floater's `pose`,
-its position (3,) mm and moment along the laboratory's axes, the position as `seen` along the rotor's, the rotor's
-`angle`, rad, and how far the `plate` is lowered, mm; how the trajectory has `ended`, in words; a `message` of what was
-wrong with a wish."""
 _flights: list[LiveFlight] = []  # The one of this process
 
 

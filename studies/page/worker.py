@@ -10,7 +10,7 @@ import resource
 import signal
 import threading
 from collections.abc import Callable, Hashable
-from functools import cache, partial
+from functools import cache
 from multiprocessing import forkserver, resource_tracker, spawn
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext, ForkServerProcess
@@ -28,18 +28,17 @@ Call = Callable[[], tuple[Any, ...]]
 @cache
 def context() -> ForkServerContext:
     """Processes are copies of one that loads the numeric libraries from now on, and begin in hundredths of a second."""
-    found = multiprocessing.get_context("forkserver")
-    spawn.get_preparation_data = partial(_prepared, spawn.get_preparation_data)
+    found, known = multiprocessing.get_context("forkserver"), spawn.get_preparation_data
+
+    def prepared(name: str) -> dict[str, Any]:  # ours do not run the user's script, which may have no guard
+        return {key: value for key, value in known(name).items() if name != NAME or not key.startswith("init_main")}
+
+    spawn.get_preparation_data = prepared
     found.set_forkserver_preload([f"{__package__}.work"])
     with safe_path():
         resource_tracker.ensure_running()
         forkserver.ensure_running()
     return found
-
-
-def _prepared(known: Callable[[str], dict[str, Any]], name: str) -> dict[str, Any]:
-    """Set as a process begins: not to run the user's script once more, which may have no guard, if ours."""
-    return {key: value for key, value in known(name).items() if name != NAME or not key.startswith("init_main")}
 
 
 class Worker:
@@ -74,10 +73,9 @@ class Worker:
     def stop(self) -> None:
         """End the process, whatever it is doing, and forget all questions."""
         self._waiting.clear()
+        task, process, connection = self._task, self.process, self._connection
         # First of all: a signal may come in between, and who stops everything then must not find half of it.
-        task, self._task = self._task, None
-        process, self.process = self.process, None
-        connection, self._connection = self._connection, None
+        self._task = self.process = self._connection = None
         if task is not None:
             task.cancel()
         if connection is not None:

@@ -25,7 +25,7 @@ from spinlev.geometry.scene.contents import Drag
 from spinlev.geometry.scene.files import changed
 from spinlev.studies.candidates import Candidate
 from spinlev.studies.cli.main import run
-from spinlev.studies.gradient import Gradient, answer_of, derivatives_of, range_ends
+from spinlev.studies.gradient import Gradient, answer_of, derivative, range_ends
 from spinlev.studies.levitation import Levitation
 
 CUBE = {"edge_mm": 10.0, "remanence_T": 1.305}
@@ -377,5 +377,5 @@ def test_frequency_locked_equilibria_have_derivatives(plate, interaction):
             one = min(near, key=lambda e: np.abs(e.state.axes - known.state.axes).max())
             ends.append(np.concatenate([np.ravel(answer_of(one, name)) for name in names]))
         expected = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12e-3 * value)
-        found = np.concatenate([np.ravel(part) for part in derivatives_of(known, way, names)])
+        found = np.concatenate([np.ravel(derivative(known, way, name)) for name in names])
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-8 * np.abs(ends[0]).max() / value)
