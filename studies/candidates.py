@@ -40,10 +40,7 @@ Limits = Mapping[str, tuple[float, float]]  # least and most, by name
 
 
 def survey_near(levitation: Levitation, places: Array, moments: Array) -> Survey | None:
-    """What becomes of equilibria of a scene nearby at `places` (n, 3) m with `moments` (n, 3), without plate.
-
-    None where one of them is lost, or is no fixed point.
-    """
+    """A `levitation`'s equilibria from `places` (n, 3) m, `moments` (n, 3) nearby, without plate; None: one is lost."""
     scene, scales = levitation.scene, Scales.of(levitation.scene)
     if not scene.floater.is_sphere or np.any(scene.gravity[:2]):
         return None
@@ -86,11 +83,7 @@ class Candidate:
 
     @cached_property
     def ends(self) -> tuple[BranchPoint, BranchPoint]:
-        """Where stable levitation ends below and above the frequency, without plate.
-
-        Of a body that is not round for its mean, or for the frequency-locked equilibrium, of whose thirteen states all
-        six modes decide.
-        """
+        """Where stable levitation ends below and above the frequency, without plate; of other bodies for the mean."""
         whole = self.levitation.scene.floater.round or self.bare.kind == LOCKED
         followed = self.levitation if whole else self.levitation.mean
         scene = replace(followed.still, plate=None)
@@ -187,10 +180,6 @@ def _gap_mm(scene: Scene, known: Equilibrium) -> Array:
     return 1e3 * np.array([rotor_gap(scene, known.position, known.state.orientation)])
 
 
-def _pose(known: Equilibrium) -> Array:
-    return np.stack([known.position, known.state.moment])
-
-
 class Search:
     """Scenes that differ in numbers with ends `free`, by key, each with the equilibrium followed from the last."""
 
@@ -270,10 +259,11 @@ class Search:
             levitation = self._levitation(numbers)
             levitation.share(near.levitation, changed=True)
             bare, step = near.bare, numbers - begun
-            pose = _pose(bare)
+            place, moment = bare.position, bare.state.moment
             if "ways" in near.__dict__:  # where the tangent leads
-                pose = pose + sum(s * near.ways[key].of(_pose) for s, key in zip(step, self.keys, strict=True))
-            place, moment = pose
+                for one, way in zip(step, near.ways.values(), strict=True):
+                    place = place + one * way.of(lambda known: known.position)
+                    moment = moment + one * way.of(lambda known: known.state.moment)
             survey = survey_near(levitation, place[None], (moment / np.linalg.norm(moment))[None])
             if survey is not None:
                 if np.linalg.det(survey.equilibria[0].slope) * np.linalg.det(bare.slope) < 0:

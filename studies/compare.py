@@ -65,10 +65,9 @@ class Compared:
 
 
 def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:
-    """Levitation distances (mm) by `dipole`, dipole of the `true_moment` and the `best` model, without the plate.
+    """Levitation distances (mm) by `dipole`, one of the `true_moment` and the `best` model (its `name`), without plate.
 
-    Of the dipoles' equilibria those nearest to where the floater levitates by the best model, of this `name`, or else
-    where it does by the dipole; a model without any has None. None where neither has one.
+    Of the dipoles' equilibria those nearest to the best model's, or else the dipole's own; None where neither has one.
     """
     true = most_like_levitation(best.equilibria)
     rough = nearest_of(dipole.equilibria, true.position) if true else most_like_levitation(dipole.equilibria)

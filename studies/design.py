@@ -98,8 +98,7 @@ class _Problem:
             if np.isfinite(end)
         ]
         self.best: list[tuple[float, Candidate, Array]] = []  # scenes that meet all limits, with how well
-        # how many scenes were looked at when one was better by more than `SETTLED` or `NEARER`
-        self.kept = search.looked_at
+        self.kept = search.looked_at  # scenes when one was better by more than `SETTLED` or `NEARER`
         self.by = ""  # models, for a message
         self.missed = np.inf  # by how much limits were missed then, before one met them
         self.nearest = np.inf, ""  # by how much the limits are missed at least, and which
@@ -163,21 +162,19 @@ class _Problem:
         value = self.values(z, self.name)
         if known is None or value is None:
             return
-        missed = [(0.0, "")]
-        for row in self.rows:
-            far = self.excess(z, *row)
-            missed.append((float(np.max(np.abs(far) if row[3] else -far)), row[0]))
-        worst = max(missed)
-        if worst[0] < MET:
+        each = ((self.excess(z, *row), row) for row in self.rows)
+        missed = [(float(np.max(np.abs(far) if equal else -far)), name) for far, (name, _, _, equal) in each]
+        worst, which = max([(0.0, ""), *missed])
+        if worst < MET:
             reached = self.sense * float(value.min() if self.sense > 0 else value[0])
             if not self.best or reached > self.best[-1][0] + SETTLED * max(1.0, abs(reached)):
                 self.kept = self.search.looked_at
             if not self.best or reached > self.best[-1][0]:
                 self.best.append((reached, known, self.numbers(z)))
-        elif worst[0] < self.nearest[0]:
-            if not self.best and worst[0] < (1 - NEARER) * self.missed:
-                self.kept, self.missed = self.search.looked_at, worst[0]
-            self.nearest = worst[0], f": {worst[1]} is {known.values(worst[1]).min():.4g} where it is nearest to them"
+        elif worst < self.nearest[0]:
+            if not self.best and worst < (1 - NEARER) * self.missed:
+                self.kept, self.missed = self.search.looked_at, worst
+            self.nearest = worst, f": {which} is {known.values(which).min():.4g} where it is nearest to them"
 
     def solved(self) -> Best:
         search = self.search
@@ -201,10 +198,8 @@ class _Problem:
                 options={"maxiter": STEPS, "ftol": TOLERANCE},
             )  # fmt: skip
         if not self.best:
-            raise ComputationError(
-                f"No scene that was looked at{self.by} meets all limits{self.nearest[1]}. Give wider bounds, or other "
-                "limits."
-            )
+            said = f"No scene that was looked at{self.by} meets all limits{self.nearest[1]}."
+            raise ComputationError(f"{said} Give wider bounds, or other limits.")
         _, known, numbers = self.best[-1]
         search.go_on_from(known, numbers)
         return known, numbers
@@ -314,8 +309,7 @@ def checked_goals(
         raise refused("points", "be a number from 2 to 100", points)
     given = {} if limits is None else limits
     if not isinstance(given, Mapping):
-        said = "what a scene can be asked for"
-        raise refused("limits", f"be ranges by {said}", limits)
+        raise refused("limits", "be ranges by what a scene can be asked for", limits)
     check_names(given, MEASURES, "limits", "what a scene can be asked for")
     ends = {name: _range(f"limits.{name}", value) for name, value in given.items()}
     return [str(one) for one in wanted], checked_free(free, levitation), {**ALWAYS, **ends}
@@ -430,11 +424,8 @@ def _lines(result: xr.Dataset) -> list[str]:
     lines = []
     for k in range(result.sizes["point"]):
         one = result.isel(point=k)
-        changes = [
-            f"{key} = {float(number):.5g}" + (f" {unit}" if unit != "1" else "")
-            for key, number, unit in zip(result["key"].values, one["number"].values, result["unit"].values, strict=True)
-        ]
-        lines.append("; ".join(changes))
+        changes = zip(result["key"].values, one["number"].values, result["unit"].values, strict=True)
+        lines.append("; ".join(f"{key} = {number:.5g} {unit}".removesuffix(" 1") for key, number, unit in changes))
         rows = zip(MEASURES, one["value"].values, result["first_value"].values, strict=True)
         said = [f"{name} {value:.4g} (was {was:.4g})" for name, value, was in rows if np.isfinite(value)]
         lines.append(f"  {', '.join(said)}")
@@ -448,20 +439,19 @@ def design_figure(result: xr.Dataset) -> Figure:
     goals = [GOALS[name] for name in str(result.attrs["goals"]).split(", ")]
     count, (low, high) = result.sizes["point"], result["bound"].values.T
     places = np.arange(result.sizes["key"])[::-1]
-    first = (result["first_number"].values - low) / (high - low)
     if count > 1:
-        (one, _), (other, _) = goals
-        for panel, name, axis in ((left, other, "x"), (left, one, "y")):
-            panel.set(**{f"{axis}label": f"{MEASURES[name][1]} ({MEASURES[name][0]})"})
-        left.plot(result["value"].sel(measure=other), result["value"].sel(measure=one), "o-", color=PALETTE[0])
-        for key, color in zip(result["key"].values, PALETTE * 3, strict=False):
-            ends = result["bound"].sel(key=key).values
-            part = (result["number"].sel(key=key) - ends[0]) / (ends[1] - ends[0])
-            right.plot(result["value"].sel(measure=other), part, "o-", color=color, label=str(key))
-        right.set(xlabel=f"{MEASURES[other][1]} ({MEASURES[other][0]})", ylabel="number, from its least to its most")
+        along, up = (result["value"].sel(measure=name) for name, _ in goals[::-1])
+        words, other = (f"{MEASURES[name][1]} ({MEASURES[name][0]})" for name, _ in goals[::-1])
+        left.plot(along, up, "o-", color=PALETTE[0])
+        left.set(xlabel=words, ylabel=other)
+        parts = (result["number"].values - low) / (high - low)
+        for key, part, color in zip(result["key"].values, parts.T, PALETTE * 3, strict=False):
+            right.plot(along, part, "o-", color=color, label=str(key))
+        right.set(xlabel=words, ylabel="number, from its least to its most")
         return figure
     after = (result["number"].isel(point=0).values - low) / (high - low)
     left.hlines(places, 0, 1, color="0.85", lw=4)
+    first = (result["first_number"].values - low) / (high - low)
     left.plot(first, places, "o", mfc="none", color=PALETTE[1], label="given")
     left.plot(after, places, "o", color=PALETTE[0], label="found")
     keys = zip(result["key"].values, result["unit"].values, strict=True)

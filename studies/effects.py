@@ -134,11 +134,9 @@ def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> Listed
     pieces = pieces_of([replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor], ())
     losses = levitation.losses or (ball_losses(pieces) if pieces else None)
     doubt = 0.0 if included else metal_error(pieces, scene.fastest)
-    near = False
-    if first is not None and not included:
-        # Within the sphere about a magnet, as in the hole of a ring, no ball is like that magnet.
-        place = (first.without or first).position
-        near = any(np.linalg.norm(place - m.body.center) < m.body.circumradius for m in scene.rotor)
+    # Within the sphere about a magnet, as in the hole of a ring, no ball is like that magnet.
+    place = None if first is None or included else (first.without or first).position
+    near = place is not None and any(np.linalg.norm(place - m.body.center) < m.body.circumradius for m in scene.rotor)
     if first and losses and scene.frequency and doubt <= SLOW_ENOUGH and not near:
         growth = growth_by_rotor(scene, first, losses, included)
     why = _why("rotor.conductivity_S_m", included, growth, doubt)
@@ -161,10 +159,10 @@ def _shape(levitation: Levitation) -> ListedEffect:
 def _why(key: str, included: bool, growth: float | None, doubt: float) -> str:
     if included:
         return "a conductivity is given"
-    assumed = f"{MAGNET_CONDUCTIVITY:.2g} S/m, as of sintered magnets,"
+    assumed = f"{MAGNET_CONDUCTIVITY:.2g} S/m, as of sintered magnets"
     if doubt > SLOW_ENOUGH:
-        return f"no {key}; with {assumed} it would be too slow to tell what it adds"
-    return f"no {key}" if growth is None else f"no {key}; estimated with {assumed[:-1]}"
+        return f"no {key}; with {assumed}, it would be too slow to tell what it adds"
+    return f"no {key}" if growth is None else f"no {key}; estimated with {assumed}"
 
 
 def _air(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:

@@ -33,7 +33,7 @@ from .figures.run import working_point_figure
 from .figures.style import NAMES, colour_bar, panels, save_figures, styled, titled
 from .levitation import Levitation
 from .plan import sources
-from .result import AXIS, Columns, columns, variable, write_dataset
+from .result import AXIS, Columns, columns, records, variable, write_dataset
 
 
 @styled
@@ -129,13 +129,9 @@ def export_job(scene: Scene, requested: Models, path: Path) -> Answer:
     data = {name: np.concatenate([each[name] for each in values]) for name in values[0]}
     with replacing(path) as temporary:
         meshio.Mesh(points, [("hexahedron", joined)], point_data=data).write(temporary)
-    return {
-        "model": levitation.table.model,
-        "error_estimate": closed_form_error(scene.rotor),
-        "file": str(path),
-        "points": len(points),
-        "floater": state is not None,
-    }, [f"B, H, M and J at {len(points)} points in {path}"]
+    said = {"model": levitation.table.model, "error_estimate": closed_form_error(scene.rotor), "file": str(path)}
+    lines = [f"B, H, M and J at {len(points)} points in {path}"]
+    return {**said, "points": len(points), "floater": state is not None}, lines
 
 
 def _floater_state(levitation: Levitation) -> State | None:
@@ -335,36 +331,32 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
         "center": [scene.rotor[k].body.center for k in numbers],
         "floater": np.full(3, np.nan) if start is None else start.position,
     }
-    return xr.Dataset(
-        columns(COLUMNS, values),
-        {"magnet": ("magnet", np.array(numbers) + 1), "axis": list(AXIS), "share": share},
-        {
-            "study": "working-point",
-            "title": "Field along the easy axes of the rotor's magnets, rotor's frame",
-            "scene": scene_text(scene),
-        },
-    )
+    axes = {"magnet": ("magnet", np.array(numbers) + 1), "axis": list(AXIS), "share": share}
+    title = "Field along the easy axes of the rotor's magnets, rotor's frame"
+    said = {"study": "working-point", "title": title, "scene": scene_text(scene)}
+    return xr.Dataset(columns(COLUMNS, values), axes, said)
+
+
+JSON_KEYS = {
+    "magnet": "magnet",
+    "lowest_mu0H_T": "lowest",
+    "error_T": "error",
+    "place_mm": "place",
+    "clear_of_edges_mm": "clear",
+    "lowest_while_slipping_mu0H_T": "lowest_turning",
+    "knee_mu0H_T": "knee",
+    "share_below_knee": "share_below",
+    "share_error": "share_error",
+}
 
 
 def working_point_answer(found: xr.Dataset) -> dict[str, Any]:
     """The numbers of `working_point_dataset` for JSON."""
-    at = found["floater"].values
+    at, plain = found["floater"].values, found.assign({name: 1e3 * found[name] for name in ("place", "clear")})
+    shares = {name: found[name].where(found["knee"].notnull()) for name in ("share_below", "share_error")}
     return {
         "floater_position_mm": None if np.isnan(at).any() else 1e3 * at,
-        "working_points": [
-            {
-                "magnet": int(one["magnet"]),
-                "lowest_mu0H_T": float(one["lowest"]),
-                "error_T": float(one["error"]),
-                "place_mm": 1e3 * one["place"].values,
-                "clear_of_edges_mm": 1e3 * float(one["clear"]),
-                "lowest_while_slipping_mu0H_T": float(one["lowest_turning"]),
-                "knee_mu0H_T": (knee := None if np.isnan(one["knee"]) else float(one["knee"])),
-                "share_below_knee": None if knee is None else float(one["share_below"]),
-                "share_error": None if knee is None else float(one["share_error"]),
-            }
-            for one in (found.isel(magnet=k) for k in range(found.sizes["magnet"]))
-        ],
+        "working_points": records(plain.assign(shares), JSON_KEYS),
     }
 
 

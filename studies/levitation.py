@@ -79,10 +79,7 @@ class Levitation:
         return other
 
     def share(self, other: "Levitation", changed: bool = False) -> None:
-        """Use the tables and the compiled equations of another scene where they fit, made or yet to make.
-
-        With `changed` also its field of permeable magnets, which follows what differs in them.
-        """
+        """Use tables and equations of `other` where they fit; with `changed` also its field, changed to this rotor."""
         self._tables = other._tables
         table, name, rotor = other.table if changed else None, self.models.model, self.scene.rotor
         if isinstance(table, RotorTable) and name == table.model in PERMEABLE and follows(table, rotor):
@@ -95,10 +92,7 @@ class Levitation:
 
     @cached_property
     def mean(self) -> "Levitation":
-        """That of the floater's mean over turns about its moment, which has dipoles all over the body.
-
-        This one where it is round about that, and those on its axis will do for the first equilibrium.
-        """
+        """That of the floater's mean over turns about its moment; this one where its first equilibrium is the same."""
         floater = self.scene.floater
         if floater.is_sphere or floater.mean:
             return self
@@ -209,11 +203,7 @@ class Levitation:
 
     @cached_property
     def without_plate(self) -> Survey:
-        """All equilibria as if there were no plate. Raises EquilibriumError: the rotor is at rest; and InputError.
-
-        The latter where a conductor is in the floater's way, the rotor turns too fast for its metal, or the field of a
-        coil does not stand still in the rotor's frame.
-        """
+        """All equilibria as if without plate. EquilibriumError: the rotor is at rest; InputError: a wrong scene."""
         plans.check_coils(self.scene)
         interaction = self.interaction
         note("Equilibria ...")
@@ -309,10 +299,7 @@ class Levitation:
 
     @cached_property
     def plate(self) -> PlateMemory | None:
-        """The plate's currents around the place where the floater levitates; None where none are modelled.
-
-        Raises InputError where the plate leaves the floater no room, or the model does not fit it.
-        """
+        """The plate's currents about where the floater levitates; None: none are modelled. InputError: no room."""
         scene = self.scene
         alone = self.absolute or scene.plate is None or not scene.frequency
         place = self._place(() if alone else self.quiet.without_plate.equilibria)
@@ -344,10 +331,7 @@ class Levitation:
         return PlateMemory(requested.plate, made, share, plan.model, plan.edges)
 
     def _foreseen(self) -> PlateMemory | None:
-        """An infinite slab for where a trajectory goes at first, if that is far, and what it misses without edges.
-
-        Its tables take seconds, the finite elements' minutes.
-        """
+        """A slab, which takes seconds, for where a trajectory goes at first, if far, and what it misses by edges."""
         if not self.absolute or not self._ahead:
             return None
         note("Trajectory over an infinite slab ...")
@@ -512,7 +496,7 @@ def _seen(plate: Plate, simulated: Trajectory, most: int | None = None) -> Array
 
 
 def branch_of(levitation: Levitation, known: Equilibrium, words: str = "") -> tuple[BranchPoint, ...]:
-    """Equilibria without plate against the frequency through one of a `levitation`, which is `known`.
+    """Equilibria without plate against the frequency through a `known` one of a `levitation`.
 
     Nothing where gravity is not along the axis, or they cannot be followed: a message that begins with `words` says so.
     """

@@ -89,7 +89,6 @@ class _Magnet:
         return self.rotation @ self.polarization
 
     def seen_from(self, frame: "_Magnet") -> Any:
-        """Its solid in the axes of another."""
         back = frame.rotation.T
         return shifted(self.solid, back @ (self.center - frame.center), back @ self.rotation)
 
@@ -145,9 +144,8 @@ def _magnet(source: Any) -> _Magnet:
         )
     pose = np.asarray(source.position, float), source.orientation.as_matrix()
     body = _body(source, np.asarray(size, float), pose)
-    if isinstance(body, Solid):
-        return _Magnet(source, solid_of(body), *pose, polarization, body)
-    return _Magnet(source, body, *pose, polarization)
+    solid, keyed = (solid_of(body), body) if isinstance(body, Solid) else (body, None)
+    return _Magnet(source, solid, *pose, polarization, keyed)
 
 
 def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Any:
@@ -257,9 +255,8 @@ def _source(body: Solid, pose: dict[str, Any]) -> Any:
         raise InputError("Input table must have no part from a file among its closed forms; instead it has one.")
     if isinstance(body, Sphere):
         return kinds.Sphere(diameter=2 * body.radius, **pose)
+    if isinstance(body, Cylinder) and body.inner_radius:
+        return kinds.CylinderSegment(dimension=(body.inner_radius, body.radius, body.height, 0, 360), **pose)
     if isinstance(body, Cylinder):
-        if body.inner_radius:
-            ring = (body.inner_radius, body.radius, body.height, 0, 360)
-            return kinds.CylinderSegment(dimension=ring, **pose)
         return kinds.Cylinder(dimension=(2 * body.radius, body.height), **pose)
     return kinds.Cuboid(dimension=body.size, **pose)

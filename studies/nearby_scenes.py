@@ -66,7 +66,7 @@ def _moves_rotor(key: str) -> bool:
 
 
 def shape_beside(near: Scene, scene: Scene, field: FieldTable) -> FloaterShape | None:
-    """What the shape of a scene's floater adds in a field, by the finite elements of one nearby; None of a sphere."""
+    """What the shape of the floater of a `scene` adds in a `field`, by elements of one `near`; None of a sphere."""
     floater = scene.floater
     if floater.is_sphere or floater.mean or not floater.round:
         return None
@@ -84,10 +84,6 @@ class NearbyScenes:
     _shares: dict[str, Array] = field(default_factory=dict, init=False)
     _beside: dict[tuple[str, str], list[tuple[float, Any]]] = field(default_factory=dict, init=False)
 
-    def step(self, key: str, value: float) -> float:
-        usual = next((size for end, size in USUAL.items() if key.rstrip(".0123456789").endswith(f"_{end}")), 0.0)
-        return STEP * (max(abs(value), usual) or 1.0)
-
     @cached_property
     def numbers(self) -> dict[str, float]:
         return scene_numbers(self.scene)[1]
@@ -100,12 +96,10 @@ class NearbyScenes:
         ]
 
     def _scenes(self, key: str, times: float = 1.0) -> list[tuple[float, float, float, Scene]]:
-        """Offsets of a number, weights of their differences of fourth and of second order, and the scenes.
-
-        The step is so many `times` the usual one.
-        """
+        """Offsets of a number, weights of their differences of fourth and of second order, and the scenes."""
         value = self.numbers[key]
-        step = times * self.step(key, value)
+        usual = next((size for end, size in USUAL.items() if key.rstrip(".0123456789").endswith(f"_{end}")), 0.0)
+        step = times * STEP * (max(abs(value), usual) or 1.0)
         for steps, sign in ((CENTRAL, step), (FORWARD, step), (FORWARD, -step)):
             with suppress(SceneError):
                 return [

@@ -32,9 +32,9 @@ LEFT_OUT = "Between the floaters: rigid magnetisation. What they induce in each 
 def several(
     scene: Scene, requested: Models, duration: float, checkpoint: Checkpoint | None = None
 ) -> tuple[Together, Levitation]:
-    """Trajectories of a scene's floaters for `duration` (s), and the models of the first.
+    """Trajectories of a `scene`'s floaters for a `duration` (s), kept in `checkpoint`, and the models of the first.
 
-    Raises InputError for an effect or a model that is not computed for several floaters, or what `JointFlight` raises.
+    Raises InputError for what is `requested` or in the scene and not computed for several, or as `JointFlight` does.
     """
     positive("duration", duration)
     check_drive(scene, duration)
@@ -49,14 +49,11 @@ def several(
             "Input rotor must have no conductivity_S_m where there are several floaters, as they share its currents, "
             "which is not computed; instead it has. Leave it out."
         )
+    among = "where there are several floaters"
     if scene.moving:
-        raise InputError(
-            "Input drive must have no center_mm and no axis where there are several floaters; instead it has."
-        )
+        raise InputError(f"Input drive must have no center_mm and no axis {among}; instead it has.")
     if requested.interaction == "mutual":
-        raise InputError(
-            "Input --interaction must be rigid or auto where there are several floaters; instead received mutual."
-        )
+        raise InputError(f"Input --interaction must be rigid or auto {among}; instead received mutual.")
     if scene.plate and requested.plate_model not in ("auto", "none"):
         raise InputError(
             "Input --plate-model must be none or auto where there are several floaters, whose common currents in a "
@@ -96,10 +93,10 @@ def outcome(found: Together) -> str:
 
 
 def several_job(scene: Scene, requested: Models, duration: float, out: Path, checkpoint: Checkpoint) -> Answer:
-    """`simulate` of a `scene` with several floaters for `duration` (s); writes trajectory.nc and figures to `out`.
+    """`simulate` of a `scene` with several floaters by `requested` models for `duration` (s); writes to `out`.
 
-    The trajectories are kept in `checkpoint` while they last. Raises FlightStopped where the user stopped it, after
-    what is finished was written, and what `several` raises.
+    A `checkpoint` is kept while it lasts. Raises FlightStopped after writing what is finished, and what `several`
+    raises.
     """
     found, levitation = several(scene, requested, duration, checkpoint)
     path, data = out / "trajectory.nc", several_dataset(found, levitation).assign_attrs(scene=scene_text(scene))
@@ -178,10 +175,7 @@ def coils_summary(scene: Scene, duration: float, modes: FloatingModes | FreeMode
 
 
 def coils_job(scene: Scene, duration: float, rtol: float, out: Path) -> Answer:
-    """`simulate` of a `scene` with coils, without rotor and plate, for a `duration` (s); writes trajectory.nc to `out`.
-
-    The mean force is accurate to `rtol`. Raises InputError as `heights_over` does.
-    """
+    """`simulate` of a `scene` with coils alone for a `duration` (s), mean force to `rtol`; writes to `out`."""
     modes, cached = modes_of(scene, rtol)
     result, values = coils_summary(scene, duration, modes)
     path = out / "trajectory.nc"

@@ -37,8 +37,7 @@ SceneLike = Scene | str | Path  # a scene, or the path of its file
 RotorField = RotorTable | GriddedTable  # a rotor's table: computed, or from a map
 # Radii for which tables are made: that of the article's floater, m, and so many times the one before.
 ARTICLE_RADIUS, STEP = 6.35e-3, 2 ** (1 / 8)
-# How much more error a plate's table may have for a large region, and the most; it is said with the result.
-LOOSER, ROUGHEST = 4.0, 0.1
+LOOSER, ROUGHEST = 4.0, 0.1  # times more error that a plate's table may have for a large region, and the most
 PLATE_WORDS = {
     "none": "only an obstacle, without eddy currents",
     "slab": "taken as an infinite slab, {thickness:.4g} mm thick",
@@ -86,10 +85,7 @@ def given_scene(scene: SceneLike) -> Scene:
 
 
 def levitating_scene(scene: SceneLike) -> Scene:
-    """A scene of one floater below a rotor, as `given_scene` has it.
-
-    Raises InputError: it has coils and no rotor, or several floaters, of which trajectories alone are computed.
-    """
+    """A scene of one floater below a rotor, as `given_scene` has it; InputError: coils alone, or several floaters."""
     found = given_scene(scene)
     if found.carried_by_coils:
         raise InputError(
@@ -129,10 +125,7 @@ class PlatePlan:
 
 
 def plate_plan(scene: Scene, models: Models, place: Array | None, tables: SharedTables) -> PlatePlan:
-    """Model of a `scene`'s plate by `models` for a floater that comes to a `place` (3,) m.
-
-    It is reported, once for all scenes that share `tables`; its reason is with the details.
-    """
+    """Model of a `scene`'s plate by `models` for a floater at a `place` (3,) m; said once for all of `tables`."""
     choice = resolve_plate_model(scene, models.plate_model, place, models.plate_rtol, note)
     if scene.plate is not None:
         edges = 1e3 * scene.plate.box.size
@@ -144,11 +137,7 @@ def plate_plan(scene: Scene, models: Models, place: Array | None, tables: Shared
 
 
 def far_plan(plan: PlatePlan, models: Models, slab: PlateMemory) -> PlatePlan:
-    """The `plan` by `models` for all of a way that a `slab` has foreseen, whose error by edges is `slab.neglected`.
-
-    For so large a region the finite elements take minutes: the slab does where its edges matter little, else they are
-    asked for less accuracy.
-    """
+    """The `plan` by `models` for a way foreseen by a `slab`: this, where its edges matter little, as it is fast."""
     region = slab.table.region
     if models.plate_model != "auto":
         return replace(plan, region=region)
@@ -170,10 +159,7 @@ def looser(rtol: float) -> float:
 
 
 def nearest_faces(floater: Floater) -> float:
-    """Distance from the magnets' faces from which on a table is to be accurate, m.
-
-    The floater's radius or up to a twelfth less, so that floaters between the same two steps share the rotor's table.
-    """
+    """Distance from faces from which on tables are accurate, m: a radius in steps, so that floaters share a table."""
     steps = math.floor(math.log(floater.radius / ARTICLE_RADIUS) / math.log(STEP) + 1e-9)
     return ARTICLE_RADIUS * STEP**steps
 
@@ -187,17 +173,14 @@ def field_key(scene: Scene, model: str, rtol: float) -> str:
 def equations_key(scene: Scene, models: Models) -> str:
     """All that decides a scene's tables and equations of motion without plate; what it leaves out are parameters."""
     floater = scene.floater
-    shape = "" if floater.is_sphere else key_of("equilibria", floater.magnets, floater.round, floater.mean)
-    return " ".join(
-        (
-            field_key(scene, models.model, models.rtol),
-            f"{scene_effects(scene)} {models.interaction}",
-            "" if models.interaction == "rigid" else mutual_key(scene.rotor, floater.ball),
-            losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
-            shape,
-            *([key_of("equilibria", scene.coils)] if scene.coils else []),
-        )
-    )
+    parts = [
+        field_key(scene, models.model, models.rtol),
+        f"{scene_effects(scene)} {models.interaction}",
+        "" if models.interaction == "rigid" else mutual_key(scene.rotor, floater.ball),
+        losses_key(scene) if pieces_of(scene.rotor, scene.conductors) else "",
+        "" if floater.is_sphere else key_of("equilibria", floater.magnets, floater.round, floater.mean),
+    ]
+    return " ".join([*parts, key_of("equilibria", scene.coils)] if scene.coils else parts)
 
 
 def check_coils(scene: Scene) -> None:

@@ -53,9 +53,7 @@ def results(number: int, function: Function, items: deque[Any], showing: bool = 
     """Results of a `function`, which gives an iterable, for `items` as they come; a `Death` for what is missing.
 
     Each comes with its item; who iterates may append others. At most `number` processes work; those that only draw
-    (`showing`) may be of whichever version of the program, and nobody reads what libraries print there.
-
-    Raises NoProcessError where not one process can begin, and `items` still has all that was not begun;
+    (`showing`) may be of any version of the program, and say nothing. Raises NoProcessError where none can begin;
     ComputationError where the function raised, or the program was changed since this process began.
     """
     busy: dict[Connection, tuple[_Process, Any]] = {}

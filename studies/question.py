@@ -53,10 +53,7 @@ def _find_together(members: Sequence[tuple[Levitation, tuple[int, ...]]]) -> Non
 
 
 def _simulate_together(levitations: Sequence[Levitation], duration: float) -> None:
-    """Simulate `duration` (s) of motion in SIMD batches of scenes with one field.
-
-    Over a plate whose currents may be modelled, and in a field so short that balls do not pay, each is simulated alone.
-    """
+    """Simulate `duration` (s) of motion in SIMD batches of scenes with one field, without plate or balls."""
     groups: dict[tuple[object, ...], list[Levitation]] = {}
     for one in levitations:
         with suppress(SpinlevError):

@@ -263,6 +263,12 @@ def columns(table: Columns, found: Found, **sizes: int) -> dict[str, xr.Variable
     }
 
 
+def records(dataset: xr.Dataset, keys: Mapping[str, str]) -> list[dict[str, Any]]:
+    """For JSON: what variables over one and the same dimension hold at each place, by `keys`; None for NaN."""
+    found = zip(*(dataset[name].values.tolist() for name in keys.values()), strict=True)
+    return [{key: None if each != each else each for key, each in zip(keys, row, strict=True)} for row in found]
+
+
 def axis_dataset(tables: Mapping[str, FieldTable], heights: Array) -> xr.Dataset:
     """Field of each model on the axis below the rotor, with its estimated relative error; heights (n,) m < 0."""
     points = np.column_stack([np.zeros((len(heights), 2)), heights])
@@ -343,10 +349,7 @@ def state_columns(state: State, over: str, when: str = "", prefix: str = "") -> 
 
 
 def trajectory_dataset(flight: Trajectory, memory: PlateMemory | None = None) -> xr.Dataset:
-    """A trajectory in the laboratory frame, with its position in the rotor's frame as well.
-
-    The attributes say how well the plate's currents are known, and whether it ended where that ends.
-    """
+    """A trajectory in the laboratory and the rotor's frame, and how well the plate's currents are known."""
     lab, rotor, dims = flight.lab, flight.rotor, ("time", "axis")
     far, tilt = np.linalg.norm(rotor.position, axis=1), np.degrees(polar_angle(lab.moment))
     data = {

@@ -69,10 +69,7 @@ def field_job(scene: Scene, points: Array, requested: Models, out: Path) -> Answ
 
 
 def _field(table: FieldTable, points: Array, coils: Array, slopes: Array) -> dict[str, Any]:
-    """B, its gradient and their errors at points (n, 3) m; H and M too if the table does not reach all.
-
-    `coils` and `slopes` are B (n, 3) and its gradient (n, 3, 3) of the scene's coils there.
-    """
+    """B, gradient and errors at points (n, 3) m with those of coils; H and M too where the table does not reach all."""
     near: dict[str, Any] = {}
     if isinstance(table, CompleteTable) and not table.in_range(points).all():
         found, tiny = table.fields(points), np.finfo(float).tiny
@@ -103,10 +100,8 @@ def _field(table: FieldTable, points: Array, coils: Array, slopes: Array) -> dic
 
 
 NEARBY = 0.15  # half edge of the region of a reduced table, in units of the place's distance from the plate
-# Distance of a place from the plate, m: nearer ones are on the face but for round-off, and a dipole is a sphere.
-NEAREST = 1e-3
-# The same in units of the largest edge: from much farther, potentials differ over the plate by round-off only.
-FARTHEST = 100.0
+NEAREST = 1e-3  # distance of a place from the plate, m: nearer ones are on the face but for round-off
+FARTHEST = 100.0  # the same in largest edges: from farther, potentials differ over the plate by round-off only
 TIGHTEST = 1e-5  # smallest tolerance that the finite elements reach in minutes
 LOWEST, HIGHEST = 0.5, 250.0  # frequencies for which a reduced table is made at least, Hz
 
@@ -148,9 +143,8 @@ def response(
 ) -> tuple[str, ComplexArray, float, list[str]]:
     """Model, tensor G (3, 3), T/(A m²), laboratory frame, its estimated relative error, and tables from the cache.
 
-    For a dipole at a `place` (3,) m of the laboratory at a `frequency` (Hz), by a `model`: "none", "slab", "fem",
-    "reduced" or "auto", which is the slab where its edges change no more than `rtol`. Raises InputError where the place
-    is not over one of the two largest faces of the `plate`, with the slab.
+    For a dipole at a `place` (3,) m of the laboratory at a `frequency` (Hz), by a `model`, of which "auto" is the slab
+    where its edges change no more than `rtol`. Raises InputError where the slab has a place beside the `plate`.
     """
     if model == "none":
         return model, np.zeros((3, 3), complex), 0.0, []
@@ -183,10 +177,7 @@ def response(
 
 
 def equilibria_job(scene: Scene, requested: Models, spin: float, out: Path, gradient: bool = False) -> Answer:
-    """All equilibria of a `scene` with body `spin` by `requested` models, with stability; writes to `out`.
-
-    With their derivatives if a `gradient` is asked for.
-    """
+    """All equilibria of a `scene` with body `spin` by `requested` models in `out`; a `gradient` if asked for."""
     levitation = Levitation(scene, requested, spin)
     result = Result(levitation, levitation.survey)
     more, lines = uncertainty_job(levitation, out)
@@ -199,9 +190,9 @@ def equilibria_job(scene: Scene, requested: Models, spin: float, out: Path, grad
 
 
 def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, resume: bool) -> Answer:
-    """Trajectory of a `scene` for `duration` (s) by `requested` models; writes trajectory.nc and its figure to `out`.
+    """Trajectory of a `scene` for `duration` (s) by `requested` models, kept in a checkpoint, from which to `resume`.
 
-    A checkpoint is kept while it lasts; `resume` goes on from there.
+    Writes trajectory.nc and its figure to `out`.
     """
     if scene.carried_by_coils:
         return coils_job(scene, duration, requested.plate_rtol, out)
@@ -247,9 +238,9 @@ def main_job(
 ) -> Answer:
     """Compute everything of a `scene` by `requested` models for a body `spin` and a trajectory of `duration` (s).
 
-    Writes result.nc, summary.json and the figures to `out`, with the derivatives if a `gradient` is asked for. What is
-    finished before a failure is kept: a scene without a stable equilibrium still leaves its fields and force curves, a
-    trajectory that the user stops its beginning; then the error goes on to the caller.
+    Writes to `out`, with the derivatives if a `gradient` is asked for. What is finished before a failure is kept: a
+    scene without a stable equilibrium leaves its fields and force curves, a stopped trajectory its beginning; then the
+    error goes on.
     """
     check_drive(scene, duration)
     check_coils(scene)

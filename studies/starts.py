@@ -21,24 +21,17 @@ TOGETHER = 512  # Trajectories that a worker gets at once
 WIDER = 4  # Times at most that a plate's table is made larger for trajectories that leave it
 
 # SI units of the keys of `[start]`.
-UNITS = {
-    "offset_mm": 1e-3,
-    "position_mm": 1e-3,
-    "velocity_mm_s": 1e-3,
-    "moment": 1.0,
-    "spin_hz": 2 * np.pi,
-    "body_x": 1.0,
-}
+UNITS = dict.fromkeys(("offset_mm", "position_mm", "velocity_mm_s"), 1e-3)
+UNITS |= {"moment": 1.0, "spin_hz": 2 * np.pi, "body_x": 1.0}
 SPREADS = {"offset_mm": 1e-3, "velocity_mm_s": 1e-3, "moment_deg": np.pi / 180, "spin_hz": 2 * np.pi}
 
 
 def endings(
     levitation: Levitation, starts: State, offset: Array | None, duration: float, workers: int
 ) -> tuple[Endings, Levitation]:
-    """Ends of trajectories of `duration` (s) from (n,) starts, in so many processes, and what has their models.
+    """Ends of trajectories of `duration` (s) from (n,) `starts` by `workers` processes, and what has their models.
 
-    `offset` (n, 3) m is that of the starts from the equilibrium, where they are given by it. Trajectories that leave
-    the range of the table of a plate begin anew with a larger one, as `Levitation.flight` has it.
+    `offset` (n, 3) m is that from the equilibrium of a `levitation`, where they are given by it.
     """
     scene, count = levitation.scene, len(starts.position)
     free = np.flatnonzero(clearance(scene, np.zeros(count), starts.position, starts.orientation) > 0)
@@ -67,11 +60,9 @@ def endings(
 
 
 def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Levitation, State, Array | None]:
-    """States (n, 3) at t = 0 from the keys of a scene's `[start]`, each three numbers a trajectory, or three for all.
+    """States (n, 3) at t = 0 from keys of `[start]`, what they are about, and offsets (n, 3) m where these are given.
 
-    With the levitation about which they are, and their offsets (n, 3) m from the equilibrium where these are given.
-    Raises InputError for a key, a shape or a number that is not allowed, with the way out; EquilibriumError where
-    offsets are given, and there is no equilibrium.
+    Raises InputError for what is not allowed, with the way out; EquilibriumError: offsets, and no equilibrium.
     """
     columns = {str(key): _rows("starts", str(key), values, UNITS) for key, values in starts.items()}
     if ("offset_mm" in columns) == ("position_mm" in columns):
@@ -109,7 +100,7 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Lev
 def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: Mapping[str, Any]) -> State:
     """States (`count`, 3) about where the scene of `levitation` begins, normal with standard deviations `spread`.
 
-    The same seed gives the same numbers; those of one key do not depend on what the others' spreads are.
+    The same `seed` gives the same numbers; those of one key do not depend on what the others' spreads are.
     """
     for name, value, least in (("n", count, 1), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
@@ -150,9 +141,8 @@ def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array
         rows = np.full(3, rows)
     fine = rows.ndim in (1, 2) and rows.shape[-1] == 3 and rows.size and np.isfinite(rows).all()
     if not fine or (name == "spread" and rows.ndim > 1):
-        shape = (
-            "one or three finite numbers" if name == "spread" else "three finite numbers for each trajectory, (n, 3)"
-        )
+        each = "three finite numbers for each trajectory, (n, 3)"
+        shape = "one or three finite numbers" if name == "spread" else each
         what = values if rows.ndim == 0 else f"an array of shape {rows.shape}"
         raise InputError(f"Input {name}.{key} must be {shape}; instead received {what}.")
     return np.atleast_2d(rows) * units[key]

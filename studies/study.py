@@ -34,10 +34,7 @@ LABELS = {
 
 
 def recorded(point: Point, table: Columns, found: Found, axes: Mapping[str, Any], **sizes: int) -> xr.Dataset:
-    """A point's result from numbers, with those of `LABELS` that it has, ready to be joined along `case`.
-
-    `table`, `found` and `sizes` are as of `columns`; `axes` are coordinates.
-    """
+    """A `point`'s result with its `LABELS`, joined along `case`: `table`, `found`, `sizes` of `columns`, and `axes`."""
     labels = {name: xr.Variable((), point[name], attrs) for name, attrs in LABELS.items() if name in point}
     return xr.Dataset(columns(table, found, **sizes), axes).assign(labels).expand_dims("case")
 

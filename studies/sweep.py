@@ -43,13 +43,9 @@ class SweepError(ComputationError):
 def swept(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> xr.Dataset:
     """Joined result of a `study` at the `points`, each computed once even if the program is stopped between them.
 
-    The `engine` computes, or this process where times are measured; finished points are kept in the folder NAME.points
-    of `out`, from which `forget` removes them once the result is safe. The attribute `failed_points` names those that
-    failed, with their reasons.
-
-    Raises SweepError: all points failed; InputError: the scheduler does not answer, or has no workers of this version
-    of the program, or a file that the points are of was replaced meanwhile; ComputationError: the scheduler is lost;
-    OSError: `out` cannot be written. The finished points are kept.
+    By an `engine`, or this process where times are measured; finished points are kept in NAME.points of `out`, until
+    `forget`. Raises SweepError: all failed; InputError: the scheduler does not answer, or has other versions, or a file
+    was replaced; ComputationError: it is lost; OSError.
     """
     journal = Journal(study, points, out)
     if finished := journal.finished():
@@ -153,11 +149,9 @@ class Journal:
 
 
 def computed(by: Workers, study: Study, points: Sequence[Point], missing: Set[int]) -> Generator[Attempt, None, None]:
-    """The results of the `missing` numbers of `points` as they come, `by` workers; the other points only help them.
+    """Results of the `missing` numbers of `points` of a `study` as they come, `by` workers, or the reason for none.
 
-    A point that raises, or whose process dies again and again, gives its reason; the others go on. Raises InputError:
-    the scheduler does not answer, or all of its workers are of another version; ComputationError: it is lost on the
-    way.
+    Raises InputError: the scheduler does not answer, or has none of this version; ComputationError: it is lost.
     """
     numbered = dict(enumerate(points))
     grouped = study.batches(numbered) if study.batches else [[k] for k in numbered]

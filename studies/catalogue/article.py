@@ -129,10 +129,7 @@ def levitation_of(
 
 
 def stable_frequencies(scene: Scene, rates: Rates) -> StableRange:
-    """Frequencies of stable levitation of a rotor, whose motion has these `rates`; the scene's own is any.
-
-    Raises EquilibriumError where it levitates stably at no frequency.
-    """
+    """Stable frequencies of a rotor, whose motion has these `rates`; EquilibriumError where there are none."""
     return stable_range(scene, rates, *reference_state(scene))
 
 
@@ -152,7 +149,7 @@ def over_plate(
 ) -> tuple[Levitation, Equilibrium, float] | None:
     """A scene with a `plate`, the equilibrium that its currents make of the `start` without, and its table's error.
 
-    The error is relative; `model` and `rtol` are of the plate's currents. None where there is no equilibrium any more.
+    By `model` and `rtol` of the plate's currents, from a levitation `alone`. None where there is no equilibrium.
     """
     there = alone.elsewhere(replace(alone.models, plate_model=model, plate_rtol=rtol), plate=plate)
     there.adopt(Survey((start,), ()))
@@ -204,7 +201,7 @@ def force(configuration: str, value: float, distance: ArrayLike, frequency: floa
 def parts(configuration: str, value: float, d: Array, a: Array | float) -> Array:
     """B⊥ and B_z by μ0 m_r/4π (1/m³), and the factors of cos θ and sin θ in the force, by 𝒢 (equations 7, 11 and 13).
 
-    Rotor as of `force`, at distances `d` with radii `a` of the side mode, (n,) m.
+    Of a rotor (`configuration`, `value`) at distances `d` with radii `a` of the side mode, (n,) m.
     """
     parameter = CONFIGURATIONS[configuration].scale * value
 
@@ -220,10 +217,9 @@ def parts(configuration: str, value: float, d: Array, a: Array | float) -> Array
 
 
 def balanced(configuration: str, value: float, frequency: float, load: float) -> tuple[float, float]:
-    """Distances (m) of the stable and of the unstable point at which the semi-analytic force is a load (N), else NaN.
+    """Distances (m) of the stable and the farther unstable point at which the semi-analytic force is a load, or NaN.
 
-    Unstable is the farthest place at which attraction falls below the load, stable the next nearer one. Rotor and
-    frequency are as of `force`.
+    Of a rotor (`configuration`, `value`) at a `frequency` (Hz); the `load` is in N.
     """
     grid = np.geomspace(CONTACT, FARTHEST, 600)
 
@@ -240,7 +236,7 @@ def balanced(configuration: str, value: float, frequency: float, load: float) ->
 def analytic_distance(configuration: str, value: float, frequency: ArrayLike) -> Array:
     """Distance without gravity and for small angles, m: equations 17 and 36 of the supplement; NaN for vertical.
 
-    Rotor as of `force`; frequency (n,) Hz.
+    Of a rotor (`configuration`, `value`) at each `frequency` (n,) Hz.
     """
     rate = 2 * np.pi * np.asarray(frequency, float)
     parameter = CONFIGURATIONS[configuration].scale * value

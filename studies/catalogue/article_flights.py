@@ -88,9 +88,9 @@ def _in_field(point: Point, grid: Array) -> dict[str, Any]:
 
 
 def mean_height(scene: Scene, field: FieldTable, point: BranchPoint) -> tuple[float, float]:
-    """Mean distance along the axis (m) of a trajectory that a kick began at `point`, and by how much its halves differ.
+    """Mean distance (m) in a `scene` and `field` after a kick at `point`, and by how much halves differ; NaN if lost.
 
-    Means are weighted by sin², which takes out the axial mode; NaN where the trajectory did not last.
+    Means are weighted by sin², which takes out the axial mode.
     """
     flight = simulate(kicked(scene, point, DISTANCE_KICK), field, SECONDS, [])
     if flight.ended_by != "duration":

@@ -61,10 +61,9 @@ class Place:
 
 @cache
 def place_of(configuration: str, measure: float, part: float) -> Place:
-    """A rotor of the article (mm, degrees) at a `part` (0 to 1) of its stable frequencies; floater and air as they are.
+    """A rotor (`configuration`, `measure`) at a `part` (0 to 1) of its stable frequencies; floater and air as they are.
 
-    Field: closed form, μr = 1, which the ranges of frequencies are of as well. Raises EquilibriumError where it
-    levitates stably at no frequency.
+    Field and range by the closed form of μr = 1. Raises EquilibriumError where it levitates stably at no frequency.
     """
     scene = article.rotor_scene(configuration, measure, permeability=1.0)
     levitation = article.levitation_of(scene, "cuboid")
@@ -151,10 +150,7 @@ COLUMNS: Columns = {
 
 
 def capture_points(quick: bool) -> list[Point]:
-    """All rotors and frequencies again and again, a batch of launches each time, so that a stop leaves equal shares.
-
-    At last floaters of other shapes, of which quick settings have the cube.
-    """
+    """All rotors and frequencies in turn, a batch of launches each, so that a stop leaves equal shares; then shapes."""
     rotors = [(name, value) for name, kind in article.CONFIGURATIONS.items() for value in kind.tested]
     every = product(range(BATCHES), rotors, PARTS)
     requested = [(*rotor, part, batch, TOGETHER, 0 if batch else CHECKED) for batch, rotor, part in every]

@@ -22,7 +22,7 @@ from scipy.special import logsumexp, ndtri
 
 from ...geometry.common import Array
 from ..figures.style import PALETTE, drawn, panels, styled
-from ..result import Columns, columns, variable
+from ..result import Columns, columns, records, variable
 from ..study import Point, Study
 from . import experiment_model as model
 from .experiment_design import design_row
@@ -38,7 +38,7 @@ from .experiment_model import (
     log_likelihoods,
     prior_values,
 )
-from .showing import records, text_table, uncertain
+from .showing import text_table, uncertain
 
 KEPT, TOGETHER = 1000, 500  # Draws of the posterior that are kept; draws that are evaluated in one call
 DONE = 0.1  # What the evidence that remains may add to its logarithm
@@ -253,9 +253,9 @@ def prior_quantiles(result: xr.Dataset) -> Array:
 
 
 def facts_weighed(one: xr.Dataset) -> tuple[xr.Dataset, Array]:
-    """Of the facts that a variant is fitted to: probabilities beforehand, given all others and in the fit, and gains.
+    """Of a variant's facts: probabilities beforehand, given all others and in the fit; and gains (fact, fact).
 
-    A gain (fact, fact) is the logarithm of the evidence of two facts together over that of each by itself.
+    A gain is the logarithm of the evidence of two facts together over that of each by itself.
     """
     known = np.flatnonzero(np.isfinite(one["log_evidence_single"].values))
     some = one.isel(fact=known, other_fact=known)

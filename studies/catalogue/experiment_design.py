@@ -224,11 +224,7 @@ def design_inputs(kind: str, number: int) -> dict[str, float]:
 
 
 def design_row(point: Point, cached: bool = True) -> xr.Dataset:
-    """One rotor of a design, which whoever fits a surrogate finds in the cache.
-
-    Over `height` and `body_spin` its nodes (NaN where nothing levitates), with `hanging`, the distance at which the
-    attraction alone carries the weight, and its inputs.
-    """
+    """One rotor of a design, which fits of surrogates find in the cache: its nodes, NaN where nothing levitates."""
     kind, model = KINDS[point["rotor"]], point["model"]
     inputs = design_inputs(point["rotor"], point["number"])
     spins, steps = np.linspace(*SPINS, point["spins"]), np.arange(point["heights"]) + 0.5

@@ -17,7 +17,7 @@ from ...dynamics.equilibria.equilibrium import EquilibriumError
 from ...geometry.scene.floater import Floater
 from ...geometry.shapes import Box, Cylinder
 from ..figures.style import PALETTE
-from ..result import Columns
+from ..result import Columns, records
 from ..study import Point, Study, recorded
 from . import article, showing
 from .showing import each, small_multiples
@@ -114,5 +114,5 @@ STUDY = Study(
     compute=limits,
     figures={"floater-shape": shape_figure},
     report=_shape_lines,
-    numbers=lambda result: {"limits": showing.records(result, NUMBERS)},
+    numbers=lambda result: {"limits": records(result, NUMBERS)},
 )

@@ -119,10 +119,7 @@ def time_points(quick: bool) -> list[Point]:
 
 
 def levitation_times(point: Point) -> xr.Dataset:
-    """Levitation time, start and end of one rotor's averaged trajectories with one variant, over `step` of frequency.
-
-    They are at those frequencies that the branch of equilibria reaches, from that of point dipoles both ways.
-    """
+    """One rotor's averaged trajectories with one variant at those frequencies that the branch of equilibria reaches."""
     case, variant, model = CASES[point["case"]], VARIANTS[point["variant"]], point["model"]
     grid, (scene, still) = np.linspace(case.lowest, case.highest, point["steps"]), scenes_of(case, variant)
     levitation = levitation_of(scene, model, interaction="rigid" if model != "fem" else "mutual")

@@ -32,10 +32,9 @@ from ...geometry.scene.contents import Plate, Scene
 from ...geometry.scene.making import assemble, sphere
 from ...geometry.shapes import Box, Sphere, ring
 from ..figures.style import PALETTE, drawn, panels
-from ..result import Columns, columns, variable
+from ..result import Columns, columns, records, variable
 from ..study import Point, Study
 from .plates import FREQUENCIES, compute_line, measured_line, team7_mesh
-from .showing import records
 
 DURATION, GRAVITY = 1.72, 9.81
 GAUSS = 5e-7  # Half of the last digit of problem 7's table, T

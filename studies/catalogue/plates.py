@@ -93,7 +93,7 @@ def without_plate(
 ) -> tuple[Levitation, Equilibrium]:
     """A scene without plate, and its equilibrium that is stable but for the currents in rotor and floater.
 
-    Parameters are those of a `PlateCase`. Raises EquilibriumError where nothing levitates.
+    By `configuration`, `measure`, `part` and `complete` of a `PlateCase`; EquilibriumError where nothing levitates.
     """
     alone, stable = _in_air(configuration, measure, complete)
     frequency = FREQUENCY if part is None else float(article.within(stable, part))
@@ -121,11 +121,7 @@ COLUMNS: Columns = {
 
 
 def plate_damping(point: Point) -> xr.Dataset:
-    """Levitation of a rotor of the article beside or above one plate, an infinite slab but for those called real.
-
-    Over `case` growth and frequency of each mode, displacement, mean force, torque and loss; NaN where the plate
-    destabilises the equilibrium. Raises EquilibriumError where nothing levitates even without the plate.
-    """
+    """A rotor of the article over or beside one plate; NaN where it destabilises the equilibrium, see `COLUMNS`."""
     case = PlateCase(**point)
     alone, start = without_plate(case.configuration, case.measure, case.part, case.complete)
     row: dict[str, Any] = {name: point[name] for name in ("value", "sweep", "configuration")}
@@ -351,10 +347,7 @@ LINE: Columns = {
 
 
 def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
-    """B_z `measured` and `computed` (17, 4) T at `x` (17,) m, and their deviation.
-
-    That is in units of the largest measured |B| of the same frequency.
-    """
+    """B_z `measured` and `computed` (17, 4) T at `x` (17,) m; deviation over the largest |B| of the same frequency."""
     amplitude = np.hypot(measured[:, 0::2], measured[:, 1::2]).max(axis=0)
     data = columns(LINE, (measured, computed, (computed - measured) / np.repeat(amplitude, 2)))
     return xr.Dataset(data, {"x": variable(("x",), x, "m", "x"), "curve": list(CURVES)})

@@ -11,7 +11,7 @@ from ...dynamics.continuation.frequencies import at_frequency, kicked
 from ...dynamics.flights.flight import simulate
 from ...geometry.scene.contents import DriveStep
 from ..figures.style import PALETTE
-from ..result import Columns
+from ..result import Columns, records
 from ..study import Point, Study, each_case, recorded
 from ..words import ENDS
 from . import article, showing
@@ -85,9 +85,9 @@ def _ramps_lines(result: xr.Dataset) -> list[str]:
 def ramps_numbers(result: xr.Dataset) -> dict[str, Any]:
     """Each rotor's frequencies as numbers: `ramps`."""
     rotor = {"configuration": "configuration", "value": "measure"}
-    found = showing.records(result, rotor | {"lowest_stable_hz": "lowest", "highest_stable_hz": "highest"})
+    found = records(result, rotor | {"lowest_stable_hz": "lowest", "highest_stable_hz": "highest"})
     for row, one in zip(found, each_case(result[["lost_at"]].stack(ramp=("way", "rate"))), strict=True):
-        row["lost"] = showing.records(one, {"way": "way", "rate_hz_per_s": "rate", "lost_at_hz": "lost_at"})
+        row["lost"] = records(one, {"way": "way", "rate_hz_per_s": "rate", "lost_at_hz": "lost_at"})
     return {"ramps": found}
 
 

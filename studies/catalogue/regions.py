@@ -18,7 +18,7 @@ from ...geometry.shapes import Box
 from ..cli.console import note
 from ..figures.style import COLORS, NAMES, PALETTE
 from ..levitation import Levitation
-from ..result import Columns
+from ..result import Columns, records
 from ..study import Point, Study, cases_with, each_case, recorded
 from . import article, showing
 from .showing import each, small_multiples
@@ -310,5 +310,5 @@ UPPER_LIMIT = Study(
     compute=upper_limit,
     figures={"upper-limit": limit_figure},
     report=_limit_lines,
-    numbers=lambda result: {"limits": showing.records(result, NUMBERS)},
+    numbers=lambda result: {"limits": records(result, NUMBERS)},
 )

@@ -68,10 +68,7 @@ SCENE = "Rotor, floater, plate and field, in the frame that turns with the rotor
 
 
 def report_job(folder: Path, out: Path) -> tuple[Path, list[str]]:
-    """Write report.html about every result in `folder`; returns it and the names of the results.
-
-    Raises InputError where the folder is missing, has no result, or one that cannot be read.
-    """
+    """Write report.html about every result in `folder`; returns it and their names. InputError where that cannot be."""
     import jinja2
 
     if not os.path.isdir(folder):  # unlike Path.is_dir never raises
@@ -100,10 +97,12 @@ def _part(path: Path) -> dict[str, Any]:
     study = CATALOGUE.get(kind)
     drawers = study.figures if study else {**dict(DRAWN.values()), QUESTION: question_figure}
     captions = {name: (getattr(draw, "func", draw).__doc__ or "").split("\n")[0] for name, draw in drawers.items()}
-    embedded = {name: _embedded(figure_bytes(figure, "png"), "png") for name, figure in figures_of(result).items()}
     with figures_across("column"):  # what a telephone shows
-        narrow = {name: _embedded(figure_bytes(figure, "png"), "png") for name, figure in figures_of(result).items()}
-    pictures = [(captions[name], source, narrow[name]) for name, source in embedded.items()]
+        narrow = figures_of(result)
+    pictures = [
+        (captions[name], *(_embedded(figure_bytes(each, "png"), "png") for each in (figure, narrow[name])))
+        for name, figure in figures_of(result).items()
+    ]
     beside = [path.parent / "scene.png"] if kind == "run" else []
     beside += [path.parent / f"{path.stem}-{name}" for name in ("scene.png", "flight.gif")]
     for file in filter(Path.exists, beside):
@@ -144,7 +143,6 @@ def _embedded(content: bytes, kind: str) -> str:
 
 
 def _fit(parts: list[dict[str, Any]]) -> None:
-    """Leave out the pictures for which a page that can be sent has no room."""
     room = LARGEST
     for part in parts:
         kept = []

@@ -134,21 +134,14 @@ def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) 
     text = "\n".join(lines)
     if ("stable" in text or "highest (Hz)" in text) and CRITERION not in text:  # one definition for all of them
         lines.append(f"Stable: {CRITERION}.")
-    values = {
-        "study": name,
-        "report": lines,
-        "failed_points": failed_points(result),
-        "result": str(path),
-        "figures": figures,
-        **(study.numbers(result) if study.numbers else {}),
-    }
+    values = {"study": name, "report": lines, "failed_points": failed_points(result), "result": str(path)}
+    values |= {"figures": figures, **(study.numbers(result) if study.numbers else {})}
     return values, [*lines, f"Written: {', '.join([str(path), *figures])}"]
 
 
-def failed_points(result: xr.Dataset) -> list[dict[str, Any]]:
+def failed_points(result: xr.Dataset) -> Any:
     """The points of a result that have no value, each with the reason."""
-    failed: list[dict[str, Any]] = json.loads(result.attrs["failed_points"])["failed"]
-    return failed
+    return json.loads(result.attrs["failed_points"])["failed"]
 
 
 def failure_lines(result: xr.Dataset) -> list[str]:
@@ -157,10 +150,9 @@ def failure_lines(result: xr.Dataset) -> list[str]:
 
 
 def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
-    """Write NAME-scene.png, NAME-flight.gif and, if `html`, NAME-view.html of a trajectory; returns the files.
+    """Write NAME-scene.png, NAME-flight.gif and, if `html`, NAME-view.html of a trajectory to `out`; returns the files.
 
-    Raises InputError where the file holds no single scene's trajectory, and RenderError where pictures cannot be drawn;
-    those that could be are written.
+    Raises InputError where `path` holds no single scene's trajectory; RenderError where pictures cannot be drawn.
     """
     result = read_result(path)
     if "scene" not in result.attrs or "position_rotor_frame" not in result:

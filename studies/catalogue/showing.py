@@ -26,10 +26,9 @@ TITLES = {"horizontal": "displaced cube", "vertical": "two cubes", "tilt": "tilt
 def each(
     panels: Callable[..., tuple[Figure, Any]], *how: Any, of: Callable[[xr.Dataset], Any] | None = None, **shared: Any
 ) -> Callable[[Callable[..., None]], Drawing]:
-    """Let what draws one panel draw the figure of a joined result.
+    """Let what draws one panel draw the figure of a joined result, or of what is made `of` it.
 
-    One of the functions below arranges the `panels`, with `how` and `shared` and from the result or what is made `of`
-    it; each row that it returns is handed on to what is decorated.
+    One of the functions below arranges the `panels`; each row that it returns is handed on to what is decorated.
     """
 
     def decorated(draw: Callable[..., None]) -> Drawing:
@@ -47,10 +46,10 @@ def each(
 def small_multiples(
     parts: Any, height: float, columns: int = 3, xlabel: str = "", ylabel: str = "", **shared: Any
 ) -> tuple[Figure, list[tuple[Axes, Any]]]:
-    """A panel for each of `parts` (by title, behind its letter), beside what it shows.
+    """A panel for each of `parts` (by title, behind its letter), beside what it shows; `shared` are of `subplots`.
 
     Rows have `columns` panels at most and a `height` in inches; the lowest panel of a column has `xlabel`, the first of
-    a row `ylabel`; `shared` are options of `Figure.subplots`.
+    a row `ylabel`.
     """
     count = len(parts := dict(parts))
     figure, ((*axes,),) = panels(1, count, height + 0.3, min(columns, count), **shared)
@@ -85,17 +84,13 @@ def rotor_cases(result: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
 
 
 def _measure(part: xr.Dataset) -> str:
-    """What a study calls displacement or tilt."""
     return "measure" if "measure" in part else "value"
 
 
 def configuration_panels(
     result: xr.Dataset, height: float, xlabel: str = "", ylabel: str = "", **shared: Any
 ) -> tuple[Figure, list[tuple[Axes, xr.Dataset]]]:
-    """A panel for each configuration of a joined result with its cases, as of `small_multiples`.
-
-    Without an `xlabel` the rotors' displacement or tilt is along x.
-    """
+    """A panel for each configuration of a `result`; `height`, `xlabel` (else the measure's), `ylabel` as above."""
     parts = {TITLES[name]: part for name, part in by_configuration(result)}
     figure, rows = small_multiples(parts, height, 3, xlabel, ylabel, sharey=True, **shared)
     for axes, part in () if xlabel else rows:
@@ -106,9 +101,9 @@ def configuration_panels(
 def rotor_panels(
     result: xr.Dataset, height: float, xlabel: str, ylabel: str, **shared: Any
 ) -> tuple[Figure, list[tuple[Axes, xr.Dataset, Any]]]:
-    """A panel for each configuration, as of `small_multiples`, and for each rotor its panel, its cases and its colour.
+    """A panel for each configuration of a `result`, and for each rotor its panel, cases and colour, explained by a bar.
 
-    Colours go from dark to bright along viridis with displacement or tilt; a bar below the panel gives them.
+    `height`, `xlabel` and `ylabel` are as of `small_multiples`.
     """
     figure, rows = configuration_panels(result, height, xlabel, ylabel, **shared)
     found: list[tuple[Axes, xr.Dataset, Any]] = []
@@ -136,10 +131,7 @@ def rotor_places(axes: Axes, part: xr.Dataset) -> Array:
 
 
 def explain(axes: Axes, formats: Mapping[str, str], **style: Any) -> None:
-    """Entries in the legend of `axes` that no curve has by itself: `formats` of `Axes.plot` by meaning.
-
-    All have the `style`; they are grey where neither it nor the format has a colour.
-    """
+    """Entries in a legend that no curve has by itself: formats of `Axes.plot` by meaning, grey if without a colour."""
     for words, shape in formats.items():
         grey = {} if "C" in shape or "k" in shape else {"color": "0.3"}
         axes.plot([], [], shape, **{**grey, "label": words, **style})
@@ -149,17 +141,9 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[st
     """Lines with aligned columns below their heads; numbers with four significant digits, NaN as a dash."""
 
     def cell(value: Any) -> str:
-        if isinstance(value, str):
-            return value
-        return f"{float(value):.4g}" if np.isfinite(float(value)) else "–"
+        return value if isinstance(value, str) else f"{float(value):.4g}" if np.isfinite(float(value)) else "–"
 
     return aligned([tuple(head), *(tuple(map(cell, row)) for row in rows)], "<>")
-
-
-def records(dataset: xr.Dataset, keys: Mapping[str, str]) -> list[dict[str, Any]]:
-    """For JSON: what variables over one and the same dimension hold at each place, by `keys`; None for NaN."""
-    found = zip(*(dataset[name].values.tolist() for name in keys.values()), strict=True)
-    return [{key: None if each != each else each for key, each in zip(keys, row, strict=True)} for row in found]
 
 
 def span(values: ArrayLike, digits: str = ".3g") -> str:
@@ -190,10 +174,7 @@ def range_text(value: xr.DataArray, error: xr.DataArray, scale: float = 1.0) -> 
 
 
 def last_crossing(distance: Array, values: Array, level: float) -> float:
-    """The distance (n,), ascending, from which on values (n,) stay below a `level`; NaN if beyond the last.
-
-    Between them logarithms are interpolated.
-    """
+    """From which `distance` (n,), ascending, on `values` (n,) stay below a `level`; NaN if beyond the last."""
     above = np.flatnonzero(values > level)
     if not len(above):
         return float(distance[0])

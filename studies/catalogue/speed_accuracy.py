@@ -208,10 +208,7 @@ def _pace(evaluate: Callable[[Array], Any], number: int = TIMED_POINTS) -> float
 
 
 def apart(name: str, quick: bool) -> Measured:
-    """`measure` in a process of its own with an empty cache, forked from one that has only imported the libraries.
-
-    `processes.mapped` begins processes that inherit this one's largest memory, and that give memory back all the time.
-    """
+    """`measure` with an empty cache, in a copy of a process that has only imported the libraries: memory is its own."""
     fresh = get_context("forkserver")
     fresh.set_forkserver_preload([__name__])
     with safe_path(), tempfile.TemporaryDirectory() as cache, ProcessPoolExecutor(1, mp_context=fresh) as pool:

@@ -90,10 +90,9 @@ def missing_extra(error: BaseException) -> str | None:
 
 
 def lend_quadmath() -> Path | None:
-    """Give NGSolve's Fortran library the libquadmath that numpy's or scipy's wheel brings, where the system has none.
+    """Give NGSolve's libgfortran the libquadmath of numpy's or scipy's wheel where there is none; returns the link.
 
-    NGSolve's wheel brings a libgfortran that looks for it beside itself, but does not bring it. Returns the link that
-    was made; None where it is not needed or no wheel has one. Raises OSError where the folder cannot be written.
+    None where it is not needed or no wheel has one. Raises OSError where the folder cannot be written.
     """
     home = _folder("ngsolve_openblas")
     if home is None or not list(home.glob("libgfortran.so*")) or _loads(QUADMATH):
@@ -126,10 +125,7 @@ PAUSE = 2.5  # silence after which a line is said, s, once; after long steps a 6
 
 
 class Heartbeat(threading.Thread):
-    """Says how far a step has come, or how long it has taken, after a `pause` (s) in which nothing else was said.
-
-    The thread begins with the first step; `say` prints a line.
-    """
+    """Says (by `say`) how far a step has come, or how long it has taken, after a `pause` (s) without other words."""
 
     def __init__(self, say: Callable[[str], None], pause: float = PAUSE) -> None:
         super().__init__(name="heartbeat", daemon=True)
@@ -262,10 +258,7 @@ def stages(label: str) -> Iterator[Callable[[str, float], None]]:
 
 @contextmanager
 def answers_only() -> Iterator[TextIO]:
-    """Give the true standard output, while everything else that prints there goes to standard error.
-
-    The numeric libraries print from C++; a program that reads our answer must not see that.
-    """
+    """Give the true standard output; what else prints there, as libraries do from C++, goes to standard error."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)

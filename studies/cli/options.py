@@ -106,11 +106,7 @@ def check_between(name: str, value: float, ends: tuple[int, int], whole: bool = 
 
 
 def read_points(path: Path) -> Array:
-    """Points (n, 3) in m from a CSV file with a header that has the columns x_mm, y_mm, z_mm.
-
-    Raises InputError where the file is missing, no file, too large, empty, lacks a column or has an entry that is no
-    finite number or too large a one.
-    """
+    """Points (n, 3) in m from a CSV file with columns x_mm, y_mm, z_mm. Raises InputError where it is none."""
     content = file_content(path, MOST, "points", f"a CSV file with {', '.join(COLUMNS)}")
     try:
         rows = csv.reader(io.StringIO(content.decode("utf-8-sig"), newline=""), skipinitialspace=True)
@@ -372,7 +368,7 @@ def parse_vary(requested: Sequence[str]) -> dict[str, list[Any]]:
 def checked_values(values: Mapping[str, Sequence[Any]], name: str = "values") -> dict[str, list[Any]]:
     """Values by key as lists of floats and, for those of `NAMES`, of texts; `name` is what messages call them.
 
-    Raises InputError: no key, no value, one that is no finite number, one that is given twice, or too many points.
+    Raises InputError: no key or value, one that is no finite number or given twice, or too many points.
     """
     if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
         raise refused(name, "be lists of values by key", values)

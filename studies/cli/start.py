@@ -42,10 +42,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Put something in the place of standard streams that are closed, lest the next opened file be taken for one.
-
-    What is said on standard error is then lost; the answer cannot be written, which is an error, as on a full disk.
-    """
+    """Put something in the place of closed standard streams, lest the next opened file be taken for one."""
     for number, name, mode in ((0, "stdin", os.O_RDONLY), (1, "stdout", os.O_RDONLY), (2, "stderr", os.O_WRONLY)):
         if getattr(sys, name) is not None:
             continue

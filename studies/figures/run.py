@@ -30,8 +30,7 @@ PLATE_MARKS = ((False, "o", "no plate"), (True, "D", "with the plate"))  # wheth
 FILLS = {"stable": "full", "marginal": "left", "unstable": "none"}  # of the marker of an equilibrium
 PARTS = 120  # Intervals of an envelope: more than a printed figure resolves
 SHOWN = 200  # Samples of a trajectory that are drawn one by one
-COARSE = 0.05
-"""Interval of samples (s) longer than an axial oscillation: a line through them would show false slow motions."""
+COARSE = 0.05  # Interval of samples (s) longer than an axial oscillation: a line would show false slow motions
 HOURS = 7200.0  # Trajectories that take longer are drawn over hours, s
 MODE_MARKERS = "osD^v"
 FAMILY = 6  # curves in a panel, at most
@@ -57,12 +56,11 @@ def scene_figure(scene: Scene) -> Figure:
 
     figure, ((side, top),) = panels(1, 2, 3.4)
     lowest = min(float(magnet.box.corners[:, 2].min()) for magnet in scene.rotor)
-    name, moment = "floater (where it levitates is not computed)", np.eye(3)[2]
-    where = np.array([0.0, 0.0, lowest - 2 * scene.floater.radius])
+    name, where = "floater (where it levitates is not computed)", (lowest - 2 * scene.floater.radius) * np.eye(3)[2]
+    axes = scene.floater.axes(np.eye(3)[2], None)
     if isinstance(start := scene.start, AbsoluteStart):
-        name, where, moment = "floater, at its start", start.position, start.moment
-    orientation = scene.floater.axes(moment, start.body_x if isinstance(start, AbsoluteStart) else None)
-    parts = scene.floater.placed(where, orientation)
+        name, where, axes = "floater, at its start", start.position, scene.floater.axes(start.moment, start.body_x)
+    parts = scene.floater.placed(where, axes)
     bodies: list[tuple[Solid, str, str]] = [(part, PALETTE[1], name) for part in parts]
     bodies += [(magnet.body, PALETTE[0], "magnet") for magnet in scene.rotor]
     bodies += [(part.body, "0.5", "conductor of the rotor") for part in scene.conductors]
@@ -197,14 +195,13 @@ def trajectory_figure(result: xr.Dataset) -> Figure:
         panel.set_xlabel(f"time ({unit})")
     seen = {"rotor's frame": "position_rotor_frame", "laboratory": "position"}  # the one in which it moves less
     frame = min(seen, key=lambda frame: np.ptp(result[seen[frame]].values[near], axis=0).max())
-    here, x, y = time[near], *(1e3 * result[seen[frame]].values[near].T[:2])
-    step = float(np.diff(seconds[near]).max(initial=0.0))
-    close: tuple[Array, ...] = (here, distance[near], x, y)
-    if step > COARSE:
+    x, y = 1e3 * result[seen[frame]].values[near].T[:2]
+    close: tuple[Array, ...] = (time[near], distance[near], x, y)
+    if (step := float(np.diff(seconds[near]).max(initial=0.0))) > COARSE:
         style = "."
         look.set_title(f"(b) a sample every {step:.2g} s")
     else:
-        close, style = _smooth(here, *close), "-"
+        close, style = _smooth(close[0], *close), "-"
     look.plot(close[0], close[1], style, lw=0.8, ms=3)
     above.plot(close[2], close[3], style, lw=0.8, ms=3)
     above.plot(x[0], y[0], "o", color=PALETTE[2], ms=4, label="start of (d)")

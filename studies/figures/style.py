@@ -73,8 +73,8 @@ COLORS.other, DASHES.other = "#000000", "-"
 Arguments = ParamSpec("Arguments")
 
 
-def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
-    """Let a function draw in the project's style."""
+def styled(draw: Callable[Arguments, Figure], explained: bool = False) -> Callable[Arguments, Figure]:
+    """Let a function draw in the project's style; what has a name may be `explained` below the panels."""
 
     @wraps(draw)
     def inside(*arguments: Arguments.args, **options: Arguments.kwargs) -> Figure:
@@ -82,6 +82,8 @@ def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
 
         with mpl.rc_context(STYLE):
             figure = draw(*arguments, **options)
+            if explained:
+                legend_below(figure)
         for panel in figure.axes:
             if place := panel.get_subplotspec():  # a colour bar has none
                 room = figure.get_figheight() / place.get_gridspec().nrows - BELOW
@@ -94,14 +96,7 @@ def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
 
 def drawn(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
     """Let a function draw in the project's style; all that has a name is explained below the panels."""
-
-    @wraps(draw)
-    def inside(*arguments: Arguments.args, **options: Arguments.kwargs) -> Figure:
-        figure = draw(*arguments, **options)
-        legend_below(figure)
-        return figure
-
-    return styled(inside)
+    return styled(draw, explained=True)
 
 
 def titled(panel: Axes, words: str) -> None:

@@ -19,8 +19,8 @@ STEP, STEPS = 1e-3, 200  # Length of a step along a field line, m, and how many 
 SEEN = 0.016  # How far along its edges a plate is drawn in a picture, m; both times the `unit` of the scene
 SIDES = 48  # Of what is round
 Surface: TypeAlias = "tuple[Array, NDArray[np.intp]]"
+# Faces of a box whose corners are numbered by the signs of x, y and z, the last changing fastest
 SQUARES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
-"""Faces of a box whose corners are numbered by the signs of x, y and z, the last changing fastest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +98,8 @@ class Sample:
 
 
 def unit(scene: Scene) -> float:
-    """A tenth of a round length (1, 2 or 5 with noughts, mm) that floater and largest magnet are: 1 of the article's.
-
-    Arrows, names, steps and margins of a picture are some of these, so that a small scene is not hidden behind them.
-    """
+    """A tenth of a round length (1, 2 or 5 with noughts, mm) of floater and largest magnet: 1 for the article's."""
+    # arrows, names, steps and margins of a picture are some of these, so that a small scene is not hidden behind them
     size = 1e3 * (scene.floater.radius + max((magnet.body.circumradius for magnet in scene.rotor), default=0.0))
     digit = 10.0 ** np.floor(np.log10(size))
     return float(max(factor for factor in (1, 2, 5) if factor * digit <= size) * digit / 10)

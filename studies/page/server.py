@@ -61,10 +61,7 @@ FULL = f"{MOST_PAGES} pages are open, and more are not served at a time. Close o
 
 
 class LivePage:
-    """Pages that are served by `run`, or in the background from `begin` on, until `stop`; a notebook shows one.
-
-    The `address` has the token; `local`: no other machine can see them; `opened`: the pages that are open.
-    """
+    """Pages that are served by `run`, or in the background from `begin` on, until `stop`; a notebook shows one."""
 
     def __init__(self, address: str, local: bool, gate: "_Gate", listening: socket.socket) -> None:
         self.address, self.local, self.opened = address, local, gate.opened

@@ -72,8 +72,8 @@ class PageState:
     def with_query(self, asked: Mapping[str, str]) -> "PageState":
         """The state of an address: of a whole scene, or one that changes what it names; its rotor or plate is whole.
 
-        Raises SceneError: the scene cannot be, or names a file that the first scene does not; InputError: a model that
-        does not exist, a spin that is no number, or more than an address may hold.
+        Raises SceneError or InputError: a scene, a file, a model or a spin that cannot be, or more than an address may
+        hold.
         """
         if sum(len(key) + len(value) for key, value in asked.items()) > LONGEST:
             raise InputError(f"Input address must have at most {LONGEST} characters of a scene; instead it is longer.")

@@ -113,10 +113,9 @@ def compared(state: PageState) -> list[FieldModel]:
 
 
 def preview(state: PageState, near: Sequence[Any] = (), patient: bool = False) -> Shown:
-    """Equilibria of a `state` without the plate's currents, while a slider moves.
+    """Equilibria of a `state` without the plate's currents, while a slider moves: by Newton's method from those `near`.
 
-    They are those that Newton's method finds from places `near`, as of `Shown.places`, else from the point dipole's,
-    else all that a search finds. Who is `patient` gets finite elements where they are not in the cache, too.
+    Else from the point dipole's, else by a search. Who is `patient` gets finite elements that are not cached, too.
     """
     known: dict[str, Levitation] = {}
     fresh: Sequence[Any] = ()  # places by the point dipole, the first of all
@@ -213,10 +212,7 @@ Place: TypeAlias = tuple[float, float]  # Frequency, Hz, and measure of the roto
 
 @dataclass(frozen=True)
 class Regions:
-    """Where the floater levitates stably over frequency (Hz) and measure (mm or °) by a model.
-
-    `cells` are polygons that together are the region, `border` the pieces of its border that are none of the map's.
-    """
+    """Where the floater levitates stably over frequency (Hz) and measure (mm or °): polygons, and what bounds them."""
 
     model: str
     cells: list[list[Place]]

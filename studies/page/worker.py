@@ -60,10 +60,7 @@ class Worker:
         return self._task is not None and not self._task.done()
 
     def ask(self, key: Hashable, call: Call, receive: Callable[[Any], None]) -> None:
-        """Compute when its turn comes: `call` gives the function and its arguments, `receive` gets the answer.
-
-        An older question with this `key` that still waits is left out.
-        """
+        """Compute `call`'s function of arguments in turn, for `receive`; a waiting question of this `key` goes."""
         self._waiting.pop(key, None)
         self._waiting[key] = call, receive
         if not self.busy:
