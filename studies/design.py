@@ -23,7 +23,7 @@ from ..geometry.files import write_whole
 from ..geometry.scene.files import changed, load_scene, scene_numbers, scene_text, toml_tables
 from .candidates import OF_SCENE, Candidate, Limits, Search, survey_near
 from .cli.console import note, to_json
-from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number, refused
+from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, is_number, refused, wrong
 from .figures.style import PALETTE, drawn, panels, plot_branch, save_figures
 from .gradient import Gradient
 from .levitation import Levitation, branch_of
@@ -327,10 +327,8 @@ def checked_free(free: object, levitation: Levitation) -> Limits:
     for key in gradient.checked_keys(list(bounds), "free"):
         number, (low, high) = gradient.numbers[key], bounds[key]
         if not low <= number <= high:
-            raise InputError(
-                f"Input free.{key} must be a range that holds the scene's own number, {number:g}; instead received "
-                f"[{low:g}, {high:g}]."
-            )
+            rule = f"be a range that holds the scene's own number, {number:g}"
+            raise wrong(f"free.{key}", rule, f"received [{low:g}, {high:g}].")
         if plate and levitation.models.plate_model != "none" and unknown_over_plate(key):
             raise InputError(f"Input free must name what has derivatives; instead {key}: {unknown_over_plate(key)}.")
     return bounds

@@ -27,7 +27,7 @@ from ..geometry.files import replacing, write_whole
 from ..geometry.scene.contents import AbsoluteStart, Scene
 from ..geometry.scene.files import scene_text
 from .cli.console import note, to_json
-from .cli.options import Answer, Models
+from .cli.options import Answer, Models, wrong
 from .figures.pictures import plate_currents
 from .figures.run import working_point_figure
 from .figures.style import NAMES, colour_bar, panels, save_figures, styled, titled
@@ -304,9 +304,7 @@ def working_point_dataset(levitation: Levitation) -> xr.Dataset:
     scene = levitation.scene
     numbers = [k for k, magnet in enumerate(scene.rotor) if magnet.polarization.any()]
     if not numbers:
-        raise InputError(
-            "Input rotor must have a magnet with a polarisation, whose working point is asked for; instead none has."
-        )
+        raise wrong("rotor", "have a magnet with a polarisation, whose working point is asked for", "none has.")
     floating = None
     if len(scene.floater.magnets) != 1:
         note("The magnets alone: of a floater of several magnets they are not computed.")

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ..geometry.common import Array, ComputationError, InputError, shown
 from ..geometry.scene.files import changed, scene_numbers
 from .candidates import DECAY, FREQUENCY, MODE_OF, Candidate, Limits, Search
-from .cli.options import FieldModel, Models, PlateModel, Requested, documented, refused
+from .cli.options import FieldModel, Models, PlateModel, Requested, documented, refused, wrong
 from .design import checked_free
 from .figures.style import PALETTE, drawn, panels
 from .levitation import Levitation
@@ -80,10 +80,8 @@ def rows_of_tracks(table: Mapping[str, Array]) -> dict[str, Array]:
         here = np.all(settings == one, axis=1)
         times, heights = table[TIME][here], table[HEIGHT][here]
         if here.sum() < FEWEST or not (np.isfinite([times, heights]).all() and np.all(np.diff(times) > 0)):
-            raise InputError(
-                f"Input data must have tracks of {FEWEST} points or more, with growing {TIME} and a {HEIGHT} at each; "
-                f"instead one of {here.sum()} points has not."
-            )
+            rule = f"have tracks of {FEWEST} points or more, with growing {TIME} and a {HEIGHT} at each"
+            raise wrong("data", rule, f"one of {here.sum()} points has not.")
         rows.append([*one[: len(keys)], *_ringing(times, -heights)])
     return dict(zip([*keys, *names], np.array(rows).T, strict=True))
 
@@ -126,10 +124,8 @@ class _Rows:
         rest = set(table) - {*self.measures, *self.keys, *errors}
         if rest or not self.measures:
             what = f"unknown are {', '.join(sorted(rest))}" if rest else "none is a measure"
-            raise InputError(
-                "Input data must have columns of keys of the scene file and of what was measured "
-                f"({', '.join(known)}); instead {what}."
-            )
+            rule = f"have columns of keys of the scene file and of what was measured ({', '.join(known)})"
+            raise wrong("data", rule, f"{what}.")
         if both := set(self.keys) & set(free):
             raise InputError(f"Input free must not name what the data give; instead both have {', '.join(both)}.")
         if errors and len(errors) < len(self.measures):
@@ -142,10 +138,8 @@ class _Rows:
             if not np.all(self.deviations[self.there] > 0):
                 raise InputError("Input data must have positive standard deviations; instead some are not.")
         if self.there.sum() <= len(free) - bool(errors):
-            raise InputError(
-                f"Input data must have more values than there are free numbers; instead {self.there.sum()} values are "
-                f"to give {len(free)} numbers."
-            )
+            instead = f"{self.there.sum()} values are to give {len(free)} numbers."
+            raise wrong("data", "have more values than there are free numbers", instead)
         self.set = np.array([table[name] for name in self.keys]).reshape(len(self.keys), len(self.there)).T
         self.searches = []
         for row in self.set:

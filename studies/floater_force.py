@@ -6,12 +6,12 @@ from numpy.typing import ArrayLike
 
 from ..fem.rotor.floater import FloaterSources, floater_sources, force_and_torque
 from ..fem.rotor.table import FieldTable, RangeError
-from ..geometry.common import Array, InputError
+from ..geometry.common import Array
 from ..geometry.overlap import body_overlap
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from .cli.console import note
-from .cli.options import FieldModel, Models, documented, refused
+from .cli.options import FieldModel, Models, documented, refused, wrong
 from .levitation import Levitation
 from .plan import SceneLike
 from .result import AXIS, variable
@@ -117,17 +117,13 @@ def _check_free(scene: Scene, places: Array, axes: Array) -> None:
         depth = max((body_overlap(other, part) for other in scene.turning_bodies for part in parts), default=-1.0)
         if depth > 0:
             where = ", ".join(f"{1e3 * c:.6g}" for c in place)
-            raise InputError(
-                f"Input position_mm must leave the floater free of the rotor; instead received ({where}) mm, where it "
-                f"overlaps it by {1e3 * depth:.3g} mm. Move it away by as much."
-            )
+            instead = f"received ({where}) mm, where it overlaps it by {1e3 * depth:.3g} mm. Move it away by as much."
+            raise wrong("position_mm", "leave the floater free of the rotor", instead)
 
 
 def _acting(sources: FloaterSources, table: FieldTable, places: Array, axes: Array) -> tuple[Array, Array]:
     try:
         return force_and_torque(sources, table, places, axes)
     except RangeError as error:
-        raise InputError(
-            f"Input position_mm must be where the field of the rotor is known all over the floater; instead {error} "
-            'Move it away, or take model="cuboid".'
-        ) from None
+        rule = "be where the field of the rotor is known all over the floater"
+        raise wrong("position_mm", rule, f'{error} Move it away, or take model="cuboid".') from None

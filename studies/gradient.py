@@ -22,11 +22,11 @@ from ..dynamics.motion.events import rotor_gap
 from ..dynamics.motion.rotor_effects import Mutual
 from ..dynamics.motion.state import Scales, State
 from ..fem.rotor.choice import PERMEABLE
-from ..geometry.common import Array, InputError, check_names
+from ..geometry.common import Array, check_names
 from ..geometry.cutting import united
 from ..geometry.scene.files import scene_numbers
 from .cli.console import aligned
-from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, refused
+from .cli.options import Answer, FieldModel, Models, PlateModel, Requested, documented, refused, wrong
 from .levitation import Levitation
 from .nearby_scenes import NearbyScenes, unknown_of_locked, unknown_over_plate
 from .plan import SceneLike
@@ -67,14 +67,12 @@ class Gradient:
         self.levitation = levitation
         self.scene, self.numbers = scene_numbers(levitation.still)
         if not self.scene.frequency:
-            raise InputError("Input frequency_hz must be positive for derivatives; instead the rotor is at rest.")
+            raise wrong("frequency_hz", "be positive for derivatives", "the rotor is at rest.")
         if self.scene.field_map:
-            raise InputError("Input rotor.field_map must be left out for derivatives; instead the field is a map.")
+            raise wrong("rotor.field_map", "be left out for derivatives", "the field is a map.")
         if len(united(self.scene.rotor)) < len(self.scene.rotor):  # by what parts them nothing is smooth
-            raise InputError(
-                "Input rotor.magnets must not be parts of one magnet for derivatives; instead some that touch have one "
-                "material and one polarisation. Give them as one."
-            )
+            instead = "some that touch have one material and one polarisation. Give them as one."
+            raise wrong("rotor.magnets", "not be parts of one magnet for derivatives", instead)
         # why derivatives are not known, and what is left out of those that are
         self.reasons: dict[str, str] = {}
         self._end: list[tuple[Equilibrium, NearbyScenes, Implicit, list[Nearby]]] = []
@@ -262,9 +260,8 @@ def range_ends(gradient: Gradient, keys: Sequence[str]) -> tuple[Array, Array, A
     frequency = gradient.scene.frequency
     run = nearest_range(levitation.branch, frequency)
     if run is None or not run.low.parameter <= frequency <= run.high.parameter:
-        raise EquilibriumError(
-            "The equilibrium is in no range of stable frequencies, whose ends would have derivatives."
-        )
+        said = "The equilibrium is in no range of stable frequencies, whose ends would have derivatives."
+        raise EquilibriumError(said)
     ends, found = (run.low, run.high), np.full((2, len(keys), 2), np.nan)
     for row, point in zip(found, ends, strict=True):
         if point.kind == BORDER:

@@ -21,7 +21,7 @@ from ..geometry.scene.making import magnets
 from ..geometry.shapes import Box, Cylinder, Sphere
 from ..geometry.solids import Part, Solid, known_shape
 from ..geometry.step_file import part_of
-from .cli.options import refused
+from .cli.options import refused, wrong
 
 KINDS = (kinds.Cuboid, kinds.Cylinder, kinds.CylinderSegment, kinds.Sphere, kinds.Tetrahedron, kinds.TriangularMesh)
 SIZES = ("diameter", "dimension", "vertices")
@@ -137,11 +137,9 @@ def _magnet(source: Any) -> _Magnet:
         raise InputError(f"Input collection must hold magnets at rest; instead {source!r} has a path.")
     polarization = np.asarray(source.polarization, float)
     if np.linalg.norm(polarization) > MOST_TESLA:
-        raise InputError(
-            f"Input polarization must be in T, and lengths in m, as in magpylib 5; instead {source!r} has "
-            f"{np.linalg.norm(polarization):.4g} T. These look like the millimetres and millitesla of magpylib 4: "
-            "divide both by 1000."
-        )
+        way_out = "These look like the millimetres and millitesla of magpylib 4: divide both by 1000."
+        instead = f"{source!r} has {np.linalg.norm(polarization):.4g} T. {way_out}"
+        raise wrong("polarization", "be in T, and lengths in m, as in magpylib 5", instead)
     pose = np.asarray(source.position, float), source.orientation.as_matrix()
     body = _body(source, np.asarray(size, float), pose)
     solid, keyed = (solid_of(body), body) if isinstance(body, Solid) else (body, None)
@@ -166,10 +164,8 @@ def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Any:
         if getattr(source, f"status_{fault}"):
             raise InputError(f"Input mesh must be one closed surface; instead {source!r} is {fault}.")
     if len(source.mesh) > MOST_TRIANGLES:
-        raise InputError(
-            f"Input mesh must have at most {MOST_TRIANGLES} triangles; instead {source!r} has {len(source.mesh)}. "
-            "Simplify it, as PyVista's decimate does."
-        )
+        instead = f"{source!r} has {len(source.mesh)}. Simplify it, as PyVista's decimate does."
+        raise wrong("mesh", f"have at most {MOST_TRIANGLES} triangles", instead)
     try:
         return faceted(np.asarray(source.mesh, float))
     except InputError as error:

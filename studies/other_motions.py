@@ -14,11 +14,10 @@ from ..dynamics.flights.trajectory import DURATION, STOPPED, Checkpoint, FlightS
 from ..dynamics.motion.events import CONTACT
 from ..fem.plate.floating import FloatingModes, FreeModes, Levitated, cached_floating_modes
 from ..fem.rotor_metal import pieces_of
-from ..geometry.common import InputError
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import scene_text
 from .cli.console import note, progress
-from .cli.options import Answer, Models, positive
+from .cli.options import Answer, Models, positive, wrong
 from .effects import PLATE_NEGLECTED
 from .figures.run import trajectory_figure
 from .figures.style import PALETTE, drawn, panels, save_figures
@@ -26,6 +25,7 @@ from .levitation import Levitation
 from .plan import check_drive
 from .result import DRIVE, Columns, columns, trajectory_dataset, variable, write_dataset
 
+AMONG = "where there are several floaters"
 LEFT_OUT = "Between the floaters: rigid magnetisation. What they induce in each other and in the rotor is left out."
 
 
@@ -40,25 +40,19 @@ def several(
     check_drive(scene, duration)
     for number, one in enumerate(scene.each):
         if one.floater.conductivity:
-            raise InputError(
-                f"Input floater[{number}].conductivity_S_m must be left out where there are several floaters, whose "
-                f"currents by each other are not computed; instead received {one.floater.conductivity:.3g}."
-            )
+            rule = f"be left out {AMONG}, whose currents by each other are not computed"
+            name = f"floater[{number}].conductivity_S_m"
+            raise wrong(name, rule, f"received {one.floater.conductivity:.3g}.")
     if pieces_of(scene.rotor, scene.conductors):
-        raise InputError(
-            "Input rotor must have no conductivity_S_m where there are several floaters, as they share its currents, "
-            "which is not computed; instead it has. Leave it out."
-        )
-    among = "where there are several floaters"
+        rule = f"have no conductivity_S_m {AMONG}, as they share its currents, which is not computed"
+        raise wrong("rotor", rule, "it has. Leave it out.")
     if scene.moving:
-        raise InputError(f"Input drive must have no center_mm and no axis {among}; instead it has.")
+        raise wrong("drive", f"have no center_mm and no axis {AMONG}", "it has.")
     if requested.interaction == "mutual":
-        raise InputError(f"Input --interaction must be rigid or auto {among}; instead received mutual.")
+        raise wrong("--interaction", f"be rigid or auto {AMONG}", "received mutual.")
     if scene.plate and requested.plate_model not in ("auto", "none"):
-        raise InputError(
-            "Input --plate-model must be none or auto where there are several floaters, whose common currents in a "
-            f"plate are not computed; instead received {requested.plate_model}."
-        )
+        rule = f"be none or auto {AMONG}, whose common currents in a plate are not computed"
+        raise wrong("--plate-model", rule, f"received {requested.plate_model}.")
     models = replace(requested, interaction="rigid", plate_model="none")
     first, *others = scene.each
     levitations = [Levitation(first, models)]

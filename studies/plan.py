@@ -24,13 +24,13 @@ from ..fem.plate.choice import resolve_plate_model
 from ..fem.plate.table import Region
 from ..fem.rotor.table import ROTOR, RotorTable
 from ..fem.rotor_metal import losses_key, pieces_of
-from ..geometry.common import Array, InputError, Watch
+from ..geometry.common import Array, Watch
 from ..geometry.overlap import TOUCHING, sphere_overlap
 from ..geometry.scene.contents import Scene
 from ..geometry.scene.files import check_files, load_scene, map_digest
 from ..geometry.scene.floater import Floater
 from .cli.console import detail, note, stages
-from .cli.options import Models, refused
+from .cli.options import Models, refused, wrong
 
 Made = TypeVar("Made")
 SceneLike = Scene | str | Path  # a scene, or the path of its file
@@ -88,15 +88,11 @@ def levitating_scene(scene: SceneLike) -> Scene:
     """A scene of one floater below a rotor, as `given_scene` has it; InputError: coils alone, or several floaters."""
     found = given_scene(scene)
     if found.carried_by_coils:
-        raise InputError(
-            "Input rotor must be given here; instead the scene has coils alone, which carry a conductor: spinlev "
-            "simulate computes its motion and nothing else."
-        )
+        alone = "the scene has coils alone, which carry a conductor: spinlev simulate computes its motion"
+        raise wrong("rotor", "be given here", f"{alone} and nothing else.")
     if found.companions:
-        raise InputError(
-            "Input floater must be one here; instead the scene has several, of which spinlev simulate computes the "
-            "trajectories and nothing else."
-        )
+        several = "the scene has several, of which spinlev simulate computes the trajectories and nothing else."
+        raise wrong("floater", "be one here", several)
     return found
 
 
@@ -188,20 +184,17 @@ def check_coils(scene: Scene) -> None:
     for k, coil in enumerate(scene.coils):
         if not coil.axial:
             where = "its current changes" if not coil.steady else f"it is {1e3 * np.hypot(*coil.center[:2]):.4g} mm off"
-            raise InputError(
-                f"Input coils[{k}] must have a steady current about the rotor's axis for equilibria, as else its field "
-                f"does not stand still in the rotor's frame; instead {where}. spinlev simulate computes such motions."
-            )
+            still = "as else its field does not stand still in the rotor's frame"
+            rule = f"have a steady current about the rotor's axis for equilibria, {still}"
+            raise wrong(f"coils[{k}]", rule, f"{where}. spinlev simulate computes such motions.")
 
 
 def check_drive(scene: Scene, duration: float) -> None:
     """A drive that is not over after `duration` (s) is a wrong scene: InputError."""
     total = float(scene.knots[0, -1])
     if total > duration * (1 + 1e-9):
-        raise InputError(
-            f"Input drive must end within the {duration:g} s that are simulated; instead its steps take {total:g} s. "
-            "Simulate longer, or shorten them."
-        )
+        rule = f"end within the {duration:g} s that are simulated"
+        raise wrong("drive", rule, f"its steps take {total:g} s. Simulate longer, or shorten them.")
 
 
 def check_way(scene: Scene, place: Array) -> None:
@@ -209,11 +202,9 @@ def check_way(scene: Scene, place: Array) -> None:
     for k, conductor in enumerate(scene.conductors):
         depth = sphere_overlap(place, scene.floater.radius, conductor.body)
         if depth > TOUCHING:
-            raise InputError(
-                f"Input rotor.conductors[{k}] must leave the floater's way free; instead it overlaps the floater by "
-                f"{depth * 1e3:.4g} mm where it levitates, at {np.round(place * 1e3, 3).tolist()} mm; make it smaller "
-                "or move it away."
-            )
+            there = f"{depth * 1e3:.4g} mm where it levitates, at {np.round(place * 1e3, 3).tolist()} mm"
+            instead = f"it overlaps the floater by {there}; make it smaller or move it away."
+            raise wrong(f"rotor.conductors[{k}]", "leave the floater's way free", instead)
 
 
 def check_room(scene: Scene, place: Array, when: str = "") -> None:
@@ -221,7 +212,6 @@ def check_room(scene: Scene, place: Array, when: str = "") -> None:
     depth = sphere_overlap(place, scene.floater.inner_radius, scene.plate.body) if scene.plate else 0.0
     if scene.plate and depth > TOUCHING:
         center, levitates = (np.round(c * 1e3, 3).tolist() for c in (scene.plate.box.center, place))
-        raise InputError(
-            f"Input plate.center_mm must leave room for the floater; instead received {center}: the plate overlaps it "
-            f"by {depth * 1e3:.4g} mm where it levitates{when}, at {levitates} mm; move the plate away."
-        )
+        by = f"{depth * 1e3:.4g} mm where it levitates{when}, at {levitates} mm"
+        instead = f"received {center}: the plate overlaps it by {by}; move the plate away."
+        raise wrong("plate.center_mm", "leave room for the floater", instead)

@@ -29,7 +29,7 @@ from ..geometry.scene.contents import AbsoluteStart, OffsetStart, Plate, Scene
 from ..geometry.scene.files import scene_digest
 from .catalogue.runner import figures_of
 from .cli.console import note, to_json
-from .cli.options import COLUMNS, Answer, Models, refused
+from .cli.options import COLUMNS, Answer, Models, refused, wrong
 from .compare import compared_models
 from .fields import MODELS, coils_at_start, write_working_point
 from .figures.pictures import last_view
@@ -119,10 +119,8 @@ def plate_job(scene: Scene, place: Array, frequency: float, model: str, rtol: fl
     distance, farthest = float(plate.body.distance(place)), FARTHEST * float(plate.box.size.max())
     if not NEAREST <= distance <= farthest:
         where = ", ".join(f"{c * 1e3:.6g}" for c in place)
-        raise InputError(
-            f"Input --at must lie outside the plate, {NEAREST * 1e3:g} mm to {farthest:.4g} m from it; "
-            f"instead received ({where}) mm."
-        )
+        rule = f"lie outside the plate, {NEAREST * 1e3:g} mm to {farthest:.4g} m from it"
+        raise wrong("--at", rule, f"received ({where}) mm.")
     if not TIGHTEST <= rtol < 1:
         raise refused("--rtol", f"be at least {TIGHTEST:g} and less than 1", rtol)
     name, tensor, error, from_cache = response(plate, place, frequency, model, rtol)
@@ -167,10 +165,8 @@ def response(
     if plate.each:
         raise InputError("Input --model must be fem, reduced or auto of several plates; instead received slab.")
     if height <= 0:
-        raise InputError(
-            "Input --at must be over one of the plate's two largest faces for --model slab; instead it is beside them. "
-            "Use --model fem."
-        )
+        rule = "be over one of the plate's two largest faces for --model slab"
+        raise wrong("--at", rule, "it is beside them. Use --model fem.")
     local, along = reaction_tensor(Slab(plate.conductivity, size[normal]), height, frequency), turn[:, normal]
     tensor = local[0, 0] * np.eye(3) + (local[2, 2] - local[0, 0]) * np.outer(along, along)
     return model, tensor, edge_error(plate, place), []

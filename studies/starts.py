@@ -13,7 +13,7 @@ from ..dynamics.motion.events import clearance
 from ..dynamics.motion.state import State
 from ..geometry.common import Array, InputError
 from ..geometry.scene.contents import AbsoluteStart, OffsetStart
-from .cli.options import refused
+from .cli.options import refused, wrong
 from .levitation import Levitation
 from .processes import mapped
 
@@ -79,10 +79,8 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Lev
         return about, displaced(begun, offset, about.scene.angular_velocity), offset
     near, floater = columns.pop("body_x", None), levitation.scene.floater
     if near is not None and floater.round:
-        raise InputError(
-            "Input starts.body_x must be left out of a floater that is round about its moment, as it changes nothing; "
-            "instead it is given."
-        )
+        rule = "be left out of a floater that is round about its moment, as it changes nothing"
+        raise wrong("starts.body_x", rule, "it is given.")
     defaults = {"velocity_mm_s": (0.0, 0.0, 0.0), "moment": (0.0, 0.0, 1.0), "spin_hz": (0.0, 0.0, 0.0)}
     whole = {key: columns.get(key, np.array([defaults.get(key)])) for key in list(UNITS)[1:-1]}
     position, velocity, moment, spin = (np.tile(v, (count, 1)) if len(v) == 1 else v for v in whole.values())
@@ -107,10 +105,8 @@ def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: M
             raise refused(name, f"be a whole number, {least} at least", value)
     sizes = {key: _rows("spread", key, values, SPREADS)[0] for key, values in spread.items()}
     if not sizes or any((size < 0).any() for size in sizes.values()):
-        raise InputError(
-            f"Input spread must have standard deviations, not negative, of some of {', '.join(SPREADS)}; "
-            f"instead received {dict(spread)}."
-        )
+        rule = f"have standard deviations, not negative, of some of {', '.join(SPREADS)}"
+        raise wrong("spread", rule, f"received {dict(spread)}.")
     draws = np.random.default_rng(int(seed)).normal(size=(int(count or 0), len(SPREADS), 3))
     offset, velocity, moment, spin = (draws[:, k] * sizes.get(key, np.zeros(3)) for k, key in enumerate(SPREADS))
     begun, _ = initial_state(levitation.scene, levitation.interaction, levitation.known_for_flight)

@@ -21,7 +21,7 @@ from ..fem.cache import program_digest
 from ..geometry.common import ComputationError, InputError, counted
 from ..geometry.files import seal, unsealed, write_whole
 from .cli.console import missing_extra, note, progress, to_json
-from .cli.options import Workers
+from .cli.options import Workers, wrong
 from .processes import Death, NoProcessError, program, results
 from .study import Batch, Compute, Point, Prepared, Study
 
@@ -252,11 +252,10 @@ def _workers_of_us(client: Client, address: str) -> list[str]:
     of_us = [worker for worker, answer in versions.items() if answer == program()]
     others = sorted(set(versions) - set(of_us))
     if others and not of_us:
-        raise InputError(
-            f"Input --scheduler must have workers of this version of the program; instead those of {address} "
-            f"({', '.join(others[:3])}{' …' if others[3:] else ''}) are of another: install the same version of "
-            "spinlev and of its libraries there, or choose --workers."
-        )
+        them = f"{', '.join(others[:3])}{' …' if others[3:] else ''}"
+        way_out = "install the same version of spinlev and of its libraries there, or choose --workers."
+        instead = f"those of {address} ({them}) are of another: {way_out}"
+        raise wrong("--scheduler", "have workers of this version of the program", instead)
     if others:
         note(f"{len(others)} of {len(versions)} workers are of another version of the program and are not used.")
     return of_us
@@ -285,10 +284,8 @@ def _client(address: str) -> Iterator[Client]:
         get_address_host_port(address)  # a client that does not get so far raises once more where it is dropped
         client = Client(address, set_as_default=False, timeout=patience)
     except (OSError, ValueError, TimeoutError, TypeError, RuntimeError) as error:
-        raise InputError(
-            f"Input --scheduler must be the address of a dask scheduler that answers, such as "
-            f"tcp://127.0.0.1:8786; instead received {address!r} ({type(error).__name__})."
-        ) from None
+        rule = "be the address of a dask scheduler that answers, such as tcp://127.0.0.1:8786"
+        raise wrong("--scheduler", rule, f"received {address!r} ({type(error).__name__}).") from None
     try:
         yield client
     except (OSError, TimeoutError, RuntimeError) as error:

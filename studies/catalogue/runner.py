@@ -21,7 +21,7 @@ from ...geometry.scene.files import check_files, parse_scene
 from ...geometry.solids import moved
 from .. import compare, design, fields, fit, other_motions
 from ..cli.console import note, progress
-from ..cli.options import NAMES, Answer, Models, Workers, combinations
+from ..cli.options import NAMES, Answer, Models, Workers, combinations, wrong
 from ..figures import run as drawing
 from ..figures.pictures import flight_frames, last_view, plate_currents
 from ..figures.renderer import render, rendered, turnable_page
@@ -59,9 +59,7 @@ def draw_result(path: Path, out: Path) -> list[str]:
 def read_result(path: Path) -> xr.Dataset:
     """The whole of a result file. Raises InputError if it cannot be read, or is no result of this program."""
     if path.suffix == ".toml":
-        raise InputError(
-            f"Input {path} must be a result; instead it is a scene. Its result is made by: spinlev run {path}"
-        )
+        raise wrong(str(path), "be a result", f"it is a scene. Its result is made by: spinlev run {path}")
     result = read_checked(path)
     if "study" not in result.attrs:
         raise InputError(f"Input {path} must be a result of spinlev; instead it has no attribute 'study'.")
@@ -156,10 +154,8 @@ def show_job(path: Path, out: Path, html: bool = False) -> list[str]:
     """
     result = read_result(path)
     if "scene" not in result.attrs or "position_rotor_frame" not in result:
-        raise InputError(
-            f"Input {path} must hold a trajectory (result.nc of `run`, trajectory.nc of `simulate`); instead it is of "
-            f"'{result.attrs['study']}'. Its figures: spinlev figure {path}"
-        )
+        rule = "hold a trajectory (result.nc of `run`, trajectory.nc of `simulate`)"
+        raise wrong(str(path), rule, f"it is of '{result.attrs['study']}'. Its figures: spinlev figure {path}")
     scene, motion = flight_of(result, str(path))
     table = Levitation(scene, Models(result.attrs.get("model", "auto"))).table
     time = result["time"].values

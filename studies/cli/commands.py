@@ -110,9 +110,8 @@ def field(
     """
     requested = Models(model, rtol=rtol).checked()
     if (given := (points is not None) + (plane is not None) + working_point) != 1:
-        raise InputError(
-            f"Input --points must be given, or --plane, or --working-point; instead received {given or 'none'} of them."
-        )
+        instead = f"received {given or 'none'} of them."
+        raise options.wrong("--points", "be given, or --plane, or --working-point", instead)
     if working_point:
         from ..fields import working_point_job
         from ..levitation import Levitation
@@ -302,11 +301,9 @@ def study(
         Duration of the trajectories, s.
     """
     if scene is not None:
-        raise InputError(
-            f"Input scene must be left out, as studies are of the article's scenes; instead received {scene}. For a "
-            f"scene of your own: spinlev compare {scene} (dipole against finite elements), or "
-            f"spinlev study {scene} --vary KEY=FIRST:LAST:STEP."
-        )
+        ways = f"spinlev compare {scene} (dipole against finite elements), or spinlev study {scene} --vary"
+        instead = f"received {scene}. For a scene of your own: {ways} KEY=FIRST:LAST:STEP."
+        raise options.wrong("scene", "be left out, as studies are of the article's scenes", instead)
     if vary:
         if name is None:
             raise InputError("Input name must be a scene file where --vary is given; instead it is missing.")

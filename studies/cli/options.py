@@ -36,6 +36,11 @@ def refused(name: str, rule: str, value: object, way_out: str = "") -> InputErro
     return InputError(f"Input {name} must {rule}; instead received {shown(value)}.{way_out}")
 
 
+def wrong(name: str, rule: str, instead: str) -> InputError:
+    """The error of an input `name` that must meet a `rule`, where something else is so `instead`; a way out follows."""
+    return InputError(f"Input {name} must {rule}; instead {instead}")
+
+
 def _floats(text: str, separator: str = ",") -> list[float]:
     """The numbers of a text; none where one is no finite number."""
     try:
@@ -57,10 +62,8 @@ def ramp(text: str) -> tuple[float, dict[str, float]]:
     """First frequency (Hz) and the step of a `[[drive]]`, from FROM:TO:RATE in Hz and Hz/s. Raises InputError."""
     numbers = _floats(text, ":")
     if len(numbers) != 3 or min(numbers[:2]) < 0 or numbers[2] <= 0 or numbers[0] == numbers[1]:
-        raise InputError(
-            "Input --ramp must be FROM:TO:RATE, two frequencies that are not negative and differ, Hz, and a positive "
-            f"rate, Hz/s, such as 160:80:0.2; instead received {shown(text)}."
-        )
+        rule = "two frequencies that are not negative and differ, Hz, and a positive rate, Hz/s, such as 160:80:0.2"
+        raise refused("--ramp", f"be FROM:TO:RATE, {rule}", text)
     first, last, rate = numbers
     return first, {"to_hz": last, "in_s": abs(last - first) / rate}
 
@@ -113,9 +116,8 @@ def read_points(path: Path) -> Array:
         header = [name.strip() for name in next(rows, [])]
         if any(header.count(column) != 1 for column in COLUMNS):
             received, once = shown(", ".join(header)), ", each once" * all(column in header for column in COLUMNS)
-            raise InputError(
-                f"{path}: Input header must have the columns {', '.join(COLUMNS)}{once}; instead received {received}."
-            )
+            rule = f"have the columns {', '.join(COLUMNS)}{once}; instead received {received}."
+            raise InputError(f"{path}: Input header must {rule}")
         where = [header.index(column) for column in COLUMNS]
         filled = (each for each in enumerate(rows, start=2) if any(cell.strip() for cell in each[1]))
         found = [[_number(path, line, row, header, column) for column in where] for line, row in filled]
