@@ -191,7 +191,6 @@ def compared_dataset(scene: Scene, rows: Sequence[Compared], frequencies: Array 
 
 
 def compare_words(rows: Sequence[Compared]) -> list[str]:
-    """The conclusion in a sentence or two, the table, and its conditions."""
     best, dipole = rows[-1], rows[0]
     scene = best.levitation.scene
     name = best.name.replace("fem", "finite elements").replace("+ mutual", "with mutual magnetisation")

@@ -349,7 +349,6 @@ JSON_KEYS = {
 
 
 def working_point_answer(found: xr.Dataset) -> dict[str, Any]:
-    """The numbers of `working_point_dataset` for JSON."""
     at, plain = found["floater"].values, found.assign({name: 1e3 * found[name] for name in ("place", "clear")})
     shares = {name: found[name].where(found["knee"].notnull()) for name in ("share_below", "share_error")}
     return {
@@ -359,7 +358,6 @@ def working_point_answer(found: xr.Dataset) -> dict[str, Any]:
 
 
 def working_point_lines(answer: Mapping[str, Any]) -> list[str]:
-    """How far down each magnet's field goes along its easy axis, and whether it demagnetises."""
     lines = [] if answer["floater_position_mm"] is not None else ["The floater has no equilibrium: it is left out."]
     for one in answer["working_points"]:
         text = (

@@ -285,7 +285,6 @@ class Levitation:
         return tuple(points[folds[0] + 1 :]) if folds else ()
 
     def _check_drive(self) -> None:
-        """Refuse a plate in the way of a floater after a step of the drive, where it would levitate at all."""
         if self.scene.plate is None or not self.scene.drive or not self.branch:
             return
         plate, (times, rates, _) = self.scene.plate, self.scene.knots
@@ -512,5 +511,4 @@ def branch_of(levitation: Levitation, known: Equilibrium, words: str = "") -> tu
 
 
 def _first(known: Sequence[Equilibrium]) -> Equilibrium | None:
-    """The equilibrium at which a trajectory begins, or else the nearest."""
     return starting_point(known) or next(iter(known), None)

@@ -76,7 +76,6 @@ def several_dataset(found: Together, levitation: Levitation) -> xr.Dataset:
 
 
 def outcome(found: Together) -> str:
-    """How the trajectories ended, in one sentence."""
     time, several = f"{found.trajectories[0].levitated_s:.4g} s", len(found.which) > 1
     if found.ended_by in (DURATION, STOPPED):
         return f"Simulated {time}: all {len(found.trajectories)} floaters still levitating."

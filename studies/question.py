@@ -125,7 +125,6 @@ class Question:
         return self._answer(point, levitation, self._dipoles(point, levitation))
 
     def _dipoles(self, point: Point, levitation: Levitation) -> tuple[Levitation, ...]:
-        """The scene by the point dipole and by that of the true moment, to compare; none where models are varied."""
         if self.ask != "equilibria" or "model" in point or levitation.table.model == "dipole":
             return ()
         models, rotor = replace(levitation.models, model="dipole", interaction="rigid"), levitation.scene.rotor
@@ -205,7 +204,6 @@ def _equilibria(question: Question, levitation: Levitation) -> xr.Dataset:
 
 
 def _beside(levitation: Levitation, dipoles: Sequence[Levitation]) -> dict[str, xr.Variable]:
-    """What `compared_models` says of dipole, dipole of the true moment and the scene's model, all without the plate."""
     found: Mapping[str, Any] = {}
     with suppress(SpinlevError):
         rough, moment, best = (one.without_plate for one in (*dipoles, levitation))

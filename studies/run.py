@@ -327,7 +327,6 @@ def _static_dataset(levitation: Levitation, survey: Survey, alone: Mapping[str, 
 def _write(
     levitation: Levitation, result: xr.Dataset, values: dict[str, Any], flight: Trajectory | None, out: Path
 ) -> None:
-    """The result and its summary first, then what is drawn of them."""
     note("Files and figures ...")
     scene = levitation.scene
     (out / "summary.json").unlink(missing_ok=True)  # an older one must not stand beside the new result

@@ -153,7 +153,6 @@ def equilibria_words(levitation: Levitation, survey: Survey) -> list[str]:
 
 
 def left_out_words(levitation: Levitation, left_out: Sequence[LeftOut]) -> list[str]:
-    """Which solutions are no equilibria of the scene, or could not be computed, and why: a sentence each kind."""
     cause = "the plate's response" if levitation.plate is not None else "gravity across the axis"
     said = []
     for body, where in ((why.IN_PLATE, "plate"), (why.IN_ROTOR, "rotor")):

@@ -33,7 +33,6 @@ FIELD_COLUMNS: Columns = {
 
 
 def field_components(point: Point) -> xr.Dataset:
-    """Field of one rotor by one model over `distance`, with the model's own error (0 for the article's formula)."""
     rotor = point["configuration"], point["value"]
     if point["model"] == "article":
         across, along = article.INTERACTION / article.FLOATER.moment * article.parts(*rotor, DISTANCES, 0.0)[:2]
@@ -155,7 +154,6 @@ FORCE_COLUMNS: Columns = {
 
 
 def force_curve(point: Point) -> xr.Dataset:
-    """Axial force by one formula or in one field, where everything else is balanced, see `FORCE_COLUMNS`."""
     grid, rotor = np.arange(article.CONTACT, 0.0451, point["spacing"]), (point["configuration"], point["value"])
     frequencies = np.asarray(point["frequencies_hz"], float)
     if point["model"] in FORCE_MODELS[:2]:
@@ -304,7 +302,6 @@ SIDE_COLUMNS: Columns = {
 
 
 def side_mode(point: Point) -> xr.Dataset:
-    """Radius of the circle of one rotor's floater at all frequencies, for δx = 1 mm a trajectory at `SIMULATED_HZ`."""
     grid = np.arange(article.LOWEST, article.HIGHEST + 1e-9, point["step_hz"])
     scene = article.rotor_scene(point["configuration"], point["value"], article.HIGHEST)
     levitation = article.levitation_of(scene, point["model"])

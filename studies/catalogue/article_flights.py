@@ -52,7 +52,6 @@ DISTANCE_COLUMNS: Columns = {
 
 
 def levitation_distance(point: Point) -> xr.Dataset:
-    """Distances of one rotor by one formula, or in one field, at all frequencies, see `DISTANCE_COLUMNS`."""
     grid = np.arange(article.LOWEST, article.HIGHEST + 1e-9, point["step_hz"])
     rotor = point["configuration"], point["value"]
     if point["model"] == "semi-analytic":
@@ -242,7 +241,6 @@ FLIGHT_COLUMNS: Columns = {
 
 
 def trajectories(point: Point) -> xr.Dataset:
-    """The trajectories of one rotor, simulated and averaged, see `FLIGHT_COLUMNS`; and what became of each."""
     complete = point.get("complete", False)
     scene = article.rotor_scene(point["configuration"], point["value"], article.HIGHEST)
     scene = replace(scene, **article.losses(scene, complete, complete))
@@ -263,7 +261,6 @@ def trajectories(point: Point) -> xr.Dataset:
 
 
 def _flight_row(scene: Scene, levitation: Levitation, start: BranchPoint, seconds: float) -> tuple[Any, ...]:
-    """One frequency's values of `FLIGHT_COLUMNS`."""
     there, field = replace(scene, frequency=start.parameter), levitation.interaction
     slow = drift(there, field, 0.0, article.FLIGHT, levitation.rates, Scales.of(there).unpack(start.state), stokes=True)
     times = np.linspace(0.0, slow.time[-1], SAMPLES)

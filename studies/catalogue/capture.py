@@ -163,7 +163,6 @@ def capture_points(quick: bool) -> list[Point]:
 
 
 def capture(point: Point) -> xr.Dataset:
-    """One batch of launches below one rotor, see `COLUMNS`; the outcomes are numbers of `WORDS`."""
     rotor, count = (point["configuration"], point["measure"], point["part"]), point["flights"]
     shape = point.get("shape", SPHERE)
     found: dict[str, Any] = {"part": point["part"], "batch": point["batch"], "settled": 0, "stayed": 0, "shape": shape}
@@ -303,7 +302,6 @@ def _capture_lines(result: xr.Dataset) -> list[str]:
 
 
 def capture_numbers(result: xr.Dataset) -> dict[str, Any]:
-    """The shares as numbers: `shares`, one entry for each rotor and frequency; and what the plate's lowering loses."""
     rows = []
     for _, one in each_place(result):
         value, low, high = share(one["outcome"] == CAPTURED)

@@ -163,7 +163,6 @@ SEED = 42
 
 
 def experiment_points(quick: bool) -> list[Point]:
-    """The rotors of all designs, and the variants of the fit."""
     import dynesty  # noqa: F401  # where it is missing, that is said before anything is computed
 
     rotors = [point for design in _designs(SETTINGS[quick], True).values() for point in design]
@@ -383,7 +382,6 @@ def _experiment_lines(result: xr.Dataset) -> list[str]:
 
 
 def _facts(one: xr.Dataset) -> list[str]:
-    """What each fact is worth, which unknowns it alone moves or narrows most, and which facts contradict each other."""
     weighed, gain = facts_weighed(one)
     rows, names = [], weighed["fact"].values
     for name in names:
@@ -406,7 +404,6 @@ def _facts(one: xr.Dataset) -> list[str]:
 
 
 def experiment_numbers(result: xr.Dataset) -> dict[str, Any]:
-    """Posterior, facts and evidences as numbers: `unknowns`, `facts`, `evidences`."""
     if "variant" not in result.dims:
         return {"unknowns": [], "facts": [], "evidences": []}
     one, ends = result.isel(variant=0), ("low", "middle", "high")

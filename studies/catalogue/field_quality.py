@@ -325,7 +325,6 @@ def hard_case_figure(result: xr.Dataset) -> Figure:
 
 
 def hard_case_lines(result: xr.Dataset) -> list[str]:
-    """Errors of each rotor near and far, and whether they are as stated, as a table."""
     rows = []
     for name in result["case"].values:
         row = result.sel(case=name)

@@ -53,7 +53,6 @@ ROUND_OFF = 1e-10  # Relative error of what needs no finite elements
 
 
 def dipole_vs_fem(point: Point) -> xr.Dataset:
-    """Distance, polar angle, modes and limits of stability of one rotor, by every model and with errors."""
     scene = rotor_scene(point["configuration"], point["measure"], drag=False)
     bare = replace(scene, floater=replace(scene.floater, recoil_permeability=1.0))
     start, (fine, coarse) = reference_state(scene), point["rtols"]
@@ -344,7 +343,6 @@ def floater_figure(result: xr.Dataset) -> Figure:
 
 
 def floater_lines(result: xr.Dataset) -> list[str]:
-    """From where on the rigid dipole does, and what it misses of a levitation, as a table."""
     reach = 1e3 * result["sufficient_from"]
     rows = [(f"{100 * float(k):g} %", *reach.sel(level=k, quantity=["force", "torque"]).values) for k in reach["level"]]
     lines = showing.text_table(("rigid dipole good to", "force, from (mm)", "torque, from (mm)"), rows)

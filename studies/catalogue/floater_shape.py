@@ -59,7 +59,6 @@ def body_of(shape: str, aspect: float) -> Floater:
 
 
 def limits(point: Point) -> xr.Dataset:
-    """The widest range of stable frequencies of a point."""
     of = point["shape"], point["aspect"]
     floater = floater_of(*of)
     scene = article.rotor_scene(point["configuration"], point["measure"], permeability=1.0, drag=False, floater=floater)

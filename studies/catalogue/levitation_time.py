@@ -119,7 +119,6 @@ def time_points(quick: bool) -> list[Point]:
 
 
 def levitation_times(point: Point) -> xr.Dataset:
-    """One rotor's averaged trajectories with one variant at those frequencies that the branch of equilibria reaches."""
     case, variant, model = CASES[point["case"]], VARIANTS[point["variant"]], point["model"]
     grid, (scene, still) = np.linspace(case.lowest, case.highest, point["steps"]), scenes_of(case, variant)
     levitation = levitation_of(scene, model, interaction="rigid" if model != "fem" else "mutual")
@@ -154,7 +153,6 @@ def levitation_times(point: Point) -> xr.Dataset:
 
 
 def _row(flight: Drift) -> tuple[Any, ...]:
-    """One frequency's values of `COLUMNS`."""
     kept, times = flight.ended_by in ("duration", "balance"), np.linspace(0.0, flight.time[-1], SAMPLES)
     lasted = (CAP, LEVITATES) if kept else (min(flight.levitated_s, CAP), OUTCOMES.index(flight.ended_by))
     ends = flight.distance[0], flight.distance[-1], flight.spin[-1]
@@ -243,7 +241,6 @@ def flights_figure(result: xr.Dataset) -> Figure:
 
 
 def time_lines(result: xr.Dataset) -> list[str]:
-    """Levitation times of each rotor by what is varied, as a table."""
     rows = []
     for case in result["case"].values.tolist():
         for variant in ("nominal", "permeable", "complete"):

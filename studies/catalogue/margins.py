@@ -149,7 +149,6 @@ class Slopes:
 
 
 def sensitivity(point: Point) -> xr.Dataset:
-    """Derivatives, tolerance band and tilt of one rotor."""
     slopes, samples = Slopes.of(point["configuration"], point["measure"], point["field"]), point["samples"]
     # a Latin hypercube: each parameter's draws are spread evenly (McKay, Beckman, Conover, Technometrics 21 (1979) 239)
     generator = np.random.default_rng(SEED)

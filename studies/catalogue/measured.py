@@ -80,7 +80,6 @@ def _modes(scene: Scene, order: int, heights: tuple[float, float] | None = None)
 
 
 def _sensitivities(scene: Scene, modes: FloatingModes, quick: bool) -> list[tuple[str, float]]:
-    """What changes of one thing do to the height at rest, m; those that need other modes if not `quick`."""
     floater, coils, base = scene.floater, scene.coils, resting_height(scene, modes)
     raised = modes.heights[0] + 1e-4, modes.heights[1] + 1e-4
     changes: dict[str, tuple[Scene, FloatingModes]] = {
@@ -329,14 +328,12 @@ TEAM28_NAME = "TEAM problem 28"
 
 
 def compute(point: Point) -> xr.Dataset:
-    """What is computed and what was measured of one experiment."""
     name, quick = point["experiment"], point["quick"]
     rows, more = team28_rows(quick) if name == TEAM28_NAME else (EXPERIMENTS[name](quick), xr.Dataset())
     return more.assign(columns(COLUMNS, [[row[k] for row in rows] for k in range(len(COLUMNS))]))
 
 
 def gather(parts: Sequence[xr.Dataset]) -> xr.Dataset:
-    """Every experiment, what disagrees most first."""
     whole = next((part for part in parts if "rms" in part), parts[0])
     rows = xr.concat([part[list(COLUMNS)].drop_attrs(deep=False) for part in parts], "experiment")
     order = np.argsort(-np.abs((rows["computed"] / rows["measured"] - 1).values))
@@ -344,7 +341,6 @@ def gather(parts: Sequence[xr.Dataset]) -> xr.Dataset:
 
 
 def measured_numbers(result: xr.Dataset) -> dict[str, Any]:
-    """What was measured and computed of each experiment, and of TEAM problem 28 its motion and sensitivities."""
     keys = "name", "kind", "unit", "measured", "measured_error", "measured_error_from", "computed", "error"
     found: dict[str, Any] = {"experiments": records(result, {key: key for key in keys})}
     if "rms" not in result:  # problem 28 failed

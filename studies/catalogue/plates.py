@@ -121,7 +121,6 @@ COLUMNS: Columns = {
 
 
 def plate_damping(point: Point) -> xr.Dataset:
-    """A rotor of the article over or beside one plate; NaN where it destabilises the equilibrium, see `COLUMNS`."""
     case = PlateCase(**point)
     alone, start = without_plate(case.configuration, case.measure, case.part, case.complete)
     row: dict[str, Any] = {name: point[name] for name in ("value", "sweep", "configuration")}
@@ -354,7 +353,6 @@ def compared(x: Array, measured: Array, computed: Array) -> xr.Dataset:
 
 
 def team7_lines(result: xr.Dataset) -> list[str]:
-    """How far each line of the problem is off, and what of that one turn of all phases explains."""
     lines = ["TEAM workshop problem 7, B_z on y = 72, z = 34 mm: deviation in per cent of the line's peak"]
     size = 100 * abs(result["deviation"])
     every = {str(curve): size.sel(curve=curve) for curve in size["curve"].values}

@@ -32,7 +32,6 @@ COLUMNS: Columns = {
 
 
 def ramps(point: Point) -> xr.Dataset:
-    """Frequencies at which the floater of one rotor is lost, over the `way` and the `rate` of the ramp (Hz/s)."""
     bare = article.rotor_scene(point["configuration"], point["measure"], drag=False)
     alone = article.levitation_of(bare, point["model"], interaction="rigid" if point["model"] == "dipole" else "mutual")
     whole = alone if point["model"] == "dipole" else alone.elsewhere(**article.losses(bare))
@@ -83,7 +82,6 @@ def _ramps_lines(result: xr.Dataset) -> list[str]:
 
 
 def ramps_numbers(result: xr.Dataset) -> dict[str, Any]:
-    """Each rotor's frequencies as numbers: `ramps`."""
     rotor = {"configuration": "configuration", "value": "measure"}
     found = records(result, rotor | {"lowest_stable_hz": "lowest", "highest_stable_hz": "highest"})
     for row, one in zip(found, each_case(result[["lost_at"]].stack(ramp=("way", "rate"))), strict=True):

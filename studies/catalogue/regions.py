@@ -72,7 +72,6 @@ def map_points(quick: bool) -> list[Point]:
 
 
 def stability_map(point: Point, rtol: float = RTOL) -> xr.Dataset:
-    """Intervals of stable frequencies of one rotor, and growth with a plate below at some frequencies."""
     scene = article.rotor_scene(point["configuration"], point["measure"], drag=False)
     levitation = article.levitation_of(scene, point["model"], rtol, point.get("interaction", "rigid"))
     try:

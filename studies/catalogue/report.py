@@ -36,7 +36,7 @@ STATIC = ("dipole-validity", "speed-accuracy", "field-hard-cases", "field-compon
 
 
 def cite_job(path: Path) -> list[str]:
-    """References of what a result used as entries of BibTeX. Raises InputError where the file is no result."""
+    """References of what the result at `path` used as entries of BibTeX."""
     keys, text = used_references(read_result(path)), files(__package__).joinpath("references.bib").read_text("utf-8")
     return [entry for entry, key in re.findall(r"(?ms)^(@\w+\{([\w-]+),.*?^\})$", text) if key in keys]
 

@@ -255,7 +255,6 @@ def speed_accuracy(quick: bool, names: Sequence[str] | None = None, truth: float
 
 
 def _largest(values: Array, truth: Array, rank: int) -> Array:
-    """Largest relative error (d,) over the points of each distance."""
     axes = tuple(range(2, 2 + rank))
     return np.asarray((np.linalg.norm(values - truth, axis=axes) / np.linalg.norm(truth, axis=axes)).max(axis=1))
 

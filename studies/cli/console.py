@@ -72,8 +72,7 @@ def way_out(need: str) -> str:
         release = platform.freedesktop_os_release()
         words = [release.get("ID", ""), *release.get("ID_LIKE", "").split()]
         system = next((FAMILIES[word] for word in words if word in FAMILIES), system)
-    ways = [f"{name}: {needs[need]}" for name, needs in PACKAGES.items() if system in (name, None)]
-    return f"{'; '.join(ways)}."
+    return "; ".join(f"{name}: {needs[need]}" for name, needs in PACKAGES.items() if system in (name, None)) + "."
 
 
 def is_missing_library(error: Exception) -> bool:
@@ -192,8 +191,6 @@ def detail(text: str) -> None:
 
 
 class _Printed(logging.Handler):
-    """Messages as they are, above a progress bar, and a sign of life where there are none."""
-
     def __init__(self) -> None:
         super().__init__()
         self.heartbeat = Heartbeat(lambda text: ERRORS.print(text, markup=False))
@@ -227,7 +224,7 @@ def printing(wanted: bool = True, verbose: bool = False) -> Iterator[None]:
 
 @contextmanager
 def progress(label: str) -> Iterator[Callable[..., None]]:
-    """A progress bar where messages are printed; gives a function that takes the finished fraction and a new label."""
+    """A progress bar, if messages are printed; gives a function that takes the finished fraction and a new label."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     shown = LOG.handlers and (ERRORS.is_interactive or ERRORS.is_jupyter)
     with ExitStack() as parts, Progress(*columns, console=ERRORS, transient=True, disable=not shown) as bar:

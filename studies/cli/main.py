@@ -61,15 +61,11 @@ def _status(arguments: list[str], out: Any, stop: threading.Event | None = None)
             note(f"spinlev: {TOO_MANY_FILES if error.errno == errno.EMFILE else what}")
             return 1
         except (KeyboardInterrupt, Exception) as error:
-            if isinstance(error, KeyboardInterrupt) or (stop and stop.is_set()):
-                note(STOPPED)
-                return 1
-            if "SPINLEV_TRACEBACK" in os.environ:
+            stopped = isinstance(error, KeyboardInterrupt) or (stop and stop.is_set())
+            if not stopped and "SPINLEV_TRACEBACK" in os.environ:
                 raise
-            if needed := missing_extra(error):
-                note(f"spinlev: {needed}")
-                return 1
-            note(f"spinlev: {_unforeseen(error)}")  # the last resort: what and where, without a traceback
+            # the last resort: what and where, without a traceback
+            note(STOPPED if stopped else f"spinlev: {missing_extra(error) or _unforeseen(error)}")
             return 1
     return 0
 

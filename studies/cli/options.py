@@ -119,7 +119,7 @@ def read_points(path: Path) -> Array:
             rule = f"have the columns {', '.join(COLUMNS)}{once}; instead received {received}."
             raise InputError(f"{path}: Input header must {rule}")
         where = [header.index(column) for column in COLUMNS]
-        filled = (each for each in enumerate(rows, start=2) if any(cell.strip() for cell in each[1]))
+        filled = (each for each in enumerate(rows, start=2) if any(map(str.strip, each[1])))
         found = [[_number(path, line, row, header, column) for column in where] for line, row in filled]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: Input points must be a readable CSV text; instead: {error}.") from None
@@ -129,21 +129,17 @@ def read_points(path: Path) -> Array:
 
 
 def _number(path: Path, line: int, row: list[str], header: list[str], column: int) -> float:
-    if any(cell.strip() for cell in row[len(header) :]):  # as of decimal commas
-        raise InputError(
-            f"{path}: Input line {line} must have no more entries than the header, {len(header)}; instead it has "
-            f"{len(row)}."
-        )
+    def bad(rule: str, instead: str) -> InputError:
+        return InputError(f"{path}: Input line {line} must have {rule}; instead {instead}.")
+
+    if any(map(str.strip, row[len(header) :])):  # as of decimal commas
+        raise bad(f"no more entries than the header, {len(header)}", f"it has {len(row)}")
     text = row[column].strip() if column < len(row) else ""
-    numbers = _floats(text)
-    value = numbers[0] if len(numbers) == 1 else math.nan
-    if math.isnan(value):
-        raise InputError(f"{path}: Input line {line} must have three finite numbers; instead received {shown(text)}.")
-    if abs(value) > FARTHEST:
-        raise InputError(
-            f"{path}: Input line {line} must have numbers of at most {FARTHEST:g} mm; instead received {value:g}."
-        )
-    return value
+    if len(numbers := _floats(text)) != 1:
+        raise bad("three finite numbers", f"received {shown(text)}")
+    if abs(numbers[0]) > FARTHEST:
+        raise bad(f"numbers of at most {FARTHEST:g} mm", f"received {numbers[0]:g}")
+    return numbers[0]
 
 
 Flag = Annotated[bool, Parameter(negative="")]
@@ -317,11 +313,10 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
         with printing(by_a_person if wanted is None else bool(wanted)):
             return function(*args, **kwargs)
 
-    own = [parameter for parameter in signature.parameters.values() if parameter.kind != parameter.VAR_KEYWORD]
-    if len(own) < len(signature.parameters):  # `**requested`, one by one
-        only = inspect.Parameter.KEYWORD_ONLY
-        for name, hint in Requested.__annotations__.items():
-            own.append(inspect.Parameter(name, only, default=getattr(Models, name), annotation=hint))
+    own, kind = list(signature.parameters.values()), inspect.Parameter
+    if own[-1].kind == kind.VAR_KEYWORD:  # `**requested`, one by one
+        hints = Requested.__annotations__.items()
+        own[-1:] = [kind(k, kind.KEYWORD_ONLY, default=getattr(Models, k), annotation=hint) for k, hint in hints]
     called.__signature__ = signature.replace(parameters=own)  # type: ignore[attr-defined]
     summary, *parts = re.split(r"(?m)^(\w+)\n-+\n", inspect.cleandoc(function.__doc__ or ""))
     sections = {name: text.strip() for name, text in zip(parts[::2], parts[1::2], strict=True)}
@@ -339,8 +334,7 @@ def documented(function: Callable[P, T]) -> Callable[P, T]:
 
 def unknown_study(name: str | None, known: Iterable[str]) -> InputError:
     """The error of a study that is none of those `known`: the one that was meant, or what takes a scene."""
-    names = list(known)
-    hint = ""
+    names, hint = list(known), ""
     if name and name.endswith(".toml"):
         hint = f" For this scene: spinlev compare {name}, or spinlev study {name} --vary KEY=FIRST:LAST:STEP."
     elif close := difflib.get_close_matches(name or "", names, n=1):
@@ -430,7 +424,7 @@ def _decimal_point(text: str) -> str:
 
 
 # Which of the scenes that come with the program shows which kind of rotor.
-KINDS: Mapping[str, str] = {
+KINDS = {
     "tilt": "tilt-over-plate",
     "horizontal": "horizontal",
     "vertical": "vertical-24h",

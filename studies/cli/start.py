@@ -55,7 +55,6 @@ def _open_streams() -> None:
 
 
 def _find_home() -> None:
-    """Give a user whose home is not known, or not there, one among the temporary files: libraries ask for it."""
     home = os.path.expanduser("~")
     if os.path.isabs(home) and os.path.isdir(home):
         return

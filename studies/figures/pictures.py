@@ -34,11 +34,9 @@ def last_view(scene: Scene, table: FieldTable, time: Array, motion: State) -> Vi
 
 
 def seen_from(scene: Scene, time: Array, motion: State) -> View:
-    """The end of a trajectory of a `scene` with its path: `motion` along the rotor's axes at `time` (n,) s.
-
-    A floater that gravity across the axis keeps on one side of it does not turn with the rotor: its path is that in the
-    laboratory, and it stands where it is at an instant near the end at which the rotor's axes are the laboratory's.
-    """
+    """The end of a trajectory of a `scene` with its path: `motion` along the rotor's axes at `time` (n,) s."""
+    # Gravity across the axis keeps a floater on one side of it: its path is that in the laboratory, and it stands where
+    # it is at an instant near the end at which the rotor's axes are the laboratory's.
     frame, last = "rotor's frame", len(time) - 1
     if np.any(scene.gravity[:2]):
         frame, angle = "laboratory", scene.angle(time)

@@ -94,10 +94,8 @@ def flight_animation(frames: Frames) -> Iterator[float | bytes]:
 
 
 def turnable_scene(view: View) -> bytes:
-    """Bodies, path and field lines of a view as the viewer of trame-vtk takes them, without names.
-
-    PyVista's own `export_html` gives the same file, but starts a web server to make it.
-    """
+    """Bodies, path and field lines of a view as the viewer of trame-vtk takes them, without names."""
+    # PyVista's own `export_html` gives the same file, but starts a web server to make it
     from trame_vtk.modules.vtk import serializers
 
     plotter = new_plotter((900, 700))
@@ -124,7 +122,7 @@ def turnable_scene(view: View) -> bytes:
 
 
 def new_plotter(size: tuple[int, int] = (1400, 1100)) -> pv.Plotter:
-    """A plotter without a screen, on white, for a picture of a `size` in pixels, width and height."""
+    """A plotter without a screen, on white, of a `size` in pixels, width and height."""
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # that there is no screen is no news here
     plotter = pv.Plotter(off_screen=True, window_size=size, lighting="three lights")
     plotter.set_background("white")
@@ -134,10 +132,9 @@ def new_plotter(size: tuple[int, int] = (1400, 1100)) -> pv.Plotter:
 def add_floater(
     plotter: pv.Plotter, scene: Scene, position: Array, moment: Array, axes: Array | None = None
 ) -> list[pv.Actor]:
-    """Draw the floater of a `scene` at a `position` (3,) m and its `moment` (3,), which may be zero.
+    """Draw the floater of a `scene` at a `position` (3,) m with its `moment` on a `plotter`; returns the actors.
 
-    On a `plotter`, lengths in mm. The columns of `axes` (3, 3) are the body's; None: those that the moment gives.
-    Returns the actors.
+    The columns of `axes` (3, 3) are the body's; None: those that the moment gives, which may be zero.
     """
     drawn, direction = [], moment / (np.linalg.norm(moment) or 1.0)
     for part in scene.floater.placed(position, direction if axes is None else axes):

@@ -59,14 +59,8 @@ class _Looks(dict[str, str]):
         return self.other or model
 
 
-NAMES = _Looks(
-    dipole="point dipole",
-    cuboid="closed form (μr = 1)",
-    fem="finite elements",
-    moments="moments",
-    map="map",
-    surface="charges on the surfaces",
-)
+NAMES = _Looks(dipole="point dipole", cuboid="closed form (μr = 1)", fem="finite elements", moments="moments")
+NAMES |= {"map": "map", "surface": "charges on the surfaces"}
 COLORS = _Looks(zip(NAMES, PALETTE, strict=False))
 DASHES = _Looks(dipole="--", cuboid="-.", fem="-", moments=":", map="-", surface="-")
 COLORS.other, DASHES.other = "#000000", "-"

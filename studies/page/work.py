@@ -235,7 +235,6 @@ def map_key(state: PageState) -> str:
 
 
 def article_points(state: PageState) -> dict[str, Any]:
-    """Rotors of the article that were `tested` without frequency, those that `levitated`, and its trajectories."""
     kind = state.keys["rotor"]["configuration"]
     known = article.CONFIGURATIONS[kind]
     return {"tested": known.tested, "levitated": known.levitated, "flights": ARTICLE_FLIGHTS.get(kind, ())}
@@ -324,7 +323,6 @@ _flights: list[LiveFlight] = []  # The one of this process
 
 
 def begin_flight(state: PageState) -> Frame:
-    """The first moment of a trajectory, this process's from now on; raises what `Levitation.live_flight` raises."""
     _flights[:] = [Levitation(state.scene, state.models, state.spin).live_flight()]
     return _frame()
 

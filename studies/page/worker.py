@@ -132,7 +132,6 @@ class Worker:
 
 
 def _stopped(task: asyncio.Task[None]) -> None:
-    """A signal that stops the program may come while a task runs, whose fault it is not: no message then."""
     error = None if task.cancelled() else task.exception()
     if error is not None and not isinstance(error, KeyboardInterrupt):
         raise error
