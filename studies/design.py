@@ -198,8 +198,10 @@ class _Problem:
                 options={"maxiter": STEPS, "ftol": TOLERANCE},
             )  # fmt: skip
         if not self.best:
-            said = f"No scene that was looked at{self.by} meets all limits{self.nearest[1]}."
-            raise ComputationError(f"{said} Give wider bounds, or other limits.")
+            raise ComputationError(
+                f"No scene that was looked at{self.by} meets all limits{self.nearest[1]}. Give wider bounds, or other "
+                "limits."
+            )
         _, known, numbers = self.best[-1]
         search.go_on_from(known, numbers)
         return known, numbers

@@ -75,7 +75,7 @@ def way_out(need: str) -> str:
     return "; ".join(f"{name}: {needs[need]}" for name, needs in PACKAGES.items() if system in (name, None)) + "."
 
 
-def is_missing_library(error: Exception) -> bool:
+def is_missing_library(error: BaseException) -> bool:
     """Whether an error is that a module's compiled code did not find a library of the system."""
     return isinstance(error, ImportError) and any(word in str(error) for word in ("shared object", "dlopen"))
 

@@ -75,7 +75,7 @@ def _message(error: Exception) -> str:
     return "\n".join(line if len(line) <= LONGEST else f"{line[:LONGEST]} ..." for line in lines)
 
 
-def _unforeseen(error: Exception) -> str:
+def _unforeseen(error: BaseException) -> str:
     if is_missing_library(error):
         mend = f"{sys.executable} -m {__package__}.installation"
         return f"a library cannot be loaded: {error}. It may be enough to run {mend}. {way_out(FORTRAN)}"

@@ -116,8 +116,8 @@ def read_points(path: Path) -> Array:
         header = [name.strip() for name in next(rows, [])]
         if any(header.count(column) != 1 for column in COLUMNS):
             received, once = shown(", ".join(header)), ", each once" * all(column in header for column in COLUMNS)
-            rule = f"have the columns {', '.join(COLUMNS)}{once}; instead received {received}."
-            raise InputError(f"{path}: Input header must {rule}")
+            names = f"{', '.join(COLUMNS)}{once}"
+            raise InputError(f"{path}: Input header must have the columns {names}; instead received {received}.")
         where = [header.index(column) for column in COLUMNS]
         filled = (each for each in enumerate(rows, start=2) if any(map(str.strip, each[1])))
         found = [[_number(path, line, row, header, column) for column in where] for line, row in filled]

@@ -85,8 +85,9 @@ def drawn(pictures: Sequence[Picture], progress: Progress = lambda fraction: Non
                 if isinstance(answer, Death):
                     from ..cli.console import DRAWING, way_out
 
-                    said = f"the process that draws them {answer.how}, as it does without graphics libraries."
-                    raise RenderError(f"{said} {way_out(DRAWING)}")
+                    said = f"the process that draws them {answer.how}, as it does without graphics libraries. "
+                    said += way_out(DRAWING)
+                    raise RenderError(said)
                 if isinstance(answer, str):
                     raise RenderError(answer)
                 if isinstance(answer, float):
