@@ -67,7 +67,6 @@ class Candidate:
 
     @property
     def bare(self) -> Equilibrium:
-        """The equilibrium as if there were no plate."""
         return self.known.without or self.known
 
     @cached_property

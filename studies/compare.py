@@ -89,11 +89,10 @@ def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str
 
 
 def field_rtol(scene: Scene) -> float:
-    """Relative error of the field in a comparison, where none is given; parts would take minutes to that of others."""
     return PART_RTOL if any(isinstance(magnet.body, Part) for magnet in scene.rotor) else Models.rtol
 
 
-def compared(scene: Scene, requested: Models, spin: float) -> list[Compared]:
+def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compared]:
     """A `scene` with body `spin` by dipole, dipole of the true moment, closed form, finite elements, and all of it.
 
     Tolerances and plate are as `requested`; a map of the field takes the place of finite elements. What mutual

@@ -68,7 +68,6 @@ Best = tuple[Candidate, Array]  # a scene and its numbers
 
 
 def _range(name: str, value: object) -> tuple[float, float]:
-    """A number as a range of itself, or two numbers in order, of which None and infinity leave an end open."""
     ends = list(value) if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else [value] * 2
     if len(ends) == 2:
         low, high = (side if end is None else end for end, side in zip(ends, (-np.inf, np.inf), strict=True))
@@ -410,7 +409,6 @@ def _measured(levitation: Levitation, known: Equilibrium | None, keys: tuple[str
 
 
 def _curve(levitation: Levitation, known: Equilibrium | None) -> Array:
-    """Frequencies, distances and stability (3, `CURVE`) along the branch of an equilibrium; NaN where there is none."""
     found = np.full((3, CURVE), np.nan)
     points = branch_of(levitation, known.without or known) if known and levitation.scene.floater.round else ()
     if points:

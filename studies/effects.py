@@ -104,7 +104,6 @@ def _scene(levitation: Levitation, first: Equilibrium | None) -> Scene:
 
 
 def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
-    """Eddy currents of the scene's floater, or what those of a sintered magnet would be."""
     scene, growth = _scene(levitation, first), None
     floater = scene.floater
     there = replace(scene, floater=replace(floater, conductivity=floater.conductivity or MAGNET_CONDUCTIVITY))
@@ -129,7 +128,6 @@ def _missed(floater: Floater, doubt: float) -> float:
 
 
 def _rotor_currents(levitation: Levitation, first: Equilibrium | None) -> ListedEffect:
-    """Eddy currents of the scene's rotor, or what those of sintered magnets, taken as balls, would be."""
     scene, growth, included = _scene(levitation, first), None, levitation.losses is not None
     pieces = pieces_of([replace(magnet, conductivity=MAGNET_CONDUCTIVITY) for magnet in scene.rotor], ())
     losses = levitation.losses or (ball_losses(pieces) if pieces else None)

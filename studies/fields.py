@@ -218,7 +218,6 @@ def field_map_job(scene: Scene, plane: str, extent: Array | None, offset: float,
 
 
 def field_map(scene: Scene, plane: str, extent: Array | None, offset: float, steps: int) -> xr.Dataset:
-    """Field of every model on a plane; `scene`, `plane`, `extent`, `offset`, `steps` as of `field_map_job`."""
     along, up, across = PLANES[plane]
     if extent is None:  # a square about the rotor, twice its size
         corners = np.concatenate([magnet.body.corners for magnet in scene.rotor])[:, [along, up]]

@@ -149,7 +149,6 @@ class _Rows:
             self.searches.append(Search(there, free))
 
     def _at(self, numbers: Array) -> Iterator[tuple[Search, Candidate | None, list[str], Array, Array]]:
-        """Each row's search and scene, the names of what was measured in it, that, and its standard deviations."""
         for k, search in enumerate(self.searches):
             names = [name for name, here in zip(self.measures, self.there[k], strict=True) if here]
             yield search, search.at(numbers), names, self.measured[k][self.there[k]], self.deviations[k][self.there[k]]

@@ -110,7 +110,6 @@ class Levitation:
 
     @property
     def from_cache(self) -> list[str]:
-        """Names of the tables that were found in the user's cache."""
         return list(self._tables.from_cache)
 
     @property
@@ -125,7 +124,6 @@ class Levitation:
 
     @property
     def about(self) -> dict[str, str]:
-        """Attributes of every result: its models and the text of its scene."""
         return {**self.labels, "scene": scene_text(self.scene)}
 
     # The rotor's field and what else acts

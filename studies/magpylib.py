@@ -147,7 +147,6 @@ def _magnet(source: Any) -> _Magnet:
 
 
 def _body(source: Any, size: Array, pose: tuple[Array, Array]) -> Any:
-    """The body of a source in its place, or the solid of one that a scene file has no keys for."""
     if isinstance(source, kinds.Sphere):
         return Sphere(float(size) / 2, *pose)
     if isinstance(source, kinds.Cuboid):

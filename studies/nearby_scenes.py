@@ -89,7 +89,6 @@ class NearbyScenes:
         return scene_numbers(self.scene)[1]
 
     def around(self, key: str) -> list[Nearby]:
-        """Equations about a number; on one side of it where it may not grow or shrink."""
         return [
             Nearby(offset, weight, lower, self.at(scene, {key: offset}))
             for offset, weight, lower, scene in self._scenes(key)

@@ -150,7 +150,6 @@ def far_plan(plan: PlatePlan, models: Models, slab: PlateMemory) -> PlatePlan:
 
 
 def looser(rtol: float) -> float:
-    """The accuracy asked of a plate's table for a region in which `rtol` takes too long."""
     return max(rtol, min(LOOSER * rtol, ROUGHEST))
 
 

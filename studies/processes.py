@@ -101,7 +101,6 @@ def results(number: int, function: Function, items: deque[Any], showing: bool = 
 
 
 def _fewer(left: int, why: str) -> int:
-    """The number of processes left. Raises NoProcessError where there are none."""
     if not left:
         raise NoProcessError(f"No process can begin: {why}.")
     return left

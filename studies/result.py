@@ -208,7 +208,6 @@ def _read(equilibrium: Equilibrium, name: str, unit: str) -> Any:
 
 
 def left_out_text(left_out: Sequence[LeftOut]) -> str:
-    """Solutions that are no equilibria, for an attribute of a dataset."""
     return "; ".join(f"{one.why}: {millimetres(one.known.position)}" for one in left_out)
 
 

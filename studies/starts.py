@@ -114,16 +114,12 @@ def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: M
     turned = begun.moment + moment
     turned = turned / np.linalg.norm(turned, axis=1)[:, None]
     drawn = State(begun.position, begun.velocity + velocity, turned, begun.spin + spin)
-    if begun.axes is not None:
-        drawn = replace(drawn, axes=_least_turns(begun.moment, turned) @ begun.axes)
+    if begun.axes is not None:  # turned about an axis across both moments
+        cross = np.cross(np.cross(begun.moment, turned)[:, None], np.eye(3)).swapaxes(1, 2)
+        cosine = np.sum(begun.moment * turned, axis=1)[:, None, None]
+        turns = np.eye(3) + cross + cross @ cross / np.maximum(1 + cosine, 1e-12)
+        drawn = replace(drawn, axes=turns @ begun.axes)
     return drawn
-
-
-def _least_turns(before: Array, after: Array) -> Array:
-    """(n, 3, 3) turns of unit vectors (n, 3) to others, about an axis across both."""
-    about, cosine = np.cross(before, after), np.sum(before * after, axis=1)
-    cross = np.cross(about[:, None], np.eye(3)).swapaxes(1, 2)
-    return np.asarray(np.eye(3) + cross + cross @ cross / np.maximum(1 + cosine, 1e-12)[:, None, None])
 
 
 def _rows(name: str, key: str, values: Any, units: Mapping[str, float]) -> Array:

@@ -40,7 +40,6 @@ def recorded(point: Point, table: Columns, found: Found, axes: Mapping[str, Any]
 
 
 def cases_with(result: xr.Dataset, **labels: object) -> xr.Dataset:
-    """The cases of a joined result with the given labels."""
     chosen = np.all([result[name].values == wanted for name, wanted in labels.items()], axis=0)
     return result.isel(case=np.flatnonzero(chosen))
 

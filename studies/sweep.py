@@ -1,7 +1,5 @@
 """The points of a study, computed by this process, others of this machine or a dask scheduler; what is done is kept."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging
@@ -12,7 +10,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence, Set
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,9 +22,6 @@ from .cli.console import missing_extra, note, progress, to_json
 from .cli.options import Workers, wrong
 from .processes import Death, NoProcessError, program, results
 from .study import Batch, Compute, Point, Prepared, Study
-
-if TYPE_CHECKING:
-    from distributed import Client, Future
 
 # Rooms whose text does not change a point, but for the file of its own study.
 SHOWING = ("studies/catalogue", "studies/cli", "studies/figures", "studies/page")
@@ -105,7 +100,6 @@ class Journal:
         return sorted(self.folder.glob(f"*-{self._sweep}.json"))
 
     def finished(self) -> dict[int, xr.Dataset]:
-        """The points that an earlier run of the same sweep has finished."""
         ours, found = self.files(), {}
         if others := len(list(self.folder.glob("*.json"))) - len(ours):
             note(
@@ -215,7 +209,7 @@ def _on_scheduler(address: str, job: Any, batches: deque[Batch]) -> Answers:
         from distributed.scheduler import KilledWorker
 
         of_us = _workers_of_us(client, address)
-        begun: dict[Future[Any], Batch] = {}
+        begun = dict[Any, Batch]()
         running = as_completed(loop=client.loop)
         while batches or begun:
             while batches:
@@ -246,7 +240,7 @@ def answered(requesting: str, job: Any, batch: Batch) -> list[Attempt] | None:
     return list(job(batch)) if program() == requesting else None
 
 
-def _workers_of_us(client: Client, address: str) -> list[str]:
+def _workers_of_us(client: Any, address: str) -> list[str]:
     """Addresses of the workers of this version, none while there are no workers. InputError where all are of others."""
     versions = client.run(program, on_error="return")
     of_us = [worker for worker, answer in versions.items() if answer == program()]
@@ -269,7 +263,7 @@ def _lost(address: str) -> ComputationError:
 
 
 @contextmanager
-def _client(address: str) -> Iterator[Client]:
+def _client(address: str) -> Iterator[Any]:
     from dask import config
     from dask.utils import parse_timedelta
     from distributed import Client

@@ -73,7 +73,6 @@ def error_bars(
 
 
 def _statistics(sample: Array) -> tuple[Array, Array]:
-    """Standard deviations and percentiles of draws (draw, ...), of those that have an equilibrium."""
     good = sample[np.isfinite(sample).reshape(len(sample), -1).any(axis=1)]
     if len(good) < 2:
         return np.full(sample.shape[1:], np.nan), np.full((len(PERCENTILES), *sample.shape[1:]), np.nan)

@@ -146,7 +146,6 @@ def equilibria_rows(levitation: Levitation, equilibria: Sequence[Equilibrium]) -
 
 
 def equilibria_words(levitation: Levitation, survey: Survey) -> list[str]:
-    """The headline, the equilibria as a table, and what was left out."""
     table = aligned(equilibria_rows(levitation, survey.equilibria), ">" * (len(COLUMNS) - 1) + "<")
     said = headline(levitation, survey.equilibria, survey.left_out)
     return [said, *(f"  {line}" for line in table), *left_out_words(levitation, survey.left_out)]
@@ -205,7 +204,6 @@ def kind_of_flight(levitation: Levitation, flight: Trajectory) -> str:
 
 
 def flight_words(levitation: Levitation, flight: Trajectory) -> str:
-    """How a trajectory of a `levitation`'s floater ended, in a sentence."""
     kind, time = kind_of_flight(levitation, flight), f"{flight.levitated_s:.4g} s"
     if flight.levitated_s >= 7200:
         time += f" ({flight.levitated_s / 3600:.4g} h)"
@@ -250,7 +248,6 @@ def plate_words(levitation: Levitation) -> list[str]:
 
 
 def note_details(flight: Trajectory) -> None:
-    """Report how exactly a trajectory was integrated, with --verbose."""
     beyond, changes = flight.beyond_plate_table, flight.field_changes
     detail(
         f"Energy balance and unit length of the moment violated by {flight.energy_error:.1e} at most; "

@@ -65,13 +65,11 @@ QUICK_ROTORS = (("horizontal", 2.0), ("vertical", 14.0), ("tilt", 10.0))
 
 
 def rotor_label(configuration: str, value: float) -> str:
-    """A rotor's parameter with its symbol and unit."""
     kind = CONFIGURATIONS[configuration]
     return f"{kind.symbol} = {value:g}{'' if kind.unit == '°' else ' '}{kind.unit}"
 
 
 def label_of(configuration: str) -> str:
-    """A configuration's parameter with its unit, for an axis."""
     return f"{CONFIGURATIONS[configuration].symbol} ({CONFIGURATIONS[configuration].unit})"
 
 

@@ -110,10 +110,6 @@ def _levitated(rotor: xr.Dataset) -> bool:
     return value in article.CONFIGURATIONS[configuration].levitated
 
 
-def _levitated_rotors(result: xr.Dataset) -> xr.Dataset:
-    return result.isel(case=[_levitated(one) for one in each_case(result)])
-
-
 @each(showing.rotor_panels, 4.0, *AXES, sharex=True)
 def models_figure(axes: Axes, rotor: xr.Dataset, color: Any) -> None:
     """The levitation distance of every rotor by finite elements and by the dipole."""
@@ -128,7 +124,7 @@ def models_figure(axes: Axes, rotor: xr.Dataset, color: Any) -> None:
     showing.explain(axes, {"thick: levitated in the experiment": "-"}, lw=1.8)
 
 
-@each(showing.rotor_panels, 3.4, *AXES, of=_levitated_rotors, sharex=True)
+@each(showing.rotor_panels, 3.4, *AXES, of=lambda r: r.isel(case=list(map(_levitated, each_case(r)))), sharex=True)
 def formulas_figure(axes: Axes, rotor: xr.Dataset, color: Any) -> None:
     """The article's formulas and simulated trajectories beside the dipole's equilibrium, for rotors that levitated."""
     plot_branch(axes, *_side(rotor, "dipole", "near"), lw=0.8, color=color)

@@ -246,7 +246,6 @@ def quantiles(one: xr.Dataset) -> Array:
 
 
 def prior_quantiles(result: xr.Dataset) -> Array:
-    """The same of the prior."""
     priors = zip(result["prior"].values, result["prior_numbers"].values, strict=True)
     return np.array([model.quantile(kind, first, second, SHARES) for kind, (first, second) in priors])
 

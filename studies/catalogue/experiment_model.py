@@ -509,7 +509,6 @@ NAMES = tuple(unknown.name for unknown in UNKNOWNS)
 
 
 def prior_values(shares: Array) -> dict[str, Array]:
-    """Values (n,) by name at points (n, unknown) of the unit cube."""
     return {u.name: quantile(u.prior, u.first, u.second, share) for u, share in zip(UNKNOWNS, shares.T, strict=True)}
 
 

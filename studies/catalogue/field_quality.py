@@ -46,7 +46,6 @@ AZIMUTHS = np.radians(np.arange(0.0, 360.0, 30.0))
 
 
 def dipole_validity(quick: bool, rotors: Mapping[str, tuple[Magnet, ...]] = ROTORS) -> xr.Dataset:
-    """Relative errors of B and of its gradient by rotor, model, distance and lateral offset."""
     distance = np.linspace(0.0115, 0.05, 12 if quick else 60)
     offset = np.linspace(0.0, 0.01, 5 if quick else 21)
     d, r, phi = np.meshgrid(distance, offset, AZIMUTHS, indexing="ij")
@@ -88,7 +87,6 @@ def models(magnets: tuple[Magnet, ...], factor: float) -> dict[str, RotorTable]:
 
 
 def moments_table(magnets: tuple[Magnet, ...], degree: int) -> RotorTable:
-    """The field of each magnet's moments up to a degree."""
     return RotorTable("moments", magnets, (), tuple(uniform_moments(magnet, degree) for magnet in magnets))
 
 

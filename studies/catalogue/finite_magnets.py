@@ -179,8 +179,6 @@ def _dipole_lines(result: xr.Dataset) -> list[str]:
 
 
 def sentence(result: xr.Dataset) -> str:
-    """The answer in one sentence, point dipoles less finite magnets: ranges over rotors and frequencies."""
-
     def wrong(name: str, scale: float = 1.0) -> str:
         value, error = change(result, name, TOTAL)
         return showing.range_text(-value, error, scale)

@@ -111,7 +111,6 @@ COLUMNS: Columns = {
 
 
 def time_points(quick: bool) -> list[Point]:
-    """Every case with every variant; `quick` has two cases, fewer frequencies and variants, and point dipoles."""
     names, variants = (QUICK, QUICK_VARIANTS) if quick else (tuple(CASES), tuple(VARIANTS))
     steps, model = (11, "dipole") if quick else (36, "cuboid")
     models = {v: model if VARIANTS[v].rotor == "rigid" else "fem" for v in variants}
@@ -162,7 +161,6 @@ def _row(flight: Drift) -> tuple[Any, ...]:
 
 
 def gather_times(parts: Sequence[xr.Dataset]) -> xr.Dataset:
-    """All rows by `case` and `variant`; NaN where one is missing."""
     names = dict.fromkeys(part["case"].item() for part in parts)
     rotors = [[part for part in parts if part["case"].item() == name] for name in names]
     cases = [xr.concat(rows, "variant", data_vars="all", coords="minimal", compat="override") for rows in rotors]

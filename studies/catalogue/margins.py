@@ -71,7 +71,6 @@ COLUMNS: Columns = {
 
 
 def parameters_of(configuration: str) -> list[Known]:
-    """How well each parameter of a rotor is known (parameter,)."""
     return list((PARAMETERS | (TILT if configuration == "tilt" else {})).values())
 
 

@@ -57,7 +57,6 @@ def team28(thickness_mm: float = 3.0) -> Scene:
 
 
 def measured_heights() -> tuple[Array, Array]:
-    """Times (n,) s and heights (n,) m of the lower face of problem 28's disc."""
     lines = files(__package__).joinpath("team28_height.csv").read_text(encoding="utf-8").splitlines()
     time, height = 1e-3 * np.loadtxt(lines, delimiter=",", skiprows=2).T
     return time, height
@@ -69,7 +68,6 @@ def resting_height(scene: Scene, modes: FloatingModes) -> float:
 
 
 def in_phase(scene: Scene, phase: float) -> Scene:
-    """The scene with another phase (rad) of all currents at the start."""
     return replace(scene, coils=tuple(replace(coil, phase=phase) for coil in scene.coils))
 
 
@@ -133,7 +131,6 @@ def swing_errors(time: Array, height: Array) -> Array:
 
 
 def team28_rows(quick: bool) -> tuple[list[Row], xr.Dataset]:
-    """Rows of problem 28, and the trajectory."""
     scene = team28()
     modes = _modes(scene, 3 if quick else 4)
     half = float(scene.floater.bodies[0].half_edges[2])
@@ -173,7 +170,6 @@ def spinning_sphere(quick: bool) -> list[Row]:
 
 
 def losses(quick: bool) -> list[Row]:
-    """What a dipole loses beside a sphere and in a tube."""
     rows: list[Row] = []
     radius, frequency, inner, outer = 0.01, 50.0, 0.01, 0.0125
     place, tube = 1.6 * radius, Plate(ring(outer, inner, 14 * inner), COPPER)

@@ -241,7 +241,6 @@ def _damping_lines(result: xr.Dataset) -> list[str]:
 
 
 def sentence(result: xr.Dataset) -> str:
-    """The answer in one sentence: ranges over the article's rotors, each with the largest error."""
     words = []
     for sweep, place in zip(ROTORS, ("below the floater", "standing beside it"), strict=True):
         part = part_of(result, sweep)

@@ -60,7 +60,6 @@ LASTING: Columns = {
 
 
 def map_points(quick: bool) -> list[Point]:
-    """Rotors by their measures and models; trajectories and the plate for those whose levitation is known."""
     rotors = {name: (value,) for name, value in article.QUICK_ROTORS} if quick else MEASURES
     points: list[Point] = []
     for c, m, model in ((c, m, model) for c, some in rotors.items() for m in some for model in article.MODELS):
@@ -237,14 +236,12 @@ def spacer(displacement: float) -> Conductor:
 
 
 def scene_of(point: Point) -> Scene:
-    """The rotor of a point in real air, with the currents that its variant has."""
     bare, variant = article.rotor_scene(point["configuration"], point["measure"], permeability=1.0), point["variant"]
     blocks = (spacer(1e-3 * point["measure"]),) if variant == VARIANTS[2] else ()
     return replace(bare, conductors=blocks, **article.losses(bare, variant != VARIANTS[0]))
 
 
 def upper_limit(point: Point) -> xr.Dataset:
-    """How long trajectories last at each frequency (`step`), and between which they last for the article's 250 s."""
     scene = scene_of(point)
     bare = article.rotor_scene(point["configuration"], point["measure"], permeability=1.0, drag=False)
     alone, whole = article.levitation_of(bare, "cuboid"), article.levitation_of(scene, "cuboid")

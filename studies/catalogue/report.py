@@ -42,7 +42,6 @@ def cite_job(path: Path) -> list[str]:
 
 
 def used_references(result: xr.Dataset) -> set[str]:
-    """Keys of the entries in references.bib that a result used, by its attributes."""
     study, attrs = str(result.attrs["study"]), result.attrs
     keys = {"effect", "program", *STUDIES.get(study, ())}
     if attrs.get("model") not in ("dipole", "cuboid", "map"):

@@ -138,12 +138,10 @@ def _studied(study: Study, points: Sequence[Point], engine: Workers, out: Path) 
 
 
 def failed_points(result: xr.Dataset) -> Any:
-    """The points of a result that have no value, each with the reason."""
     return json.loads(result.attrs["failed_points"])["failed"]
 
 
 def failure_lines(result: xr.Dataset) -> list[str]:
-    """Which points of a sweep have no value, and why."""
     return [f"No value at {json.dumps(f['point'], ensure_ascii=False)}: {f['reason']}" for f in failed_points(result)]
 
 

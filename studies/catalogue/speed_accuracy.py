@@ -108,7 +108,6 @@ def _gridded(step_mm: float, magnets: Magnets) -> tuple[FieldTable, int]:
 
 
 def methods(quick: bool) -> dict[str, Method]:
-    """The catalogue; `quick` leaves out what takes longer than some seconds."""
     orders, sizes, steps = ((1, 2, 3), (0.5,), (4,)) if quick else ((1, 2, 3, 4, 5, 6), (0.5, 0.25), (4, 2))
     direct, split = ((2, 3), (2, 3)) if quick else (orders, (2, 3, 4, 5, 6, 7))
     rtols = (1e-3, 1e-5) if quick else (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)

@@ -31,7 +31,6 @@ ASCII = str.maketrans(LETTERS | SIGNS | MARKS)
 
 
 def make_readable() -> None:
-    """Let standard output and standard error write everything."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=READABLE)

@@ -45,7 +45,6 @@ def run(arguments: list[str], stop: threading.Event) -> int:
 
 
 def _status(arguments: list[str], out: Any, stop: threading.Event | None = None) -> int:
-    """The exit status; `stop` shows that the user has stopped the program, whatever a library made of that."""
     with printing(verbose="--verbose" in arguments):
         try:
             _answer(arguments, out)

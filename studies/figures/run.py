@@ -1,13 +1,14 @@
 """Figures of results, each drawn from its dataset alone."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
@@ -20,10 +21,6 @@ from ...geometry.scene.contents import AbsoluteStart, Scene
 from ...geometry.solids import Solid
 from .style import COLORS, DASHES, NAMES, PALETTE, drawn, panels, plain_log, plot_branch, styled, titled
 from .view import near_plate, triangles
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 DISTANCE = "levitation distance (mm)"
 PLATE_MARKS = ((False, "o", "no plate"), (True, "D", "with the plate"))  # whether the plate's currents act
@@ -52,8 +49,6 @@ MOST = 0.8  # Of its way is shown where it is far from the equilibria, so that a
 @drawn
 def scene_figure(scene: Scene) -> Figure:
     """A scene to scale, from the side and from above, as it stands at t = 0; nothing is computed for it."""
-    from matplotlib.patches import Polygon
-
     figure, ((side, top),) = panels(1, 2, 3.4)
     lowest = min(float(magnet.box.corners[:, 2].min()) for magnet in scene.rotor)
     name, where = "floater (where it levitates is not computed)", (lowest - 2 * scene.floater.radius) * np.eye(3)[2]
@@ -398,7 +393,6 @@ def _label(values: xr.DataArray, value: str = "") -> str:
 
 
 def question_lines(result: xr.Dataset) -> list[str]:
-    """What was found, in a few lines."""
     varied, ask = np.atleast_1d(result.attrs["varied"]), str(result.attrs["ask"])
     grid = " × ".join(f"{key} ({result.sizes[key]} values)" for key in varied)
     lines = [f"{ANSWERED[ask]} over {grid}."]
@@ -419,7 +413,6 @@ def question_lines(result: xr.Dataset) -> list[str]:
 
 
 def _beside_lines(result: xr.Dataset) -> list[str]:
-    """How the dipoles differ from the sweep's model, all without the plate, whatever the stability of either."""
     if "dipole_distance" not in result:
         model = str(result.attrs.get("model", ""))
         return ["Against finite elements: --vary model=dipole,fem."] if model == "dipole" else []

@@ -61,7 +61,6 @@ def scene_picture(view: View) -> bytes:
 
 
 def sample_picture() -> bytes:
-    """A small PNG, which tells whether anything can be drawn."""
     plotter = new_plotter((64, 64))
     plotter.add_mesh(pv.Sphere())
     return _png(plotter)

@@ -94,7 +94,6 @@ def drawn(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
 
 
 def titled(panel: Axes, words: str) -> None:
-    """Add words to the letter of a panel."""
     panel.set_title(f"{panel.get_title('left')} {words}".strip())
 
 
@@ -185,7 +184,6 @@ def save_figures(figures: Mapping[str, Figure], out: Path) -> list[str]:
 
 
 def figure_bytes(figure: Figure, kind: str) -> bytes:
-    """The figure as the content of a file of the kind `png` or `pdf`."""
     import matplotlib as mpl
 
     stream = io.BytesIO()

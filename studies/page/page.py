@@ -24,12 +24,8 @@ QUICK, LONG = 60.0, 600.0  # Seconds that a scene with its preview, and other wo
 SLOWEST = 0.25  # Most seconds of a trajectory between two pictures
 POINTS = 41  # Of a map along each axis
 ROLLING = 4000  # Samples of a trajectory that are kept
-PLATES = {
-    "none": "Plate: only an obstacle",
-    "slab": "Plate: infinite slab",
-    "auto": "Plate: as the accuracy needs it",
-    "reduced": "Plate: finite, as a network",
-}
+PLATES = {"none": "Plate: only an obstacle", "slab": "Plate: infinite slab", "auto": "Plate: as the accuracy needs it"}
+PLATES["reduced"] = "Plate: finite, as a network"
 NO_MAP = "No map: it needs a horizontal, vertical or tilted rotor and gravity along the axis."
 MAGNET, METAL, BALL = "#434C5E", "#B08D57", "#9AA5B1"
 SEEN = 0.03  # How far along its edges a plate is drawn, m

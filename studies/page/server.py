@@ -76,7 +76,6 @@ class LivePage:
         return f'<iframe src="{html.escape(self.address)}" width="100%" height="{HEIGHT}" style="border:0"></iframe>'
 
     def begin(self) -> "LivePage":
-        """Serve in a thread of its own."""
         self._thread = threading.Thread(target=self.run, name="spinlev explore", daemon=True)
         self._thread.start()
         return self

@@ -65,7 +65,6 @@ class PageState:
         return replace(self, scene=changed(self.scene, {key: value}, self.source, self.first or self.scene))
 
     def query(self) -> str:
-        """The state as the text behind the question mark of an address."""
         parts = {"model": self.model, "plate_model": self.plate_model, "spin": json.dumps(self.spin)}
         return urlencode(parts | _flat(self.keys))
 
@@ -148,7 +147,6 @@ class Control:
 
 
 def controls(state: PageState) -> list[Control]:
-    """The sliders of a state, from the most to the least used: of what its scene has."""
     scene, rotor, floater = state.scene, state.keys["rotor"], state.keys["floater"]
     rows: list[tuple[str, str, float, float, float, float]]
     rows = [("frequency_hz", "Frequency (Hz)", scene.frequency, 20.0, 300.0, 0.5)]

@@ -38,18 +38,10 @@ from .state import MEASURES, PageState
 SIGHT = np.array([[-0.045], [0.045]]) * np.ones(3)  # The box in which field lines are drawn, m
 SLICE = (-34.0, 34.0), (-60.0, 15.0)  # Where |B| is shown in the plane of the moments, x and z in mm
 PIXEL, WEAKEST = 1.0, -3.0  # of it: mm, and log10 of |B| in T
-ENDS = {
-    "beyond": "left the region for which the plate's response was computed",
-    "contact": "touched the rotor or the plate",
-    "lost": "lost: it is too far away to come back",
-}
-MODEL_WORDS = {
-    "dipole": "point dipole",
-    "cuboid": "closed form of the cuboids",
-    "surface": "charges on the magnets' surfaces",
-    "fem": "finite elements",
-    "map": "map of the field",
-}
+ENDS = {"contact": "touched the rotor or the plate", "lost": "lost: it is too far away to come back"}
+ENDS["beyond"] = "left the region for which the plate's response was computed"
+MODEL_WORDS = {"dipole": "point dipole", "cuboid": "closed form of the cuboids", "fem": "finite elements"}
+MODEL_WORDS |= {"surface": "charges on the magnets' surfaces", "map": "map of the field"}
 PLATE_WORDS = {"none": "without the plate's eddy currents", "slab": "over the plate as an infinite slab"}
 PLATE_WORDS |= dict.fromkeys(("reduced", "fem"), "over the finite plate")
 HALVINGS = 6  # of a step of the map, until where its region of stability ends is known
@@ -59,11 +51,9 @@ ARTICLE_FLIGHTS = {
     "vertical": ((60.0, 14.0, "levitated for 24 h"),),
 }
 MODE_COLUMNS = ("normal mode", "frequency (Hz)", "growth rate (s⁻¹)")
-FILES = {
-    "toml": ("scene.toml", "text/plain"),
-    "json": ("equilibria.json", "application/json"),
-    "nc": ("equilibria.nc", "application/x-netcdf"),
-}  # What can be taken home: a file's name and its type
+# What can be taken home: a file's name and its type
+FILES = {"toml": ("scene.toml", "text/plain"), "json": ("equilibria.json", "application/json")}
+FILES["nc"] = ("equilibria.nc", "application/x-netcdf")
 
 
 Pose: TypeAlias = tuple[list[float], list[float]]  # Position, mm, and direction of the moment at t = 0
@@ -226,7 +216,6 @@ def has_map(state: PageState) -> bool:
 
 
 def map_key(state: PageState) -> str:
-    """All that a map depends on: neither its own axes, nor the plate, nor where a trajectory begins."""
     whole = canonical_keys(state.scene)
     keys = {key: value for key, value in whole.items() if key not in ("frequency_hz", "plate", "start")}
     open_ones = ("displacement_mm", "angle_deg")
