@@ -179,6 +179,10 @@ def _gap_mm(scene: Scene, known: Equilibrium) -> Array:
     return 1e3 * np.array([rotor_gap(scene, known.position, known.state.orientation)])
 
 
+def _pose(known: Equilibrium) -> Array:
+    return np.stack([known.position, known.state.moment])
+
+
 class Search:
     """Scenes that differ in numbers with ends `free`, by key, each with the equilibrium followed from the last."""
 
@@ -258,11 +262,10 @@ class Search:
             levitation = self._levitation(numbers)
             levitation.share(near.levitation, changed=True)
             bare, step = near.bare, numbers - begun
-            place, moment = bare.position, bare.state.moment
+            pose = _pose(bare)
             if "ways" in near.__dict__:  # where the tangent leads
-                for one, way in zip(step, near.ways.values(), strict=True):
-                    place = place + one * way.of(lambda known: known.position)
-                    moment = moment + one * way.of(lambda known: known.state.moment)
+                pose = pose + sum(s * way.of(_pose) for s, way in zip(step, near.ways.values(), strict=True))
+            place, moment = pose
             survey = survey_near(levitation, place[None], (moment / np.linalg.norm(moment))[None])
             if survey is not None:
                 if np.linalg.det(survey.equilibria[0].slope) * np.linalg.det(bare.slope) < 0:
