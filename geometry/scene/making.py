@@ -37,7 +37,7 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         table = SceneTable.model_validate(keys)
     except ValidationError as error:
         raise SceneError(source, described_faults(error.errors())) from None
-    faults, rotor = list(key_faults(table)), table.rotor
+    faults, rotor = key_faults(table), table.rotor
     if known:  # overlaps of very many bodies would take minutes
         number = len(rotor.conductors) + (len(rotor.magnets) if isinstance(rotor, ExplicitRotor) else 0)
         if number > (most := max(MOST_BODIES, len(known.turning_bodies))):
@@ -55,7 +55,7 @@ def assemble(keys: Mapping[str, Any], source: str, folder: Path | None = None, k
         files = files if known is None else dict(known.files)
     except InputError as error:  # a file
         raise SceneError(source, [str(error)]) from None
-    if faults := list(overlap_faults(scene)):
+    if faults := overlap_faults(scene):
         raise SceneError(source, faults)
     scene = replace(
         scene, files=tuple(files.items()), parts=tuple(parts.values()), tolerances=tuple(tolerances.items())

@@ -155,23 +155,35 @@ def _close(place: Sequence[Any]) -> list[str]:
     return difflib.get_close_matches(str(place[-1])[:LONGEST], _allowed(place), n=1)
 
 
-def key_faults(table: schema.SceneTable) -> Iterator[str]:
+Fault = tuple[str, ...]  # A key, the rule, what is there instead, and perhaps a way out
+GIVEN = "be given", "it is missing"
+
+
+def _sentence(key: str, rule: str, instead: str, *way_out: str) -> str:
+    return " ".join([f"Input {key} must {rule}; instead {instead}.", *way_out])
+
+
+def key_faults(table: schema.SceneTable) -> list[str]:
     """One sentence for each rule between keys that is broken."""
+    return [_sentence(*fault) for fault in _key_faults(table)]
+
+
+def _key_faults(table: schema.SceneTable) -> Iterator[Fault]:
     rotor, there = table.rotor, table.model_fields_set
     for place, start in table.starts.items():
         if start.offset_mm is not None and start.position_mm is not None:
-            yield f"Input {place} must have offset_mm or position_mm; instead received both."
+            yield place, "have offset_mm or position_mm", "received both"
         for key in ("velocity_mm_s", "moment", "spin_hz", "body_x"):
             given = getattr(start, key)
             if given is not None and start.position_mm is None:
-                yield f"Input {place}.{key} must come with {place}.position_mm; instead received it alone."
+                yield f"{place}.{key}", f"come with {place}.position_mm", "received it alone"
             if given is not None and key in ("moment", "body_x") and not any(given):
-                yield f"Input {place}.{key} must be a direction, not zero; instead received {given}."
+                yield f"{place}.{key}", "be a direction, not zero", f"received {given}"
     if drag := table.drag:
         for key in ("linear_N_s_m", "angular_N_m_s"):
             if (getattr(drag, key) is not None) == bool(drag.model):
-                both = f"Input drag.{key} must be left out beside drag.model; instead received both."
-                yield both if drag.model else f"Input drag.{key} must be given; instead it is missing."
+                beside = "be left out beside drag.model", "received both"
+                yield f"drag.{key}", *(beside if drag.model else GIVEN)
     magnets: dict[str, Any] = {"rotor": rotor}
     if isinstance(rotor, ExplicitRotor):
         magnets = {f"rotor.magnets[{k}]": magnet for k, magnet in enumerate(rotor.magnets)}
@@ -179,168 +191,147 @@ def key_faults(table: schema.SceneTable) -> Iterator[str]:
         yield from _shape_faults(place, magnet)
         key, (along, across) = "remanence_T" if magnet is rotor else "polarization_T", magnet.recoil_permeability
         if along != across and not np.any(getattr(magnet, key)):
-            yield (
-                f"Input {place}.{key} must not be zero where recoil_permeability has an easy axis; instead it is zero."
-            )
+            yield f"{place}.{key}", "not be zero where recoil_permeability has an easy axis", "it is zero"
     for k, conductor in enumerate(rotor.conductors):
         yield from _shape_faults(f"rotor.conductors[{k}]", conductor)
     needed = () if table.coils and "rotor" not in there else ("frequency_hz", "rotor")
-    yield from (f"Input {key} must be given; instead it is missing." for key in needed if key not in there)
+    yield from ((key, *GIVEN) for key in needed if key not in there)
     yield from _coil_faults(table, table.coils or ())
     for name, floater in table.named("floater").items():
-        yield from (re.sub("(?<!the )floater", name, fault) for fault in _floater_faults(floater))
+        for fault in _floater_faults(floater):
+            yield tuple(re.sub("(?<!the )floater", name, part) for part in fault)
     yield from _several_faults(table)
     plates = table.named("plate")
     for name, plate in plates.items():
         yield from _shape_faults(name, plate)
         if plate.lowering != plates.get("plate[0]", plate).lowering:
-            yield (
-                f"Input {name}.lowering must be that of plate[0], as all plates are lowered together; "
-                "instead it is another."
-            )
+            yield f"{name}.lowering", "be that of plate[0], as all plates are lowered together", "it is another"
     yield from _drive_faults(table)
     if rotor.field_map is None:
         alone = [k for k in ("map_length_unit", "map_field_unit", "map_columns") if getattr(rotor, k) is not None]
-        yield from (f"Input rotor.{key} must come with rotor.field_map; instead received it alone." for key in alone)
+        yield from ((f"rotor.{key}", "come with rotor.field_map", "received it alone") for key in alone)
 
 
-def _drive_faults(table: schema.SceneTable) -> Iterator[str]:
+def _drive_faults(table: schema.SceneTable) -> Iterator[Fault]:
     for k, step in enumerate(table.drive or ()):
         kinds = [key for key in ("to_hz", "stop", "hold_s") if getattr(step, key) is not None]
         ways = [key for key in ("center_mm", "axis") if getattr(step, key) is not None]
         if step.axis is not None and not np.any(step.axis):
-            yield f"Input drive[{k}].axis must be a direction, not zero; instead received {step.axis}."
+            yield f"drive[{k}].axis", "be a direction, not zero", f"received {step.axis}"
         if ways and table.plate is not None:
-            yield (
-                f"Input drive[{k}].{ways[0]} must be left out beside a plate, whose currents are known for a rotor "
-                "that stays where it is; instead it is given. Leave the plate out, or lower it (plate.lowering)."
-            )
+            rule = "be left out beside a plate, whose currents are known for a rotor that stays where it is"
+            way_out = "Leave the plate out, or lower it (plate.lowering)."
+            yield f"drive[{k}].{ways[0]}", rule, "it is given", way_out
         if ways and "hold_s" in kinds:
-            yield f"Input drive[{k}].hold_s must be in_s beside {ways[0]}; instead received hold_s."
+            yield f"drive[{k}].hold_s", f"be in_s beside {ways[0]}", "received hold_s"
         elif len(kinds) > 1 or not kinds + ways:
             received = " and ".join(kinds) or "none of them"
-            yield f"Input drive[{k}] must have one of to_hz, stop and hold_s; instead received {received}."
+            yield f"drive[{k}]", "have one of to_hz, stop and hold_s", f"received {received}"
         elif (step.in_s is None) != (kinds == ["hold_s"]):
-            rule, instead = ("be left out", "received both") if step.in_s else ("be given", "it is missing")
-            yield f"Input drive[{k}].in_s must {rule} beside {(kinds + ways)[0]}; instead {instead}."
+            rule, instead = ("be left out", "received both") if step.in_s else GIVEN
+            yield f"drive[{k}].in_s", f"{rule} beside {(kinds + ways)[0]}", instead
 
 
-def _coil_faults(table: schema.SceneTable, coils: Sequence[schema.CoilTable]) -> Iterator[str]:
+def _coil_faults(table: schema.SceneTable, coils: Sequence[schema.CoilTable]) -> Iterator[Fault]:
     """Faults of coils, and of those beside a rotor with what their field would do and is not computed."""
     changing = [bool(isinstance(coil.current_A, list) or coil.frequency_hz) for coil in coils]
     for k, coil in enumerate(coils):
+        place = f"coils[{k}].current_A"
         if coil.width_mm >= 2 * coil.radius_mm:
-            yield (
-                f"Input coils[{k}].width_mm must be less than twice radius_mm, of the middle of the winding; instead "
-                f"received {coil.width_mm:g}."
-            )
+            rule = "be less than twice radius_mm, of the middle of the winding"
+            yield f"coils[{k}].width_mm", rule, f"received {coil.width_mm:g}"
         if isinstance(coil.current_A, list):
             if coil.frequency_hz or coil.phase_deg:
-                yield (
-                    f"Input coils[{k}].current_A must be a number beside frequency_hz and phase_deg; instead received "
-                    "a table."
-                )
+                yield place, "be a number beside frequency_hz and phase_deg", "received a table"
             if np.any(np.diff(np.array(coil.current_A)[:, 0]) <= 0):
-                yield f"Input coils[{k}].current_A must have increasing times; instead they are not."
+                yield place, "have increasing times", "they are not"
     if not coils or "rotor" not in table.model_fields_set:
         return
     if any(step.center_mm is not None or step.axis is not None for step in table.drive or ()):
-        yield "Input drive must have no center_mm and no axis beside coils, which stay where they are; instead it has."
+        yield "drive", "have no center_mm and no axis beside coils, which stay where they are", "it has"
     if isinstance(floater := table.floater, list):
-        yield "Input floater must be one table beside coils and a rotor; instead received a list."
+        yield "floater", "be one table beside coils and a rotor", "received a list"
         return
     others = [k for k, coil in enumerate(coils) if any(coil.center_mm[:2]) or changing[k]]
     if others and (floater.conductivity_S_m or any(part.conductivity_S_m for part in floater.tables)):
-        yield (
-            f"Input floater must have no conductivity_S_m beside coils[{others[0]}], which is off the rotor's axis or "
-            "has a current that changes: what it drives in the floater is not computed; instead it has. Steady "
-            "currents about the axis may stand beside any floater."
+        rule = (
+            f"have no conductivity_S_m beside coils[{others[0]}], which is off the rotor's axis or has a current that "
+            "changes: what it drives in the floater is not computed"
         )
+        yield "floater", rule, "it has", "Steady currents about the axis may stand beside any floater."
     for name, plate in table.named("plate").items():
         if any(changing):
-            yield (
-                f"Input {name} must be left out beside coils[{changing.index(True)}], whose current changes and would "
-                "drive currents in it, which is not computed; instead it is given. Steady currents drive none."
+            rule = (
+                f"be left out beside coils[{changing.index(True)}], whose current changes and would drive currents in "
+                "it, which is not computed"
             )
+            yield name, rule, "it is given", "Steady currents drive none."
         elif plate.lowering is not None:
-            yield (
-                f"Input {name}.lowering must be left out beside coils, whose field would drive currents in a plate "
-                "that moves, which is not computed; instead it is given."
-            )
+            rule = "be left out beside coils, whose field would drive currents in a plate that moves"
+            yield f"{name}.lowering", f"{rule}, which is not computed", "it is given"
 
 
-def _several_faults(table: schema.SceneTable) -> Iterator[str]:
+def _several_faults(table: schema.SceneTable) -> Iterator[Fault]:
     number, starts = len(table.named("floater")), table.named("start")
     if not isinstance(table.floater, list):
         if isinstance(table.start, list):
-            yield "Input start must be one table beside one floater; instead received a list."
+            yield "start", "be one table beside one floater", "received a list"
     elif number < 2:
-        yield f"Input floater must be one table, or a list of two and more; instead received a list of {number}."
+        yield "floater", "be one table, or a list of two and more", f"received a list of {number}"
     elif not isinstance(table.start, list) or len(starts) != number:
-        yield (
-            f"Input start must be a list of {number} tables [[start]], one for each floater; instead received "
-            f"{len(starts) or 'none'}."
-        )
+        rule = f"be a list of {number} tables [[start]], one for each floater"
+        yield "start", rule, f"received {len(starts) or 'none'}"
     else:
         for name in (name for name, start in starts.items() if start.position_mm is None):
-            yield f"Input {name}.position_mm must be given where there are several floaters; instead it is missing."
+            yield f"{name}.position_mm", "be given where there are several floaters", "it is missing"
 
 
-def _floater_faults(floater: schema.FloaterTable) -> Iterator[str]:
+def _floater_faults(floater: schema.FloaterTable) -> Iterator[Fault]:
     single = [k for k in (*schema.SIZE_KEYS, "file", "remanence_T", "recoil_permeability", "density_kg_m3")
               if getattr(floater, k, None) is not None]  # fmt: skip
     sphere = floater.shape == "sphere" and not floater.composite
     if floater.composite:
         if single or floater.shape != "sphere":
             beside = " and ".join([*([] if floater.shape == "sphere" else ["shape"]), *single])
-            yield (
-                "Input floater must have its sizes and materials in floater.magnets and floater.bodies alone where it "
-                f"has such; instead received {beside} beside them."
-            )
+            rule = "have its sizes and materials in floater.magnets and floater.bodies alone where it has such"
+            yield "floater", rule, f"received {beside} beside them"
         if not floater.magnets:
-            yield "Input floater.magnets must have at least one magnet; instead there is ballast alone."
+            yield "floater.magnets", "have at least one magnet", "there is ballast alone"
         for name, tables in (("magnets", floater.magnets), ("bodies", floater.bodies)):
             for k, table in enumerate(tables):
                 yield from _shape_faults(f"floater.{name}[{k}]", table)
     else:
         yield from _shape_faults("floater", floater)
-        missing = (key for key in ("remanence_T", "density_kg_m3") if key not in single)
-        yield from (f"Input floater.{key} must be given; instead it is missing." for key in missing)
+        yield from ((f"floater.{key}", *GIVEN) for key in ("remanence_T", "density_kg_m3") if key not in single)
     if floater.inertia_kg_m2 is not None:
         if sphere:
-            yield "Input floater.inertia_kg_m2 must be left out of a sphere; instead it is given."
+            yield "floater.inertia_kg_m2", "be left out of a sphere", "it is given"
         low, middle, high = sorted(floater.inertia_kg_m2)
         if high > (low + middle) * (1 + 1e-9):
-            yield (
-                "Input floater.inertia_kg_m2 must be moments of inertia, of which none is larger than the other two "
-                f"together; instead received {high:g} beside {low:g} and {middle:g}."
-            )
+            rule = "be moments of inertia, of which none is larger than the other two together"
+            yield "floater.inertia_kg_m2", rule, f"received {high:g} beside {low:g} and {middle:g}"
 
 
-def _shape_faults(place: str, table: Any) -> Iterator[str]:
+def _shape_faults(place: str, table: Any) -> Iterator[Fault]:
     given = [key for key in schema.SIZE_KEYS if getattr(table, key, None) is not None]
     file, sizes = getattr(table, "file", None), " and ".join(given)
     if table.shape == "file" and not file:
-        yield f"Input {place}.file must be given, as the shape is 'file'; instead it is missing."
+        yield f"{place}.file", "be given, as the shape is 'file'", "it is missing"
     elif place == "floater" and file and table.shape != "file":
-        yield "Input floater.file must be left out, or shape be 'file'; instead it is given."
+        yield "floater.file", "be left out, or shape be 'file'", "it is given"
     elif file and table.shape not in ("cuboid", "file"):
-        yield f"Input {place}.shape must be left out beside file; instead received {table.shape!r}."
+        yield f"{place}.shape", "be left out beside file", f"received {table.shape!r}"
     elif file and given:
-        yield f"Input {place} must have no size beside file; instead received {sizes}."
+        yield place, "have no size beside file", f"received {sizes}"
     elif not file and place == "floater" and not given and table.shape == "sphere":
-        yield "Input floater.diameter_mm must be given; instead it is missing."
+        yield "floater.diameter_mm", *GIVEN
     elif not file and set(given) != set(wanted := schema.SIZES[table.shape]):
-        more = " and ".join(key for key in given if key not in wanted)
-        yield (
-            f"Input {place} must have {' and '.join(wanted)}, as the shape is {table.shape!r}; "
-            f"instead received {sizes or 'no size'}." + (f" Leave out {more}." if more else "")
-        )
+        rule = f"have {' and '.join(wanted)}, as the shape is {table.shape!r}"
+        more = [key for key in given if key not in wanted]
+        yield place, rule, f"received {sizes or 'no size'}", *([f"Leave out {' and '.join(more)}."] if more else ())
     elif not file and table.shape == "ring" and table.inner_diameter_mm >= table.diameter_mm:
-        yield (
-            f"Input {place}.inner_diameter_mm must be less than diameter_mm {table.diameter_mm:g}; "
-            f"instead received {table.inner_diameter_mm:g}."
-        )
+        rule = f"be less than diameter_mm {table.diameter_mm:g}"
+        yield f"{place}.inner_diameter_mm", rule, f"received {table.inner_diameter_mm:g}"
 
 
 def unusual(scene: Scene) -> str:
@@ -361,42 +352,37 @@ def unusual(scene: Scene) -> str:
     return f"Unusual: {', '.join(dict.fromkeys(said))}. Is that meant? Every key names its unit." if said else ""
 
 
-def overlap_faults(scene: Scene) -> Iterator[str]:
+def overlap_faults(scene: Scene) -> list[str]:
     """Every overlap of the scene's bodies with its depth, of the rotor over a whole turn; touching is allowed."""
+    return [_sentence(*fault) for fault in _overlap_faults(scene)]
+
+
+def _overlap_faults(scene: Scene) -> Iterator[Fault]:
     bodies = [(f"magnet {i}", magnet.body) for i, magnet in enumerate(scene.rotor, 1)]
     bodies += [(f"conductor {i}", part.body) for i, part in enumerate(scene.conductors, 1)]
     yield from _own_overlaps("rotor", "magnets and conductors", bodies)
     for k, (stretch, step) in enumerate(zip(scene.stretches, scene.drive, strict=False)):
         if step.axis and stretch.axes[:, 2] @ step.axis < -OPPOSITE:
-            yield (
-                f"Input drive[{k}].axis must not be opposite to the axis before it, as no way to it is the shortest; "
-                "instead it is. Give a step between."
-            )
+            rule = "not be opposite to the axis before it, as no way to it is the shortest"
+            yield f"drive[{k}].axis", rule, "it is", "Give a step between."
     metal = scene.plate.body.placed if scene.plate else ()
     plates = [("plate" if len(metal) == 1 else f"plate[{k}]", body) for k, body in enumerate(metal)]
     for (plate, fixed), (name, body) in product(plates, bodies):
         if (depth := deepest_overlap_in_a_turn(body, fixed)) > TOUCHING:
-            yield (
-                f"Input {plate} must stay clear of the turning rotor; instead it overlaps {name} by "
-                f"{depth * 1e3:.4g} mm; move the plate away or make it thinner."
-            )
+            instead = f"it overlaps {name} by {depth * 1e3:.4g} mm; move the plate away or make it thinner"
+            yield plate, "stay clear of the turning rotor", instead
     for (first, one), (second, other) in combinations(plates, 2):
         if (depth := body_overlap(one, other)) > -TOUCHING:
             how = f"overlap by {depth * 1e3:.4g} mm" if depth > TOUCHING else "touch"
-            yield (
-                f"Input {second} must be apart from {first}, as currents of bodies that touch are not computed; "
-                f"instead they {how}; give them as one file."
-            )
+            rule = f"be apart from {first}, as currents of bodies that touch are not computed"
+            yield second, rule, f"they {how}; give them as one file"
     windings = [] if scene.carried_by_coils else [(f"coils[{k}]", coil.body) for k, coil in enumerate(scene.coils)]
     for name, winding in windings:
         beside = [(f"the turning rotor's {other}", deepest_overlap_in_a_turn(body, winding)) for other, body in bodies]
         beside += [(f"the {other}", body_overlap(body, winding)) for other, body in plates]
         for other, depth in beside:
             if depth > TOUCHING:
-                yield (
-                    f"Input {name} must stay clear of all bodies; instead it overlaps {other} by {depth * 1e3:.4g} mm; "
-                    "move it away."
-                )
+                yield name, "stay clear of all bodies", f"it overlaps {other} by {depth * 1e3:.4g} mm; move it away"
     obstacles = [*((f"rotor {name}", body) for name, body in bodies), *windings]
     obstacles += [("the plate" if len(plates) == 1 else name, body) for name, body in plates]
     for k, one in enumerate(scene.each):
@@ -406,25 +392,19 @@ def overlap_faults(scene: Scene) -> Iterator[str]:
         if not isinstance(start, AbsoluteStart):
             continue
         if start.body_x is not None and one.floater.round and not scene.carried_by_coils:
-            yield (
-                f"Input start{number}.body_x must be left out of a floater that is round about its moment, as it "
-                "changes nothing; instead it is given."
-            )
+            rule = "be left out of a floater that is round about its moment, as it changes nothing"
+            yield f"start{number}.body_x", rule, "it is given"
         axes = one.floater.axes(start.moment / np.linalg.norm(start.moment), start.body_x)
         own, place = one.floater.placed(start.position, axes), ", ".join(f"{c * 1e3:g}" for c in start.position)
         for name, body in obstacles:
             if (depth := max(body_overlap(body, part) for part in own)) > TOUCHING:
-                yield (
-                    f"Input start{number}.position_mm must leave the floater clear of all bodies; instead received "
-                    f"[{place}], where it overlaps {name} by {depth * 1e3:.4g} mm."
-                )
+                instead = f"received [{place}], where it overlaps {name} by {depth * 1e3:.4g} mm"
+                yield f"start{number}.position_mm", "leave the floater clear of all bodies", instead
         obstacles += [(f"floater[{k}]", part) for part in own]
 
 
-def _own_overlaps(owner: str, kinds: str, bodies: Sequence[tuple[str, Solid]]) -> Iterator[str]:
+def _own_overlaps(owner: str, kinds: str, bodies: Sequence[tuple[str, Solid]]) -> Iterator[Fault]:
     for (first, one), (second, other) in combinations(bodies, 2):
         if not apart(one, other) and (depth := body_overlap(one, other)) > TOUCHING:
-            yield (
-                f"Input {owner} must have {kinds} that do not overlap; instead {first} and {second} overlap by "
-                f"{depth * 1e3:.4g} mm; move them apart by as much."
-            )
+            instead = f"{first} and {second} overlap by {depth * 1e3:.4g} mm; move them apart by as much"
+            yield owner, f"have {kinds} that do not overlap", instead
