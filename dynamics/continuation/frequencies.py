@@ -246,11 +246,7 @@ def on_branch(
 
 
 def tracked_end(scene: Scene, family: Family, end: BranchPoint, moved: float = 0.0) -> BranchPoint | None:
-    """The end of stability of a kind near one of another scene's `family`, without what lies between.
-
-    None where none is near. Of the equilibria of a `scene` against the frequency, a `family`; the end is expected to
-    have `moved` so far, Hz.
-    """
+    """The `end` of another scene's branch on a `scene`'s `family`, `moved` about so far, Hz; None: none is near."""
     expected = end.parameter + (0.0 if end.kind == BORDER else moved)
     pose = np.concatenate([end.position / family.problem(expected)[0][Parameter.LENGTH], end.state[6:-3]])
     if end.kind == BORDER:
@@ -293,10 +289,7 @@ def levitates(point: BranchPoint) -> bool:
 def one_way(
     scene: Scene, family: Family, start: Array, frequency: float, end: float, steps: Steps = STEPS
 ) -> list[BranchPoint]:
-    """The branch from `frequency` towards `end` (Hz), to its first fold, contact or the border, which is marked.
-
-    Of the equilibria of a `scene` against the frequency, a `family`, from a scaled state `start` (12,) in `steps`.
-    """
+    """The `scene`'s `family` from `start` at `frequency` to its first marked end before `end` (Hz), in `steps`."""
     points = follow_branch(family, start, frequency, end, steps, partial(is_over, scene), MARGINAL)
     for k, point in enumerate(points):
         if point.kind == FOLD:
@@ -315,11 +308,7 @@ def one_way(
 def way_out(
     scene: Scene, table: FieldTable, equilibria: Sequence[Equilibrium], memory: PlateMemory | None = None
 ) -> str:
-    """Message for a scene without a stable equilibrium, with a frequency that has one.
-
-    The `scene` has these `equilibria` in the field, and with the effects, of `table`, and the plate's currents, if they
-    are modelled (`memory`).
-    """
+    """Message for a `scene` with unstable `equilibria` in `table` and with `memory`: a frequency with a stable one."""
     times = [f"{1 / g:.2g} s" if g < 10 else f"{1e3 / g:.2g} ms" for g in [e.growth_per_s for e in equilibria]]
     pairs = zip(equilibria, times, strict=True)
     kinds = dict.fromkeys(f"{1e3 * e.distance:.2f} mm (e-folding time {time})" for e, time in pairs)

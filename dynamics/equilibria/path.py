@@ -50,10 +50,7 @@ class AtRest:
 
     @staticmethod
     def extended(value: Array, slope: Array, moment: Array) -> tuple[Array, Array]:
-        """Equations with one more, which keeps |m̂| = 1, and their derivatives by the unknowns (n, 6 + e).
-
-        From a `value` (n, k) and a `slope` (n, k, 5 + e) by position, tilts of the `moment` (n, 3), and the rest.
-        """
+        """Equations with |m̂| = 1 and slopes (n, 6 + e): `value` (n, k), `slope` (n, k, 5 + e) by tilts of `moment`."""
         n, k, unknowns = slope.shape
         values, slopes = np.zeros((n, k + 1)), np.zeros((n, k + 1, unknowns + 1))
         values[:, :k], slopes[:, k, 3:6] = value, moment

@@ -84,11 +84,7 @@ FIXED_POINTS = TableKind("equilibria", FixedPoints, "Fixed points of a scene wit
 def cached_points(
     scene: Scene, equations: str, spin: float, make: Callable[[], FixedPoints], report: Report
 ) -> tuple[FixedPoints, bool]:
-    """Result of a search `make`, from the cache if it is there, and whether it was.
-
-    Of a `scene`, whose plate decides nothing, with body `spin`; `equations` gives the rotor's table and the equations
-    of motion from all others, and `report` is called with faults of the cache.
-    """
+    """A search `make` of a `scene`, by `equations` and `spin`, perhaps from the cache, and whether so; `report`s."""
     inputs = equations, spin, _own_spin(scene), parameters(scene, Scales.of(scene), frozen_spin=True)
     return FIXED_POINTS.cached(inputs, make, report)
 

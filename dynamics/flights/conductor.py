@@ -146,10 +146,7 @@ def heights_over(scene: Scene) -> tuple[float, float]:
 
 
 def levitation_height(scene: Scene, modes: FloatingModes) -> float:
-    """Height (m) of the centre where the mean force carries the floater and falls with height; NaN: there is none.
-
-    The currents of the `scene` are sinusoidal, the `modes` those of its floater over its coils.
-    """
+    """Height (m) of the centre where the mean force of `modes` carries a `scene`'s floater, and falls; NaN: nowhere."""
     leaders, weight = Supply(scene.coils).leaders, -scene.floater.mass * float(scene.gravity[2])
     phasors = np.array([coil.current * np.exp(1j * (coil.phase - np.pi / 2)) for coil in leaders])
     frequencies = np.array([coil.frequency for coil in leaders])

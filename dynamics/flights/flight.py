@@ -562,10 +562,7 @@ def starting_point(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
 
 
 def most_like_levitation(equilibria: Sequence[Equilibrium]) -> Equilibrium | None:
-    """Where a trajectory begins, or, where none may, the equilibrium whose modes grow least; None without any.
-
-    Of those below the rotor that are stable along the axis, if there are some: others are on other branches.
-    """
+    """A `starting_point`, else what grows least, of those below the rotor and axially stable if there are such."""
     below = [e for e in equilibria if np.hypot(*e.position[:2]) < abs(e.position[2])]
     along = [e for e in below if any(m.name == AXIAL and m.growth_per_s <= SLOWLY for m in e.modes)]
     return starting_point(equilibria) or min(along or equilibria, key=lambda e: e.growth_per_s, default=None)

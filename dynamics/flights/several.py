@@ -131,11 +131,7 @@ class Together:
 
 
 class JointFlight(Flight):
-    """The motion of a scene's floaters.
-
-    The `scene` has an absolute start of each, `tables` are the rotor's field for each, with its effects; it lasts for a
-    `duration` (s). Raises StartError: that is not positive, or a floater would begin in contact.
-    """
+    """Motion of a `scene`'s floaters in `tables` for `duration` (s). Raises StartError: not positive, or contact."""
 
     def __init__(self, scene: Scene, tables: Sequence[FieldTable], duration: float) -> None:
         if not duration > 0:

@@ -305,11 +305,7 @@ TURNS = ("by_x", "by_y", "by_z")
 
 
 def locked_balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
-    """The balances (6,) of a body at rest in the rotor's frame, their derivatives (6 × 6), and their variables (7,).
-
-    Accelerations of place and of spin along the body's axes; the derivatives are by x, y, z and by small turns about
-    the rotor's axes.
-    """
+    """Balances (6,) of a body at rest in the rotor's frame, slopes (6 × 6) by place and small turns, variables (7,)."""
     given, turns = list(hy.make_vars(*LOCKED)), list(hy.make_vars(*TURNS))
     position, before = given[:3], given[3:]
     quaternion = [q + 0.5 * d for q, d in zip(before, left_product(turns, before), strict=True)]

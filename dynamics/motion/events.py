@@ -26,11 +26,7 @@ Events = list[tuple[hy.expression, str]]
 
 
 def flight_events(scene: Scene, position: Vector, turn: Turn = STEADY) -> Events:
-    """Contact with the bodies of a scene, and loss.
-
-    The bodies are the rotor's magnets, plates and coils. `position` is three scaled expressions, rotor's frame, and
-    `turn` that of the rotor; of a drive `DRIVEN`.
-    """
+    """Contact with bodies of a `scene`, and loss: scaled `position` (3,), rotor's frame, the rotor's `turn`."""
     length = hy.par[Parameter.LENGTH]
     metres = [length * p for p in position]
     inner = scene.floater.inner_radius
@@ -88,11 +84,7 @@ def clearance(scene: Scene, time: Array, position: Array, orientation: Array | N
 
 
 def first_contact(scene: Scene, time: Array, position: Array, orientation: Array) -> int | None:
-    """The first of instants one after another at which the floater overlaps something; None: at none of them.
-
-    See `clearance` for what is given. A body that is no sphere is near what it was near an instant before, so that few
-    gaps have to be searched for.
-    """
+    """First of close instants at which the floater overlaps something, or None; arguments as of `clearance`."""
     near = np.flatnonzero(clearance(scene, time, position) < -TOUCHING)
     if scene.floater.is_sphere:
         return int(near[0]) if len(near) else None

@@ -440,10 +440,7 @@ class FloaterCurrents:
 def _of_round(
     loss: Array, mixed: Array, dipole: Vector, changes: Matrix, coupled: tuple[Vector, Matrix] | None, moment: Vector
 ) -> tuple[list[hy.expression], Matrix]:
-    """See `FloaterCurrents._of_shape`, of a body that is round about its moment m̂ with `loss` and coupling `mixed`.
-
-    Of the gradient's change C there are m̂·C m̂, C m̂ across m̂, and the rest.
-    """
+    """`_of_shape` of a body round about m̂, by m̂·C m̂, C m̂ across m̂ and the rest; `loss`, coupling `mixed`."""
     rest, tilted, straight = (float(loss[k, k]) for k in (0, 3, 1))
     along, across = _pointed(changes, moment)
     lengthwise, sideways = 1.5 * (straight - rest) * along, [(tilted - rest) * a for a in across]
