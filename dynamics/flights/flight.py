@@ -30,17 +30,7 @@ from ..motion.equations import Equations, equations_of_motion, parameters
 from ..motion.plate import ENDLESS, PlateForce, PlateMemory, plate_numbers
 from ..motion.state import DRIVEN, SAME, STEADY, Given, Parameter, Scales, State, moved
 from .balls import DEGREE, Balls, in_ball, is_long
-from .trajectory import (
-    DURATION,
-    STOPPED,
-    Checkpoint,
-    FieldChanges,
-    FlightStopped,
-    Recorder,
-    Trajectory,
-    crossing,
-    propagated,
-)
+from .trajectory import DURATION, STOPPED, Checkpoint, FieldChanges, FlightStopped, Recorder, Trajectory, propagated
 
 LEFT = "left"
 INSIDE = 1 - 1e-9  # Square of the distance from a ball's centre, in radii, from which on the floater has left it
@@ -382,7 +372,9 @@ class Course:
             self.ended_by = events.CONTACT
             times, states = times[: first + 1], states[: first + 1]
             if first:
-                times[-1], states[-1] = crossing(part.integrator, self.values, times[-2:], states[-2:], self.touching)
+                times[-1], states[-1] = recorder.crossing(
+                    part.integrator, self.values, times[-2:], states[-2:], self.touching
+                )
         return times, flight.balanced(self.values, times, states)
 
     def touching(self, times: Array, states: Array) -> int | None:

@@ -237,6 +237,22 @@ class Recorder:
         times = times[times < end - 1e-9 * interval]
         return np.concatenate([[now], times, [end] if len(times) < count else []])
 
+    @staticmethod
+    def crossing(
+        integrator: Any, values: Array, times: Array, states: Array, first_over: Callable[[Array, Array], int | None]
+    ) -> tuple[float, Array]:
+        """Time and state (s,) at which a motion crosses a border between `times` (2,), its `states` (2, s) being there.
+
+        `integrator`, `values`: as of `propagated`; `first_over` gives the first of times (n,) at which a state (n, s) is
+        over the border; None: at none of them.
+        """
+        for _ in range(DIVISIONS):
+            grid = np.linspace(times[0], times[1], PARTS + 1)
+            *_, times, states = propagated(integrator, values, (times[0], 0.0), states[0], grid)
+            first = first_over(times, states) or len(times) - 1
+            times, states = times[first - 1 : first + 1], states[first - 1 : first + 1]
+        return float(times[-1]), states[-1]
+
     def doubled(self, now: float) -> "Recorder":
         """With the interval that so many samples as there would have been until `now` had led to."""
         while np.floor(now / self.interval + 1e-9) + 1 > self.capacity:
@@ -283,19 +299,3 @@ def propagated(
         return None, steps, times, states
     times, states = np.append(times[: len(states)], integrator.time), np.vstack([states, integrator.state])
     return -outcome.value - 1, steps, times, states
-
-
-def crossing(
-    integrator: Any, values: Array, times: Array, states: Array, first_over: Callable[[Array, Array], int | None]
-) -> tuple[float, Array]:
-    """Time and state (s,) at which a motion crosses a border between `times` (2,), its `states` (2, s) being there.
-
-    `integrator`, `values`: as of `propagated`; `first_over` gives the first of times (n,) at which a state (n, s) is
-    over the border; None: at none of them.
-    """
-    for _ in range(DIVISIONS):
-        grid = np.linspace(times[0], times[1], PARTS + 1)
-        *_, times, states = propagated(integrator, values, (times[0], 0.0), states[0], grid)
-        first = first_over(times, states) or len(times) - 1
-        times, states = times[first - 1 : first + 1], states[first - 1 : first + 1]
-    return float(times[-1]), states[-1]

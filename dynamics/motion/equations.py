@@ -44,22 +44,7 @@ from ...geometry.common import MU_0, Array
 from ...geometry.scene.contents import Scene
 from .effect import NOTHING, PARAMETERS, ZERO, Motion, interaction_of
 from .plate import PlateMemory, memory_terms
-from .state import (
-    HALF,
-    STEADY,
-    Given,
-    Parameter,
-    Scales,
-    Turn,
-    Vector,
-    about_z,
-    add,
-    cross,
-    dot,
-    left_product,
-    rotation_of,
-    subtract,
-)
+from .state import HALF, STEADY, Given, Parameter, Scales, Turn, Vector, about_z, add, cross, dot, rotation_of, subtract
 
 Matrix = list[list[hy.expression]]
 CENTRE = tuple(f"{vector}_{axis}" for vector in ("position", "velocity") for axis in "xyz")
@@ -307,8 +292,8 @@ TURNS = ("by_x", "by_y", "by_z")
 def locked_balances(equations: Equations) -> tuple[list[hy.expression], list[hy.expression]]:
     """Balances (6,) of a body at rest in the rotor's frame, slopes (6 × 6) by place and small turns, variables (7,)."""
     given, turns = list(hy.make_vars(*LOCKED)), list(hy.make_vars(*TURNS))
-    position, before = given[:3], given[3:]
-    quaternion = [q + 0.5 * d for q, d in zip(before, left_product(turns, before), strict=True)]
+    position, (w, *own), half = given[:3], given[3:], [0.5 * t for t in turns]
+    quaternion = [w - dot(half, own), *add(own, [w * h for h in half], cross(half, own))]
     rate = hy.par[Parameter.RATE]
     spin = [rate * part for part in rotation_of(quaternion)[2]]
     velocity = [-rate * position[1], rate * position[0], hy.expression(0.0)]
