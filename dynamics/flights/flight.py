@@ -372,9 +372,8 @@ class Course:
             self.ended_by = events.CONTACT
             times, states = times[: first + 1], states[: first + 1]
             if first:
-                times[-1], states[-1] = recorder.crossing(
-                    part.integrator, self.values, times[-2:], states[-2:], self.touching
-                )
+                between = times[-2:], states[-2:], self.touching
+                times[-1], states[-1] = recorder.crossing(part.integrator, self.values, *between)
         return times, flight.balanced(self.values, times, states)
 
     def touching(self, times: Array, states: Array) -> int | None:

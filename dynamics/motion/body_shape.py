@@ -21,15 +21,7 @@ from ...fem.harmonics import interior
 from ...fem.harmonics.expressions import regular_harmonics
 from ...fem.harmonics.interior import Ball, BallField
 from ...fem.harmonics.solid import tensors
-from ...fem.rotor.floater import (
-    TURNS,
-    FloaterSources,
-    floater_sources,
-    polarizability_tensor,
-    shares,
-    slopes_of,
-    strength,
-)
+from ...fem.rotor.floater import FloaterSources, floater_sources, polarizability_tensor, shares, slopes_of, strength
 from ...fem.rotor.table import DerivedField, FieldFormula, RangeError
 from ...geometry.common import Array, even_directions
 from ...geometry.scene.floater import Floater
@@ -71,7 +63,7 @@ def all_over(floater: Floater, more: int = 0) -> FloaterSources:
     """Dipoles all over a floater, for polynomials of so many degrees `more`; of its mean over turns where it is one."""
     degree = int(min(max(1.0, floater.radius / (floater.inner_radius or 1e-9) / 3**0.5) * SUMMED, MOST))
     sources = floater_sources(floater, degree=degree + more)
-    return sources.averaged(TURNS + more) if floater.mean and not floater.turned else sources
+    return sources.averaged(more) if floater.mean and not floater.turned else sources
 
 
 @dataclass(frozen=True, eq=False)

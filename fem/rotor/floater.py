@@ -66,8 +66,9 @@ class FloaterSources:
         """The same of a body with axes (3, 3)."""
         return replace(self, places=self.places @ axes.T, moments=self.moments @ axes.T, corners=self.corners @ axes.T)
 
-    def averaged(self, number: int = TURNS) -> Self:
-        """Its mean over a `number` of turns about its z, exact for orders m of its multipoles below that."""
+    def averaged(self, more: int = 0) -> Self:
+        """Its mean over `TURNS` and `more` about its z, exact for orders m of its multipoles below that."""
+        number = TURNS + more
         angles = 2 * np.pi * np.arange(number) / number
         turned = [self.turned(rotation_matrix((0.0, 0.0, angle))) for angle in np.degrees(angles)]
         parts = zip(*((one.places, one.moments / number, one.corners) for one in turned), strict=True)
