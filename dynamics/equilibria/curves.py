@@ -168,8 +168,7 @@ class Curve:
 
     def passes(self, point: Array) -> bool:
         """Whether the curve goes through a point (6,), judged by cubic interpolation at the point's own height."""
-        heights = CubicHermiteSpline(self.arc, self.points[:, 2], self.tangents[:, 2])
-        crossings = heights.solve(point[2], extrapolate=False)
+        crossings = self._height.solve(point[2], extrapolate=False)
         apart = self._spline(crossings[np.isfinite(crossings)]) - point
         return bool(np.min(np.linalg.norm(apart, axis=1), initial=np.inf) < 1e-3)
 
@@ -181,6 +180,10 @@ class Curve:
     @cached_property
     def _spline(self) -> CubicHermiteSpline:
         return CubicHermiteSpline(self.arc, self.points, self.tangents)
+
+    @cached_property
+    def _height(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.arc, self.points[:, 2], self.tangents[:, 2])
 
 
 @dataclass(frozen=True, eq=False)

@@ -243,7 +243,7 @@ class Recorder:
     ) -> tuple[float, Array]:
         """Time and state (s,) at which a motion crosses a border between `times` (2,), its `states` (2, s) being there.
 
-        `integrator`, `values`: as of `propagated`; `first_over` gives the first of times (n,) at which a state (n, s) is
+        `integrator`, `values`: as of `propagated`; `first_over` gives the first of times (n,) at which a state is
         over the border; None: at none of them.
         """
         for _ in range(DIVISIONS):
