@@ -93,10 +93,10 @@ def field_rtol(scene: Scene) -> float:
 
 
 def compared(scene: Scene, requested: Models, spin: float = 0.0) -> list[Compared]:
-    """A `scene` with body `spin` by dipole, dipole of the true moment, closed form, finite elements, and all of it.
+    """A `scene` with body `spin` by dipoles, closed form, finite elements, and these with mutual magnetisation.
 
-    Tolerances and plate are as `requested`; a map of the field takes the place of finite elements. What mutual
-    magnetisation cannot be computed for is left out with a message. Raises EquilibriumError: the rotor is at rest.
+    Tolerances and plate are as `requested`; a map takes the place of finite elements. What mutual magnetisation cannot
+    be computed for is left out with a message. Raises EquilibriumError: the rotor is at rest.
     """
     if not scene.floater.round:
         note("All models have the mean of the floater over turns about its moment.")
@@ -140,10 +140,7 @@ def _nearest(equilibria: Sequence[Equilibrium], to: Equilibrium | None) -> Equil
 
 
 def compared_dataset(scene: Scene, rows: Sequence[Compared], frequencies: Array | None = None) -> xr.Dataset:
-    """All of it over `model`, and the branches over `frequencies` (n,) Hz, by default about the ranges of stability.
-
-    `scene` is what was asked for; the `rows` have the mean of a floater that is not round.
-    """
+    """All `rows` of a `scene` over `model`, and branches over `frequencies` (n,) Hz, by default the stable ones."""
     if frequencies is None:
         ends = [f for row in rows for f in row.stable or ()] or [scene.frequency * (1 - BESIDE)]
         low, high = min(*ends, scene.frequency), max(*ends, scene.frequency)

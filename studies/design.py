@@ -207,10 +207,7 @@ class _Problem:
 
 
 def optimised(search: Search, goal: tuple[str, int], limits: Limits) -> Best:
-    """The scene that makes a measure large (1) or small (-1) within `limits`, and its numbers.
-
-    Raises ComputationError where no scene that was looked at meets them.
-    """
+    """The best scene of a `search` for a `goal` within `limits`; ComputationError where none meets them."""
     begun = search.near, search.at_near
     try:
         if "margin" in (goal[0], *limits):
@@ -336,10 +333,7 @@ def checked_free(free: object, levitation: Levitation) -> Limits:
 
 
 def designed(levitation: Levitation, goals: Sequence[str], bounds: Limits, limits: Limits, points: int) -> xr.Dataset:
-    """The Dataset of `design`, for `goals`, `bounds` of free numbers and `limits` that were checked.
-
-    Of two goals the curve has so many `points`; `levitation` is of the scene given.
-    """
+    """The Dataset of `design` for a `levitation`, checked `goals`, `bounds`, `limits`; `points` are of a curve."""
     if (levitation.models.model, levitation.models.plate_model) not in SIMPLE:
         _check_reach(levitation, bounds, limits)
     search = Search(levitation, bounds)

@@ -121,7 +121,7 @@ def _floater_currents(levitation: Levitation, first: Equilibrium | None) -> List
 def _missed(floater: Floater, doubt: float) -> float:
     """Relative error of the currents' effect by a shape's tensors and delays, where they are slow to `slow_error`.
 
-    That is the square of 2ωμ0σR² over 105, and by the slowest delay, (2/21) μ0σR², an effect of delays is 2ω of it.
+    That is the square of 2ωμ0σR² over 105; by the slowest delay, (2/21) μ0σR², an effect of delays is 2ω of it.
     """
     shape = current_shape(floater)
     return shape.error + min(1.0, DIPOLE * float(np.sqrt(105 * doubt))) * shape.delay_error

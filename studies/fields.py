@@ -97,10 +97,7 @@ AIR, ROTOR, FLOATER, PLATE = range(4)
 
 
 def export_job(scene: Scene, requested: Models, path: Path) -> Answer:
-    """Write B (T), H and M (A/m), J (A/m²) and the body's number of a `scene` with `requested` models to `path`.
-
-    Raises InputError where the file's name does not end in .vtu.
-    """
+    """Write B (T), H, M (A/m), J (A/m²) and the body's number of a `scene` by `requested` models to `path` (.vtu)."""
     if path.suffix != ".vtu":
         raise InputError(f"Input OUT must end in .vtu; instead received {path}.")
     levitation = Levitation(scene, requested)

@@ -58,10 +58,7 @@ TABLED = 10.0
 
 
 class Gradient:
-    """Derivatives of the equilibria of a `levitation` by numbers of its scene.
-
-    Raises InputError where the rotor is at rest, its field is a map, or its magnets are parts of one.
-    """
+    """Derivatives of a `levitation`'s equilibria by numbers of its scene; InputError where there can be none."""
 
     def __init__(self, levitation: Levitation) -> None:
         self.levitation = levitation
@@ -82,10 +79,7 @@ class Gradient:
         return list(self.numbers) if by is None else _checked(name, by, self.numbers, "keys of numbers in this scene")
 
     def ways(self, known: Equilibrium, keys: Sequence[str]) -> tuple[dict[str, Tangent], Implicit | None, NearbyScenes]:
-        """The way of one equilibrium by each key, with its equations and those of scenes nearby.
-
-        There is none by a key, or no equations, where it is not known: see `reasons`.
-        """
+        """The way of one equilibrium by each key, unless not known (`reasons`), its equations and those nearby."""
         base = self._around(known, known.currents is not None)
         implicit = Implicit(known, base.setting)
         if implicit.at_fold:
@@ -185,10 +179,9 @@ class Gradient:
     def with_errors(
         self, known: Equilibrium, tangent: Tangent, names: Sequence[str], key: str
     ) -> tuple[list[Array], list[Array]]:
-        """Derivatives of answers `names` along the way `tangent` by `key`, and their estimated errors.
+        """Derivatives of answers `names` of a `known` equilibrium along its way, `tangent`, by `key`, and their errors.
 
-        These are of the differences, of the equilibrium that is `known`, and of the tables of field, mutual
-        magnetisation, currents in the rotor and plate, each relative to what it adds to the derivative.
+        These are of the differences, of the equilibrium, and of the tables, each relative to what it adds.
         """
         assert tangent.lower is not None
         levitation, bare = self.levitation, known.without or known
@@ -224,10 +217,7 @@ class Gradient:
         return TABLED * sum(one.position_error for one in fixed) / self.scene.floater.radius
 
     def _escape(self, known: Equilibrium, keys: Sequence[str]) -> tuple[float, Array, Array]:
-        """Energy (J) that carries the floater over the next unstable equilibrium away from the rotor; by each key.
-
-        Without the plate's currents: the Jacobi integral there less that here. NaN where there is no such equilibrium.
-        """
+        """Energy (J) over the next unstable equilibrium farther from the rotor, without plate; by each key."""
         lost = np.full(len(keys), np.nan)
         here = known.without or known
         every = [e for e in self.levitation.without_plate.equilibria if e.kind == known.kind != LOCKED]
@@ -273,10 +263,7 @@ def range_ends(gradient: Gradient, keys: Sequence[str]) -> tuple[Array, Array, A
 
 
 def equilibrium_at(levitation: Levitation, point: BranchPoint) -> Equilibrium:
-    """The equilibrium of a point of a branch, at whose frequency the scene is; of a body that is not round its mean's.
-
-    Or a frequency-locked one, if the point is.
-    """
+    """The equilibrium of a branch's `point`, at whose frequency a `levitation` is; of a body not round its mean's."""
     scene, kind = levitation.still, LOCKED if len(point.state) == 13 else ""
     if not scene.floater.round and not kind:
         scene, kind = replace(scene, floater=scene.floater.averaged), AVERAGED

@@ -49,10 +49,8 @@ PLACES = 50  # on a trajectory, at which the error by a slab's missing edges is 
 class Levitation:
     """Equilibria, stability and trajectory of a `scene` by the `models` asked for, at body `spin` S = Ω·m̂/ω.
 
-    Every member is computed when it is first used and then kept: the rotor's `table`, the `survey` of all equilibria,
-    the currents of the `plate`, the `stability` of the equilibrium at which a `flight` begins, and its trajectory.
-    Raises SceneError where a scene's file cannot be used; InputError for a model that does not exist, or a tolerance
-    out of range.
+    Every member is computed when it is first used and then kept. Raises SceneError where a scene's file cannot be used;
+    InputError for a model that does not exist, or a tolerance out of range.
     """
 
     def __init__(self, scene: SceneLike, models: Models = Models(), spin: float = 0.0) -> None:
@@ -392,15 +390,10 @@ class Levitation:
     def flight(self, duration: float, checkpoint: Checkpoint | None = None, cached: bool = False) -> Trajectory:
         """The motion for `duration` (s) from where the scene says, kept in `checkpoint` while it lasts.
 
-        If `cached`, it is from the user's cache where the same motion was simulated before, and is kept there.
-
-        A floater that leaves the range of the plate's table begins anew with one for where it goes: states of other
-        currents begin without the earlier ones. Where none can be made, the trajectory ends there as lost
-        (`Trajectory.left_plate_table`).
-
-        Raises EquilibriumError where it shall begin at an equilibrium, and there is none that will do; InputError where
-        `duration` is not positive or shorter than the drive, it would begin in contact, or the plate is in the way
-        after a step of the drive; FlightStopped, which holds what was simulated, where the user stopped it.
+        If `cached`, the same motion is simulated once for all runs. A floater that leaves the range of the plate's
+        table begins anew with one for where it goes; where none can be made, the trajectory ends there as lost. Raises
+        EquilibriumError: there is none to begin at; InputError: a duration, a start or a drive that cannot be;
+        FlightStopped, which holds what was simulated.
         """
         positive("duration", duration)
         plans.check_drive(self.scene, duration)

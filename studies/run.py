@@ -186,10 +186,7 @@ def equilibria_job(scene: Scene, requested: Models, spin: float, out: Path, grad
 
 
 def simulate_job(scene: Scene, requested: Models, duration: float, out: Path, resume: bool) -> Answer:
-    """Trajectory of a `scene` for `duration` (s) by `requested` models, kept in a checkpoint, from which to `resume`.
-
-    Writes trajectory.nc and its figure to `out`.
-    """
+    """Trajectory of a `scene` for `duration` (s) by `requested` models in `out`, with a checkpoint to `resume` from."""
     if scene.carried_by_coils:
         return coils_job(scene, duration, requested.plate_rtol, out)
     request = {"scene": scene_digest(scene), "duration_s": duration, **vars(requested)}

@@ -96,10 +96,7 @@ def given_starts(levitation: Levitation, starts: Mapping[Any, Any]) -> tuple[Lev
 
 
 def drawn_starts(levitation: Levitation, count: int | None, seed: int, spread: Mapping[str, Any]) -> State:
-    """States (`count`, 3) about where the scene of `levitation` begins, normal with standard deviations `spread`.
-
-    The same `seed` gives the same numbers; those of one key do not depend on what the others' spreads are.
-    """
+    """`count` states about where a `levitation`'s scene begins, normal with standard deviations `spread`, by `seed`."""
     for name, value, least in (("n", count, 1), ("seed", seed, 0)):
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
             raise refused(name, f"be a whole number, {least} at least", value)

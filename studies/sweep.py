@@ -79,10 +79,7 @@ def forget(study: Study, points: Sequence[Point], out: Path) -> None:
 
 
 class Journal:
-    """One sealed file for each finished point of a `study` in the folder NAME.points of `out`, made with the first.
-
-    Its name, which it repeats, says of which sweep it is: `points` and the program's text decide what is in the files.
-    """
+    """One sealed file a finished point of a `study` in NAME.points of `out`, named by the `points` and the program."""
 
     def __init__(self, study: Study, points: Sequence[Point], out: Path) -> None:
         function = study.compute

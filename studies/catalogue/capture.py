@@ -93,8 +93,7 @@ def plate_under(place: Place, lowered: bool = False) -> PlateMemory:
 def launches(place: Place, count: int, seed: list[int]) -> tuple[dict[str, Array], State]:
     """A `count` of launches drawn evenly over heights, a disc, a cap of directions and spins; let go by a hand.
 
-    How each is let go below a `place` (n,) by the names of `COLUMNS`, and its state (n, 3) at t = 0, along the rotor's
-    axes. The same `seed` gives the same launches, to the last bit.
+    How each is let go below a `place` (n,) by the names of `COLUMNS`, and its state at t = 0; the same for a `seed`.
     """
     draws = np.random.default_rng(seed)
     height, area, cap, along = draws.uniform(size=(4, count))

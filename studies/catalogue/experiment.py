@@ -26,18 +26,6 @@ from ..result import Columns, columns, records, variable
 from ..study import Point, Study
 from . import experiment_model as model
 from .experiment_design import design_row
-from .experiment_model import (
-    EVEN,
-    FITTED,
-    LONGEST,
-    NAMES,
-    UNKNOWNS,
-    Fact,
-    Models,
-    Trials,
-    log_likelihoods,
-    prior_values,
-)
 from .showing import text_table, uncertain
 
 KEPT, TOGETHER = 1000, 500  # Draws of the posterior that are kept; draws that are evaluated in one call
@@ -62,38 +50,37 @@ COLUMNS: Columns = {
 }
 
 
-def posterior(models: Models, facts: Mapping[str, Fact], live: int, walks: int, seed: int) -> dict[str, Any]:
-    """Draws of the posterior of the `models` by the `facts`, and the evidence, by names of `COLUMNS`.
-
-    Nested sampling with so many `live` points, each new one found by so many `walks`; the `seed` decides all of it.
-    """
+def posterior(
+    models: model.Models, facts: Mapping[str, model.Fact], live: int, walks: int, seed: int
+) -> dict[str, Any]:
+    """Draws of the posterior of `models` by `facts`, and evidence: `live` points, `walks` for a new one, a `seed`."""
     from dynesty import NestedSampler
 
     def likelihood(shares: Array) -> float:
-        known = log_likelihoods(models, prior_values(shares[None]), facts)
+        known = model.log_likelihoods(models, model.prior_values(shares[None]), facts)
         return float(sum(value[0] for value in known.values()))
 
     generator = np.random.default_rng(seed)
     how: Any = {"nlive": live, "bound": "multi", "sample": "rwalk", "walks": walks, "rstate": generator}
-    sampler = NestedSampler(likelihood, lambda shares: shares, len(UNKNOWNS), **how)  # shares of the priors
+    sampler = NestedSampler(likelihood, lambda shares: shares, len(model.UNKNOWNS), **how)  # shares of the priors
     sampler.run_nested(dlogz=DONE, print_progress=False)
     found = sampler.results
     weights = np.exp(found.logwt - logsumexp(found.logwt))
-    values = prior_values(found.samples[generator.choice(len(weights), KEPT, p=weights / weights.sum())])
+    values = model.prior_values(found.samples[generator.choice(len(weights), KEPT, p=weights / weights.sum())])
     return {
-        "posterior": np.stack([values[name] for name in NAMES], axis=1),
-        "fact_log_likelihood": np.stack(list(log_likelihoods(models, values, facts).values()), axis=1),
+        "posterior": np.stack([values[name] for name in model.NAMES], axis=1),
+        "fact_log_likelihood": np.stack(list(model.log_likelihoods(models, values, facts).values()), axis=1),
         "log_evidence": found.logz[-1],
         "log_evidence_error": found.logzerr[-1],
         "calls": np.sum(found.ncall),
     }
 
 
-def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) -> dict[str, Any]:
+def evidences(models: model.Models, facts: Mapping[str, model.Fact], draws: int, seed: int) -> dict[str, Any]:
     """Evidences of `models` by `facts` from `draws` (a power of two) of the prior by Sobol's sequence of a `seed`."""
-    shares = np.clip(scipy.stats.qmc.Sobol(len(UNKNOWNS), seed=seed).random(draws), 1e-12, 1 - 1e-12)
+    shares = np.clip(scipy.stats.qmc.Sobol(len(model.UNKNOWNS), seed=seed).random(draws), 1e-12, 1 - 1e-12)
     pieces = np.array_split(shares, max(1, draws // TOGETHER))
-    parts = [log_likelihoods(models, prior_values(part), facts) for part in pieces]
+    parts = [model.log_likelihoods(models, model.prior_values(part), facts) for part in pieces]
     known = np.stack([np.concatenate([part[name] for part in parts]) for name in facts], axis=1)
 
     def mean(logarithms: Array) -> Array:
@@ -117,25 +104,27 @@ def evidences(models: Models, facts: Mapping[str, Fact], draws: int, seed: int) 
 
 SYNTHETIC = "made-up facts"
 # Unknowns of which facts are made up: off the prior's middle by up to 1.5 of its deviations
-TRUTH: dict[str, float] = {u.name: (u.first + u.second) / 2 if u.prior == EVEN else u.first for u in UNKNOWNS}
+TRUTH: dict[str, float] = {
+    u.name: (u.first + u.second) / 2 if u.prior == model.EVEN else u.first for u in model.UNKNOWNS
+}
 TRUTH |= {"displacement": 1.2, "tilt": 1.6, "stack": 14.2, "stack_tilt": 1.0}
 TRUTH |= {"magnets": 7.5e5, "steel": 3.0, "motion": 9.0}
 FLIGHTS: tuple[model.Flight, ...] = (
-    *(("single", 1.0, frequency, LONGEST) for frequency in np.arange(95.0, 185.0, 10.0)),
-    *(("stack", 14.0, frequency, LONGEST) for frequency in np.arange(52.0, 68.0, 3.0)),
+    *(("single", 1.0, frequency, model.LONGEST) for frequency in np.arange(95.0, 185.0, 10.0)),
+    *(("stack", 14.0, frequency, model.LONGEST) for frequency in np.arange(52.0, 68.0, 3.0)),
 )
 
 
-def synthetic_facts(models: Models) -> dict[str, Fact]:
+def synthetic_facts(models: model.Models) -> dict[str, model.Fact]:
     """How each of `FLIGHTS` of the true rotors most probably ends, and the times of falls, by the models themselves."""
-    trials, facts = Trials.of(models, {name: np.array([value]) for name, value in TRUTH.items()}, FLIGHTS), {}
+    trials, facts = model.Trials.of(models, {name: np.array([value]) for name, value in TRUTH.items()}, FLIGHTS), {}
     for flight, course in trials.courses.items():
         found = trials.ends(flight)
         way = max(found, key=lambda name: float(found[name][0]))
         lasted = float(course["fall"][0]) if way == "falls" else None
         when = "" if lasted is None else f" after {lasted:.3g} s"
         says = f"{flight[0]} of {flight[1]:g} mm, {flight[2]:g} Hz: {way}{when}"
-        facts[says] = Fact(says, (flight,), model.ended(flight, way, lasted))
+        facts[says] = model.Fact(says, (flight,), model.ended(flight, way, lasted))
     return facts
 
 
@@ -187,7 +176,7 @@ def experiment(point: Point) -> xr.Dataset:
     if "rotor" in point:
         return xr.Dataset({"hanging": design_row(point)["hanging"]}).expand_dims("design")
     name, settings, effects = point["variant"], SETTINGS[point["quick"]], VARIANTS[point["variant"]]
-    models = Models(surrogates_of(settings, effects), effects)
+    models = model.Models(surrogates_of(settings, effects), effects)
     facts = dict(list(model.FACTS.items())[: 4 if point["quick"] else None])
     if name == SYNTHETIC:
         facts = synthetic_facts(models)
@@ -195,10 +184,10 @@ def experiment(point: Point) -> xr.Dataset:
     found |= evidences(models, facts, settings["draws"], SEED)
     of = models.surrogates.values()
     found |= {"surrogate_error": [one.errors for one in of], "surrogate_rotors": [one.rotors for one in of]}
-    found["truth"] = [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in NAMES]
+    found["truth"] = [TRUTH[unknown] if name == SYNTHETIC else np.nan for unknown in model.NAMES]
     found["says"] = [fact.says for fact in facts.values()]
-    labels = {"fact": list(facts), "other_fact": list(facts), "unknown": list(NAMES)}
-    labels |= {"rotor_kind": list(models.surrogates), "fitted": list(FITTED)}
+    labels = {"fact": list(facts), "other_fact": list(facts), "unknown": list(model.NAMES)}
+    labels |= {"rotor_kind": list(models.surrogates), "fitted": list(model.FITTED)}
     return xr.Dataset(columns(COLUMNS, found), labels).expand_dims(variant=[name])
 
 
@@ -227,8 +216,8 @@ def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
         return xr.Dataset({"design_rotors": rotors})
     says = {k: v for part in variants for k, v in zip(part["fact"].values, part["says"].values[0], strict=True)}
     joined = xr.concat([part.drop_vars("says") for part in variants], "variant", data_vars="all", join="outer")
-    known: dict[str, Any] = {k: ("unknown", [getattr(u, k) for u in UNKNOWNS]) for k in ("prior", "unit", "why")}
-    numbers = ("unknown", "number"), [[u.first, u.second] for u in UNKNOWNS]
+    known: dict[str, Any] = {k: ("unknown", [getattr(u, k) for u in model.UNKNOWNS]) for k in ("prior", "unit", "why")}
+    numbers = ("unknown", "number"), [[u.first, u.second] for u in model.UNKNOWNS]
     said = "fact", [str(says[name]) for name in joined["fact"].values]
     return joined.assign({**known, "design_rotors": rotors, "says": said, "prior_numbers": numbers})
 
@@ -269,7 +258,7 @@ def facts_weighed(one: xr.Dataset) -> tuple[xr.Dataset, Array]:
 
 
 def _labels(result: xr.Dataset) -> dict[str, str]:
-    symbols = {unknown.name: unknown.symbol for unknown in UNKNOWNS}
+    symbols = {unknown.name: unknown.symbol for unknown in model.UNKNOWNS}
     units = {"1": "", "S/m": " (MS/m)", "deg": " (°)", "um": " (µm)", "kg/m3": " (kg/m³)"}
     pairs = zip(result["unknown"].values.tolist(), result["unit"].values.tolist(), strict=True)
     return {name: symbols.get(name, name) + units.get(unit, f" ({unit})") for name, unit in pairs}

@@ -48,8 +48,7 @@ def small_multiples(
 ) -> tuple[Figure, list[tuple[Axes, Any]]]:
     """A panel for each of `parts` (by title, behind its letter), beside what it shows; `shared` are of `subplots`.
 
-    Rows have `columns` panels at most and a `height` in inches; the lowest panel of a column has `xlabel`, the first of
-    a row `ylabel`.
+    Rows have `columns` panels and a `height` in inches; `xlabel` is below the lowest, `ylabel` beside the first.
     """
     count = len(parts := dict(parts))
     figure, ((*axes,),) = panels(1, count, height + 0.3, min(columns, count), **shared)

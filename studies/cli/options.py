@@ -297,10 +297,7 @@ SHARED = _entries("\n".join([COMMON, inspect.getdoc(Models) or "", inspect.getdo
 
 
 def documented(function: Callable[P, T]) -> Callable[P, T]:
-    """A function whose docstring says what it leaves out: shared arguments and errors, and the scene of its example.
-
-    Messages are printed where `progress` is true; of an unknown keyword it says which one it resembles.
-    """
+    """A function whose docstring says what it leaves out: shared arguments and errors, and the scene of its example."""
     signature = inspect.signature(function)
     known = [*signature.parameters, *Requested.__annotations__]
 

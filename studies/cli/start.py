@@ -68,10 +68,7 @@ def _find_home() -> None:
 
 
 def _listen(stop: threading.Event) -> None:
-    """Raise KeyboardInterrupt at Ctrl-C, at SIGTERM and at SIGHUP: a batch system stops like a person.
-
-    A terminal that is closed says so more than once, and takes no more words: neither may disturb what is still kept.
-    """
+    """Raise KeyboardInterrupt at Ctrl-C, SIGTERM and SIGHUP, which a closed terminal sends more than once."""
     terminals = [number for number in (1, 2) if os.isatty(number)]
 
     def stopped(number: int, _: object) -> None:

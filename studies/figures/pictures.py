@@ -49,10 +49,7 @@ def seen_from(scene: Scene, time: Array, motion: State) -> View:
 
 
 def drawn_field(scene: Scene, table: FieldTable) -> Callable[[Array], Array]:
-    """B (n, 3) T at points (n, 3) m by the table and, nearer to the magnets than its range, by the closed form.
-
-    NaN inside the magnets.
-    """
+    """B (n, 3) T at points (n, 3) m by the table and, where that ends, the closed form; NaN inside the magnets."""
     sources = table, rotor_table(scene.rotor, "cuboid")
 
     def field(points: Array) -> Array:

@@ -32,10 +32,9 @@ class Picture(Protocol):
 
 
 def render(pictures: Mapping[Path, Picture], progress: Progress = lambda fraction: None) -> None:
-    """Draw `pictures`, by the file that each becomes, all in one process, and write each as soon as it is finished.
+    """Draw `pictures`, by the file of each, in one process, and write each as it is finished; `progress` gets the part.
 
-    `progress` is called with the part of all that is done. Raises RenderError where the process died or found no way to
-    draw, so that no older picture is left where one could not be drawn; OSError where a file cannot be written.
+    Raises RenderError where they cannot be drawn, and leaves no older ones; OSError where a file cannot be written.
     """
     for path in pictures:
         path.unlink(missing_ok=True)

@@ -280,10 +280,7 @@ def drawable(result: xr.Dataset) -> bool:
 
 @drawn
 def question_figure(result: xr.Dataset) -> Figure:
-    """Curves over the number with most values, one for each combination of the others, or maps where they are many.
-
-    Of equilibria the branch on which the floater levitates; solid and filled where it is stable or marginal.
-    """
+    """Curves over the number with most values, one for each combination of the others, or maps where they are many."""
     (shown, names), (along, others) = _derived(result), _axes(result)
     figure, ((*axes,),) = panels(1, len(names), 3.1, 2)
     members = list(product(*(shown[key].values.tolist() for key in others)))
@@ -356,10 +353,7 @@ def _curve(axes: Axes, result: xr.Dataset, name: str, key: str, color: str, labe
 
 
 def _levitating(result: xr.Dataset, key: str) -> NDArray[np.int_]:
-    """Numbers of the equilibria along a parameter on the branch of the stable ones, or of the first; -1 beyond its end.
-
-    From the first stable one on to both sides, each is the nearest to the one before, a stable one if there is any.
-    """
+    """Numbers of equilibria on the branch of the stable ones or the first, each nearest to the last; -1 beyond."""
     place = result["position"].transpose(key, "equilibrium", "axis").values
     stable = result["stable"].transpose(key, "equilibrium").values == 1
     begin, numbers = int(np.argmax(stable.any(axis=1))), np.full(len(place), -1)

@@ -256,11 +256,7 @@ class Page:
 
 
 def scene_bodies(scene: Scene, lines: Sequence[Array]) -> dict[str, Any]:
-    """What page.js draws: what turns with the rotor, what stands still, and the floater about its centre, moment up.
-
-    `arrows`: centres of the magnets and vectors from there to the tips; `floater`: none for a ball; `reach`: half the
-    width of the picture, its lowest and its highest point.
-    """
+    """What page.js draws of a `scene`: what turns with the rotor, what stands, and the floater about its centre."""
     size = max(float(np.linalg.norm(magnet.box.size)) for magnet in scene.rotor)
     turning = [_mesh(triangles(magnet.body), MAGNET) for magnet in scene.rotor]
     turning += [_mesh(triangles(conductor.body), METAL) for conductor in scene.conductors]
