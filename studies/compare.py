@@ -53,15 +53,9 @@ class Compared:
         row: dict[str, Any] = {"name": self.name, "stable_range_hz": self.stable}
         if (e := self.found) is None:
             return row | dict.fromkeys(OF_EQUILIBRIUM)
-        return row | {
-            "distance_mm": -1e3 * float(e.position[2]),
-            "distance_error_mm": 1e3 * e.position_error,
-            "polar_angle_deg": e.polar_angle_deg,
-            "growth_per_s": e.growth_per_s,
-            "efolding_s": e.efolding_s,
-            "stability": e.stability,
-            "frequencies_hz": e.frequencies_hz,
-        }
+        row |= {"distance_mm": -1e3 * float(e.position[2]), "distance_error_mm": 1e3 * e.position_error}
+        names = "polar_angle_deg", "growth_per_s", "efolding_s", "stability", "frequencies_hz"
+        return row | {name: getattr(e, name) for name in names}
 
 
 def compared_models(dipole: Survey, true_moment: Survey, best: Survey, name: str) -> dict[str, Any] | None:

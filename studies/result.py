@@ -56,6 +56,7 @@ OF_A_STATE = (
     ("spin", "rad/s", "angular velocity"),
 )
 PLACES = 500  # of a trajectory, at which the field's error is looked at
+ENDED = ("beyond_plate_table", "left_plate_table", "levitated_s", "ended_by")
 Columns = Mapping[str, tuple[tuple[str, ...], str, str]]  # dimensions, unit and a name for an axis label, by name
 Found = Mapping[str, Any] | Sequence[Any]  # quantities by name, or in the order of a table of columns
 DRIVE: Columns = {
@@ -133,10 +134,7 @@ class Result:
                 "model": table.model,
                 "error_estimate": float(table.relative_error(places[table.in_range(places)])[0].max()),
                 **_plate(levitation.flight_plate),
-                "beyond_plate_table": flight.beyond_plate_table,
-                "left_plate_table": flight.left_plate_table,
-                "levitated_s": flight.levitated_s,
-                "ended_by": flight.ended_by,
+                **{name: getattr(flight, name) for name in ENDED},
                 "kind": words.kind_of_flight(levitation, flight),
                 "energy_error": flight.energy_error,
                 "field_changes": vars(flight.field_changes),

@@ -107,12 +107,10 @@ class Journal:
             content = None
             with suppress(InputError):
                 content = unsealed(path)
-            if content is None:
-                note(f"The finished point {path} is damaged and is computed anew.")
-                continue
-            name, _, text = content.partition(b"\n")
+            name, _, text = (content or b"").partition(b"\n")
             if name != path.name.encode():
-                note(f"The finished point {path} is of another sweep or point and is computed anew.")
+                why = "damaged" if content is None else "of another sweep or point"
+                note(f"The finished point {path} is {why} and is computed anew.")
                 continue
             kept = json.loads(text)
             variables = {

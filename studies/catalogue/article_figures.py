@@ -207,7 +207,7 @@ def parts_figure(result: xr.Dataset) -> Figure:
     figure, ((left, right),) = panels(1, 2, 3.9)
     one = result.isel(frequency=min(1, result.sizes["frequency"] - 1))
     true = case_with(one, model="fem")
-    for model, (style, text) in STYLES.items():
+    for model, (style, _) in STYLES.items():
         found = case_with(one, model=model)
         for part, color in (("attracting", PALETTE[0]), ("repelling", PALETTE[1])):
             _plot(left, found, found[part], style, color=color, lw=1.0)
@@ -215,10 +215,10 @@ def parts_figure(result: xr.Dataset) -> Figure:
                 # in units of the weight: the parts themselves cross zero
                 _plot(right, found, 100e-3 * (found[part] - true[part]) / article.WEIGHT, style, color=color)
         _plot(left, found, _net(found), style, color="k")
-        showing.explain(left, {text: style})
-    showing.explain(left, {"attracting part": "C0-", "repelling part": "C1-", "net force, with gravity": "k-"})
     _mark(left, true, PALETTE[2])
-    showing.explain(left, {words: symbol for symbol, words in POINTS.values()}, ms=5)
+    key = {text: style for style, text in STYLES.values()} | {"attracting part": "C0-", "repelling part": "C1-"}
+    key |= {"net force, with gravity": "k-", **{words: symbol for symbol, words in POINTS.values()}}
+    showing.explain(left, key, ms=5)
     left.axhline(0.0, color="0.3", lw=0.6)
     left.set(ylabel="force, upwards (mN)", ylim=(-470, 350), title=f"(a) δx = 1 mm, {float(one['frequency']):g} Hz")
     right.set(ylabel="deviation from finite elements\n(% of the weight)", ylim=(-25, 25))
@@ -236,8 +236,7 @@ def net_figure(result: xr.Dataset) -> Figure:
         _mark(net, found, color)
         _plot(angle, found, 1e-3 * np.degrees(found["polar_angle"].values), "-", color=color)
         showing.explain(net, {f"{float(found['frequency']):g} Hz": f"C{k}-"})
-    showing.explain(net, {text: style for style, text in list(STYLES.values())[:2]})
-    showing.explain(net, {words: symbol for symbol, words in POINTS.values()}, ms=5)
+    showing.explain(net, {text: style for style, text in [*list(STYLES.values())[:2], *POINTS.values()]}, ms=5)
     net.axhline(0.0, color="0.3", lw=0.6)
     net.set(ylabel="net force, with gravity (mN)", ylim=(-60, 1.1e3 * float(_net(result).max())))
     angle.axhline(REPORTED_ANGLE, color="0.4", lw=0.8, ls="-.", label="near tipping point in the article")

@@ -219,7 +219,7 @@ def gather_experiment(parts: Sequence[xr.Dataset]) -> xr.Dataset:
     known: dict[str, Any] = {k: ("unknown", [getattr(u, k) for u in model.UNKNOWNS]) for k in ("prior", "unit", "why")}
     numbers = ("unknown", "number"), [[u.first, u.second] for u in model.UNKNOWNS]
     said = "fact", [str(says[name]) for name in joined["fact"].values]
-    return joined.assign({**known, "design_rotors": rotors, "says": said, "prior_numbers": numbers})
+    return joined.assign({"design_rotors": rotors, "says": said, **known, "prior_numbers": numbers})
 
 
 SHOWN = ["displacement", "tilt", "stack_tilt", "magnets", "steel", "motion", "spin"]  # Unknowns of the corner
