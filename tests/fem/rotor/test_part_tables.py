@@ -22,7 +22,7 @@ from spinlev.geometry.files import CrashError, LostError, call_apart
 from spinlev.geometry.magnets import Magnet
 from spinlev.geometry.meshes import magnets as magnet_meshes
 from spinlev.geometry.meshes.magnets import MeshSettings
-from spinlev.geometry.overlap import overlapping_magnets
+from spinlev.geometry.overlap import body_overlap
 from spinlev.geometry.scene.files import changed, load_scene, parse_scene, scene, scene_text
 from spinlev.geometry.scene.making import magnets
 from spinlev.geometry.scene.messages import SceneError
@@ -162,9 +162,7 @@ def test_distances_are_those_of_the_solid(folder):
     points = np.random.default_rng(0).uniform(-0.01, 0.01, (500, 3))
     assert part.distance(points) == pytest.approx(cube.distance(points), abs=1e-12)
     assert part.reach(np.eye(3)) == pytest.approx([5e-3] * 3)
-    beside = Magnet(Box((0.01,) * 3, (9.5e-3, 0, 0)), (1, 0, 0))
-    ((_, _, depth),) = overlapping_magnets([Magnet(part, (1, 0, 0)), beside])
-    assert depth == pytest.approx(0.5e-3)
+    assert body_overlap(part, Box((0.01,) * 3, (9.5e-3, 0, 0))) == pytest.approx(0.5e-3)
 
 
 @pytest.mark.parametrize(
