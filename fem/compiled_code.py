@@ -24,8 +24,7 @@ from ..geometry.files import seal, unsealed, user, write_whole
 from .cache import cache_folder, cache_limit, key_of, make_room, others_may_write
 
 LIMIT = 2**29  # Size of all that is kept, bytes; what was not used for the longest time makes room
-# Memory of functions that this process keeps at hand, bytes; those in use are not lost by it, and integrators, which
-# have a state, are read anew each time.
+# Memory of functions kept at hand, bytes, beside those in use; integrators, which have a state, are read anew.
 SHARED = 2**26
 # What a function takes of it: so many bytes where it was compiled here, and so many times its file.
 EACH, TIMES = 3_000_000, 20

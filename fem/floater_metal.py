@@ -33,8 +33,7 @@ from .closed_forms.eddy_bodies import thin_field_torque
 from .elements.spaces import volume_points
 from .rotor_metal import flat, metal_of
 
-# Degrees of the elements, up to the first that changes K by so little: of one less for the error that is stated. About
-# the small hole of a ring the mesh is so fine that the fifth takes ten times as long as the third, for nothing.
+# Degrees of the elements, up to the first that changes K by so little: by a ring's small hole five is slow for nothing
 ORDERS, STEADY = (2, 3, 4, 5), 4e-3
 SMEARED = np.array([0.15, 0.22, 0.3])  # ε in cube roots of a piece's volume
 POWERS = 0, 3, 5  # of ε that its field's energy is made of
@@ -63,8 +62,7 @@ class CurrentShape:
     coupling: Array  # (3, 5) K/(κR) between field and gradient, zero of bodies with a centre of symmetry
     coupling_delay: float  # its mean delay by that of the ball's field
     error: float  # relative error of the tensors by the finite elements, at most
-    # the same of what the delays do, in a field whose gradient changes it by itself over a radius: with what one delay
-    # of the gradient and one of the coupling miss
+    # the same of what the delays do, where a gradient changes the field by itself over a radius
     delay_error: float
 
 

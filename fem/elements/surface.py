@@ -34,11 +34,9 @@ from ..harmonics.interior import sphere
 from ..harmonics.solid import FOUR_PI, gauss_legendre, members, orthonormal
 
 INSET = 1e-10  # of the smallest edge: how far inside of a face closed forms are taken, and what counts as on a face
-# Distance from a face, in edges by the nodes along them, from which on the nodes' own rule does: nodes are at most
-# h = 1.2 of that apart, so that it errs by exp(-2π 4/1.2) = 1e-9
+# Distance from a face, in edges by their nodes, from which on the nodes' own rule does, to exp(-2π 4/1.2) = 1e-9
 APART, APART_OF_FEW = 4.0, 0.75  # of few, by 2e-2 of a field that is itself a few per cent of the carriers'
-# Nodes along an edge up to which the middle of a face needs them more than the logarithms at its edges: by four of them
-# the field of a cube is wrong by 3e-4, and by 2e-3 if they crowd as more do
+# Nodes along an edge up to which a face's middle needs them more: four of a cube err by 3e-4, crowding by 2e-3
 FEW = 8
 MORE = 2  # times as many nodes along an edge for moments as for charges
 KINKS = 0.2  # gap, in edges, from which on a neighbour's edges make no kink in the charges

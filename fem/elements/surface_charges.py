@@ -24,13 +24,11 @@ from .surface import FEW, INSET, SURFACES, far_rows
 DENSE, BLOCK = 6000, 500  # nodes up to which their equations are factorised (290 MB), and fields otherwise at once
 SOLVED = 1e-12  # residual of the charges, relative, by the largest μ
 SOLVED_BY_FEW = 1e-4  # the same of few nodes, whose own errors of B are thirty times what it does
-# Nodes and χ up to which what charges induce in each other is left out: χ of their field at most, which is a tenth of
-# so few nodes' own error to about as much
+# Nodes and χ up to which charges do not induce each other: χ of their field at most, a tenth of so few nodes' error
 ROUGH, SLIGHT = 5, 0.12
 TURNS = 25  # of magnets' responses to each other; with χ up to 1/2 they settle to that in fewer
 PAIRS = 1 << 15  # of a charge and a place at once, so that they stay in the processor's cache
-# Distances of two bodies' centres, in the sum of their circumradii, from which on the few places of `Surface.coarse` on
-# each stand for all. What is charged beyond the carriers has hardly a field there.
+# Distances of two bodies' centres, by their circumradii, from which on the few places of `Surface.seen` stand for all
 FAR = (1.5, 6.0)
 STRAIGHT = 1e-15  # difference of a turn's entries from 0 or ±1 that is round-off
 ALIKE = 1e-11  # differences of turns, and of places in circumradii, below which two pairs lie alike

@@ -262,8 +262,7 @@ class BallField:
 
     first: int  # number of the first of these parameters
     degree: int  # of the potential: 7, 8 and 9 ask for 613, 780 and 966 operations where the table of a cube has 1824
-    # whether the potential is even in y about the centre, as in the plane in which a rotor is its own mirror image:
-    # then half of the weights are zero, and are not written
+    # whether the potential is even in y about the centre, as in a rotor's mirror plane: half of the weights are zero
     mirrored: bool = False
 
     @property

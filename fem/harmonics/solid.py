@@ -28,8 +28,7 @@ Member = tuple[int, int, int]  # l, m, and 0 for the real or 1 for the imaginary
 FOUR_PI = 4 * np.pi
 
 CHUNK = 4096  # points at once, so that what belongs to them fits in memory
-# Points at once of harmonics, more of few degrees as far as they are so many numbers: so that these fit in the
-# processor's cache
+# Points at once of harmonics, more of few degrees: so that these fit in the processor's cache
 BLOCK, NUMBERS = 128, 1 << 18
 STEP, STEPS = 4, 6  # degrees that are compiled together, and how often: a second, once; others are seldom asked for
 FACTORIALS = np.array([float(math.factorial(n)) for n in range(171)])  # all that a double can hold

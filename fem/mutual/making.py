@@ -24,8 +24,7 @@ from . import response, table as formulas
 from .response import ChargeResponse
 from .table import PARALLEL, Grids, MutualTable, ResponseGrid, effort
 
-# Relative size of a singular value that is none; and up to how many weights they are found. No QR with pivots: their
-# order jumps from a scene to its neighbour, and derivatives would jump with it.
+# Relative size of a singular value that is none, for so many weights. No QR with pivots: derivatives would jump.
 SMALL, FEW_WEIGHTS = 1e-9, 500
 # What a weight costs that is held, by an error of the size of all that is fitted, and one that is not; where there are
 # not `ENOUGH` values for each of these they run wild between the samples (errors of 7000 instead of 0.4 were seen)
@@ -37,8 +36,7 @@ CHUNK, BESIDE = 512, 128
 # Points of cuboids beside each other, up to which each has a weight of its own; in round magnets that gains nothing
 SINGLE = 250
 GAPS = (0.03, 0.08, 0.16, 0.5, 1.5)  # at which both are compared, in floater radii
-# Of dipoles, the responses to which are fitted; many magnets would have thousands. With 200 a ring beside a block has
-# errors of 22 near contact, with 250 of 3
+# Of dipoles whose responses are fitted; with 200 a ring beside a block errs by 22 near contact, with 250 by 3
 MOST_PLACES = 250
 MEANS = 0.2  # of what is added, by the difference of two permeabilities whose mean the charges have: 0.09 measured
 CHARGED = 1.0  # error of the finer charges by what the coarser ones differ from them
@@ -96,14 +94,11 @@ OBLIQUE = (
     "one with two permeabilities and an easy axis along none of its edges, which its points cannot follow. Choose "
     "--interaction rigid, give it one recoil_permeability, or turn the body with its magnetisation."
 )
-# Pairs of dipoles that are fitted, of one magnet and of several; how much those at one place count, which alone make
-# the energy; and at one of so many places the rotor's response to the sphere's is
+# Pairs of fitted dipoles, of one magnet and of several; weight of those at one place; strides of samples that return
 EQUATIONS, AT_ONE_PLACE, SPARSE, NEAR_SPARSE, FACING = (8000, 5000), 5.0, 6, 6, 3
-# Places at each of `SPHERE_GAPS` and `NEAR_GAPS` where the sphere's response is sampled: of one magnet, of two whose
-# points have weights of their own, and of others
+# Places at each of `SPHERE_GAPS` and `NEAR_GAPS`: of one magnet, of two with a weight for each point, and of others
 SAMPLES = np.array([[30, 0], [120, 180], [60, 90]])
-# How many more samples than are `ENOUGH` do for two magnets whose points have weights of their own, and what part of
-# all is taken at least: with fewer the weights of single points are wild near contact
+# Samples by `ENOUGH` for two magnets with a weight for each point, and by all: with fewer these are wild near contact
 SPARE, LEAST = 1.1, 0.5
 
 

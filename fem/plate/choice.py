@@ -22,17 +22,14 @@ from .tables import PlateAround
 NEGLIGIBLE = 1e-6  # Part of the floater's weight below which the largest conceivable force of the plate is left out
 REACH = 0.003  # The floater may move so far from where it begins, along each axis, m
 RASTER = 0.001  # Bounds of regions are multiples of this, m, so that scenes that differ little share a table
-# So are centres of those about an equilibrium of this, with odd halves: with `REACH` to each side all that are nearest
-# to one centre share a table.
+# So are centres of those about an equilibrium of this, with odd halves: all that are nearest to one share a table.
 CENTERS = 0.004
 USUAL = 0.00635, 0.027  # The three lengths are for about this radius and distance of the floater, m: the article's
 # Frequencies of a table, Hz, at least; and the multiple of the rotor's that it must hold.
 LOWEST, HIGHEST, HARMONICS = 0.5, 250.0, 2.0
-# How far a bound that a floater has left is moved out, in widths of the region: across the plate's face, and along it,
-# where terms grow with the square of the width.
+# How far a crossed bound moves out, in widths of the region: across the plate's face, and along it, where it is dear.
 FACING, BESIDE = 2.0, 0.5
-# Half the width of a wider region along the face, in distances from it: at 2.3 a slab takes 230 states, at 4.6 it takes
-# minutes.
+# Half the width of a wider region along the face by its distance: at 2.3 a slab takes 230 states, at 4.6 minutes.
 WIDEST = 3.0
 AT = 1e-6  # Distance from a bound, in widths of the region, at which it counts as crossed: that is where the event is
 SKIN = 0.9  # Nearest that a region comes to the plate, in radii of the floater, which touches it at one

@@ -328,14 +328,11 @@ def train(
     return made, worst_error(omegas, residuals, couplings, len(probes)), omegas, dipoles
 
 
-# Share of the tolerance for what the current space misses of the finite elements' currents. With 0.1 the dipoles do not
-# stand for a rotor over a plate that is lowered, and all is solved again.
+# Share of the tolerance for what the states miss of the finite elements'. With 0.1 all is solved again where lowered.
 SPACE_SHARE = 0.06
-# Tolerances below the first have a finer mesh, from the second on a coarser one with less air: its truncation takes a
-# part of them.
+# Tolerances below the first have a finer mesh, from the second on a coarser one with less air.
 STRICT, LOOSE = 5e-4, 2e-3
-# An order whose expected error is at most so many times what is allowed is trained at once; once trained it is kept
-# with an error of the second times that: the next takes three times as long, and a few more states make up for it.
+# An order that is expected to err by so many times the allowed is trained; it is kept up to the second times that.
 HOPEFUL, KEPT = 1.5, 1.1
 INDEPENDENT = 1e-9  # Combinations of dipoles with less than this share of the largest squared potential are left out
 STEPS = 5.0  # The raster of boxes is the largest power of two, in metres, of which so many fit between box and plate

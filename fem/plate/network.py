@@ -32,16 +32,14 @@ from .table import ENOUGH, Region, refuse
 
 NEGLIGIBLE = 1e-12  # Snapshot energies below this share of the largest are round-off
 FREQUENCIES = 7  # Errors are looked at at so many, in equal ratios
-# Share of the tolerance for the finite elements and the states left out together; the rest is the field functions', and
-# that is more of a strict tolerance.
+# Share of the tolerance for finite elements and states left out; the rest, more of a strict one, is the functions'.
 NETWORK_SHARE, STRICT_SHARE = 0.9, 0.8
 FUNCTION_SHARE = 0.1  # Share of the tolerance for the field functions; what the other errors leave of it comes on top
 CONDUCTOR = "this plate and this place of the floater"  # In words, of which tolerances are refused
 # Highest degree of the multipoles, and for strict tolerances: in a region half as wide as it is far from the plate,
 # degree 4 ends near 8e-5 of the field of the plate's currents, degree 5 near 2e-5.
 DEGREE, STRICT_DEGREE = 4, 7
-# Depths of their centres behind the surface, in units of the distance between region and plate: near ones for what is
-# close to the surface, far ones for the rest.
+# Depths of their centres behind the surface, by the distance between region and plate: near and far ones.
 DEPTHS = (0.0, 0.3, 0.6, 1.0, 1.6, 2.5, 4.0, 6.0, 10.0, 18.0)
 SPACING = 2.5  # Lateral distance of the lines of centres, in the same unit
 
@@ -56,8 +54,7 @@ class PassiveNetwork:
     rates: Array  # (states,) λ_i, 1/s
     # s_i = ∫ σ e_i·A_s dV (sources, states), √J, of sources in the plate's frame
     couplings: Callable[[Sequence[Source]], Array]
-    # for a tolerance of reaction tensors the multipoles, their weights (states, k), 1/√J, and the error that they
-    # leave, which may be more
+    # for a tolerance the multipoles, their weights (states, k), 1/√J, and the error that they leave, perhaps more
     field_functions: "Callable[[PassiveNetwork, float, Watch], tuple[Multipoles, Array, float]]"
     mesh_error: float  # estimated relative errors of reaction tensors
     state_error: float

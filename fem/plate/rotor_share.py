@@ -40,11 +40,9 @@ LEFT_OUT = 1e-7  # Share of the rotor's field at the plate that is left out wher
 UNNOTICED = 1e-3  # The same, of a table's tolerance
 SHARE_PART = 0.1  # Share of a table's tolerance for the series of the rotor's signals
 MOST_TERMS = 16  # Highest number of harmonics, and of points along the way
-# Angles of a turn and depths of the plate at first, at which networks are trained too, with probes between them; and
-# the fewest angles at further depths
+# Angles and depths at first, of training too, with probes between them; and the fewest angles at further depths
 ANGLES, DEPTHS_FIRST, FEWEST = 8, 5, 4
-# Angles, rad, where the series is looked at: magnets that lie alike have harmonics that equidistant angles take for
-# others, or for none
+# Angles, rad, where the series is looked at: equidistant ones take harmonics for others, or for none
 CHECKED = (0.7, 2.1, 4.4)
 TOGETHER = 32  # Places whose signals are computed at once
 NOISE = 1e-10  # Amplitudes below this share of the largest signal are what symmetry forbids
@@ -230,8 +228,7 @@ def rotor_share(network: PassiveNetwork, rotor: TurningRotor, tolerance: float, 
     while more(depths, by_depth := float(np.abs(series[..., -1]).max() / size) if distance else 0.0):
         depths += depths - 1
         series, size = series_of(few, depths)
-    # The highest harmonics go, and the highest polynomials, whose sums no signal misses by more than half of the
-    # tolerance.
+    # The highest harmonics and polynomials go, whose sums no signal misses by more than half of the tolerance.
     sizes = np.abs(series).sum(axis=2).max(axis=1), np.abs(series).sum(axis=0).max(axis=0)
     turning, going = (_left_out(part / size) for part in sizes)
     kept = max(3, int(np.argmax(turning <= tolerance / 2)) | 1)

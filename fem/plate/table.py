@@ -102,8 +102,7 @@ class RotorShare:
     distance: float = field(metadata={"units": "m"})  # how far the plate goes down
     # (2H+1, states, k) Chebyshev coefficients over 0…distance: constant, cos φ, sin φ, cos 2φ, …
     series: Array = field(metadata={"units": "J^1/2"})
-    # Estimated largest error of a signal, relative to the largest signal; in it, of harmonics that were left out as the
-    # floater does not need them (`without_high_harmonics`), what they miss of the rotor's currents' field
+    # Estimated largest error of a signal by the largest; in it what left-out harmonics miss (`without_high_harmonics`)
     error: float
 
     def __post_init__(self) -> None:

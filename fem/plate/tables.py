@@ -24,8 +24,7 @@ PLATE = TableKind("plate", PlateTable, TITLE)
 DRIVEN = TableKind("driven-plate", tuple[PlateTable, RotorShare], f"{TITLE}, and the rotor's share of their signals")
 SLAB = TableKind("slab", tuple[PlateTable, RotorShare], "Eddy currents of an infinite slab, with the rotor's share")
 CHANGED = TableKind("changed-share", tuple[Array, float], "Signals of changed rotors in the currents of a plate")
-# Share of what the finite elements leave of the tolerance for what dipoles around the rotor miss of it; the rest is the
-# left-out states'. Above, the rotor itself is solved for, which takes as long again: a few more states cost less.
+# Share of what the elements leave of the tolerance for what dipoles around the rotor miss of it; above, it is solved.
 OTHERS_SHARE = 0.65
 ENDLESS = 1e6  # Edges of a plate without edges, m
 

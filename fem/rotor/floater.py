@@ -39,8 +39,7 @@ DEGREE = 20  # of polynomials over the body that the dipoles integrate exactly
 RTOL, RTOL_OF_PARTS = 1e-5, 1e-3
 DIRECTIONS = 24  # of a dipole beside a floater, by which the sizes of its multipoles' shares are measured
 TURNS = 8  # over which the mean of a body over turns about its moment is taken
-# Least thickness, in circumradii, and highest permeability with which moments of charges reach `RTOL`: of some hundred
-# cylinders, rings and cuboids flatter ones and those of permeabilities of 1.2 and 2 missed it
+# Least thickness, in circumradii, and highest permeability with which moments of charges reach `RTOL`
 COMPACT, HARD = 0.76, 1.1
 SHARE = 0.4  # least radius of the sphere of charges, in circumradii
 
@@ -121,8 +120,7 @@ class FloaterSources:
         return forces, torques
 
 
-# Along an edge, of the charges by which a body's polarizability is computed, up to a permeability; beyond it edges ask
-# for more.
+# Along an edge, of the charges for a polarizability, up to a permeability; beyond it edges ask for more.
 NODES, HIGHEST_PERMEABILITY = 10, 2.0
 
 

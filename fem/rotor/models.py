@@ -45,8 +45,7 @@ class Accuracy:
     """Accuracy asked of a table, and from which distance on."""
 
     rtol: float = 3e-6  # relative error of B
-    # Distance from the magnets' faces from which on `rtol` holds, m, `NEAREST` of the largest magnet's edge at least;
-    # None: 0.8 of that edge, if it were a cube
+    # Distance from faces from which on `rtol` holds, m; None: 0.8 of the largest magnet's edge, if it were a cube
     nearest: float | None = None
 
     def __post_init__(self) -> None:
