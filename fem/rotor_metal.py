@@ -34,8 +34,7 @@ from ..geometry.scene.contents import Scene
 from ..geometry.shapes import Box, Cylinder
 from ..geometry.solids import Solid, places_off
 from .cache import TableKind
-from .elements.condensed import require_memory
-from .elements.spaces import IntegrationPoints, load_vector, volume_points
+from .elements.spaces import IntegrationPoints, load_vector, require_memory, volume_points
 from .harmonics.solid import factorials, members, norm
 from .plate.multipoles import Multipoles, fit_multipoles
 

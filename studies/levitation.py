@@ -27,8 +27,7 @@ from ..fem.plate.choice import plate_around, rotor_nearby, wider_region
 from ..fem.plate.slab import cached_edge_error, edge_error
 from ..fem.plate.table import PlateTable, Region, RotorShare
 from ..fem.plate.tables import PlateAround
-from ..fem.rotor.changed import ChangedTable, changed_table, follows
-from ..fem.rotor.choice import PERMEABLE, cached_rotor_table, resolve_model, rotor_table
+from ..fem.rotor import choice as rotors
 from ..fem.rotor.models import AccuracyError
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import RotorLosses, cached_rotor_losses, check_metal, losses_key, pieces_of
@@ -80,9 +79,9 @@ class Levitation:
         """Use tables and equations of `other` where they fit; with `changed` also its field, changed to this rotor."""
         self._tables = other._tables
         table, name, rotor = other.table if changed else None, self.models.model, self.scene.rotor
-        if isinstance(table, RotorTable) and name == table.model in PERMEABLE and follows(table, rotor):
+        if isinstance(table, RotorTable) and name == table.model in rotors.PERMEABLE and rotors.follows(table, rotor):
             key = plans.field_key(self.scene, name, self.models.rtol)
-            self._tables.once(key, lambda: changed_table(table, rotor, True))
+            self._tables.once(key, lambda: rotors.changed_table(table, rotor, True))
 
     def adopt(self, known: Survey, searched: bool = True) -> None:
         """Take over the equilibria without plate that are known from a search here or from scenes nearby."""
@@ -135,15 +134,15 @@ class Levitation:
         scene, rtol, nearest = self.scene, self.models.rtol, plans.nearest_faces(self.scene.floater)
         if model == "map":
             return self._tables.once(plans.field_key(scene, model, rtol), lambda: plans.map_of(scene))
-        chosen = partial(resolve_model, scene.rotor, model, rtol, nearest)
+        chosen = partial(rotors.resolve_model, scene.rotor, model, rtol, nearest)
         name, reason = self._tables.once(f"model {plans.field_key(scene, model, rtol)}", chosen)
         if model == "auto":
             detail(f"Field model: {name} ({reason})")
         key = plans.field_key(scene, name, rtol)
-        if name in PERMEABLE:
-            make = partial(cached_rotor_table, scene.rotor, name, rtol, note, nearest)
-            return self._tables.table(key, name, f"Rotor's field by {PERMEABLE[name]}", make)
-        return self._tables.once(key, lambda: rotor_table(scene.rotor, name, rtol, nearest))
+        if name in rotors.PERMEABLE:
+            make = partial(rotors.cached_rotor_table, scene.rotor, name, rtol, note, nearest)
+            return self._tables.table(key, name, f"Rotor's field by {rotors.PERMEABLE[name]}", make)
+        return self._tables.once(key, lambda: rotors.rotor_table(scene.rotor, name, rtol, nearest))
 
     @cached_property
     def answers(self) -> tuple[MutualTable | None, str]:
@@ -218,7 +217,7 @@ class Levitation:
     def _searched(self, table: FieldTable, equations: str, watch: Watch, rates: Rates | None = None) -> Survey:
         def remembered(search: Callable[[], FixedPoints], kind: str) -> FixedPoints:
             # no number in a key stands for how a map is fitted, or what magnets a field followed to these
-            if self.scene.field_map or isinstance(interaction_of(table).field, ChangedTable):
+            if self.scene.field_map or isinstance(interaction_of(table).field, rotors.ChangedTable):
                 return search()
             found, known = cached_points(self.still, f"{equations} {kind}".strip(), self.spin, search, note)
             if known:

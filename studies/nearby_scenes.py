@@ -22,7 +22,7 @@ from ..dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from ..dynamics.motion.state import Scales
 from ..fem.mutual.making import moved_mutual, mutual_table_beside
 from ..fem.mutual.table import MutualTable, StrongerMutual
-from ..fem.rotor.changed import changed_table, magnified
+from ..fem.rotor.choice import changed_table, magnified
 from ..fem.rotor.floater import floater_sources
 from ..fem.rotor.table import FieldTable, RotorTable
 from ..fem.rotor_metal import MovedLosses, RotorLosses, cached_rotor_losses

@@ -24,8 +24,7 @@ from ...geometry.meshes.magnets import MagnetMesh, to_meshio
 from ..closed_forms.moments import volume_rule
 from ..closed_forms.uniform import remanent_field
 from ..harmonics.solid import gauss_legendre
-from .condensed import OpenBoundary, TooLargeError, require_memory, solve_open
-from .spaces import volume_points
+from .spaces import OpenBoundary, TooLargeError, require_memory, solve_open, volume_points
 
 BOUNDARY_DEGREE = 8  # harmonics up to this degree see an exactly open boundary; higher ones reach the bodies below 1e-8
 # Of the Gauss rule along a face, for Coulomb's law: farther than 1.2 half edges from the faces its error is below 1e-40

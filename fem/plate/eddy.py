@@ -25,8 +25,8 @@ from ...geometry.scene.contents import Plate
 from ...geometry.shapes import Box
 from ..closed_forms.eddy_bodies import ComplexArray
 from ..closed_forms.potentials import HomogeneousField, unit_dipoles
-from ..elements.condensed import require_memory, solve_condensed
-from ..elements.spaces import Parity, load_vector, region_edges, tree_edges, volume_points
+from ..elements import spaces
+from ..elements.spaces import solve_condensed
 from ..rotor.models import AccuracyError
 from .table import OPTION
 
@@ -60,20 +60,20 @@ class EddySpace:
         if order < 1:
             raise ValueError(f"Input order must be at least 1; instead received {order}.")
         self.conductors, self.order = conductors, order
-        self.parity = Parity(conductors.mirrors)
+        self.parity = spaces.Parity(conductors.mirrors)
         mesh = conductors.mesh
         self.sigma = mesh.MaterialCF(dict(conductors.conductivity), default=0.0)
         self.real = self.elements(complex_valued=False)
         # Exact for twice its order; of tetrahedra the rules of order 8 and less have few points.
         bricks = mesh[ngsolve.ElementId(ngsolve.VOL, 0)].type == ngsolve.ET.HEX
         rule_order = order + 2 if bricks else min(order + 1, max(order, 4))
-        self.quadrature = volume_points(mesh, conductors.pattern, rule_order)
+        self.quadrature = spaces.volume_points(mesh, conductors.pattern, rule_order)
         self.region = self.quadrature.region
         self.points = self.quadrature.points * MILLIMETRE
         self.weights = self.quadrature.sample(self.sigma)[:, 0] * self.quadrature.weights * MILLIMETRE**3
         self.root = np.repeat(np.sqrt(self.weights * conductors.images), 3)
         self._edges = np.array([[v.nr for v in edge.vertices] for edge in mesh.edges], dtype=np.int64)
-        self._conducting = region_edges(mesh, self.region)
+        self._conducting = spaces.region_edges(mesh, self.region)
 
     def elements(self, complex_valued: bool) -> ngsolve.FESpace:
         """The finite elements; real and complex ones have the same numbering."""
@@ -90,7 +90,7 @@ class EddySpace:
         """∫ σ A·v dV (sources, unknowns), S m³ T, of potentials (sources, n, 3) at the quadrature points, T m."""
         test, points = self.real.TestFunction(), self.quadrature
         parts = (self.sigma * points.function(one) * test * points.measure for one in potentials)
-        return MILLIMETRE**3 * np.array([load_vector(self.real, one) for one in parts])
+        return MILLIMETRE**3 * np.array([spaces.load_vector(self.real, one) for one in parts])
 
     def free_unknowns(self, parity_class: Sequence[int], space: ngsolve.FESpace) -> ngsolve.BitArray:
         """Coupling unknowns of one parity class: without odd planes, the far boundary and a spanning tree in air."""
@@ -99,12 +99,12 @@ class EddySpace:
         fixed = mesh.Boundaries("|".join(["far", *odd]))
         free = ngsolve.BitArray(space.FreeDofs(True))
         free &= ~space.GetDofs(fixed)
-        for edge in tree_edges(self._edges, self._conducting | region_edges(mesh, fixed)):
+        for edge in spaces.tree_edges(self._edges, self._conducting | spaces.region_edges(mesh, fixed)):
             free[int(edge)] = False
         return free
 
 
-def source_images(parity: Parity, points: Array, sources: Sequence[Source]) -> Iterator[Array]:
+def source_images(parity: spaces.Parity, points: Array, sources: Sequence[Source]) -> Iterator[Array]:
     """(classes, some sources, n, 3) parity parts of the sources' potentials at `points` (n, 3), T m."""
     flips = parity.flips
     mirrored = (points * flips[:, None]).reshape(-1, 3)
@@ -124,7 +124,7 @@ class ShiftedSystem:
         self.space, self.shift = space, shift
         self.fes = space.elements(complex_valued=True) if np.iscomplexobj(shift) else space.real
         way_out = "Allow a larger error of the plate (--plate-rtol, or --rtol of the command plate)"
-        require_memory(self.fes, self.fes.FreeDofs(True), way_out)
+        spaces.require_memory(self.fes, self.fes.FreeDofs(True), way_out)
         trial, test = self.fes.TnT()
         form = ngsolve.BilinearForm(self.fes, symmetric=True, condense=True)
         form += ngsolve.curl(trial) * ngsolve.curl(test) * ngsolve.dx

@@ -27,9 +27,8 @@ from ..elements.surface_charges import SurfaceCharges
 from ..harmonics.expansion import MultipoleExpansion, polynomial_rule
 from ..harmonics.interior import field_coefficients, harmonics, matrices, shells as multipole_degrees, sphere
 from ..harmonics.solid import factorials, regular_values, tensors
-from .changed import changed_table
 from .charges import bear_charges
-from .choice import cached_rotor_table
+from .choice import cached_rotor_table, changed_table
 from .models import Accuracy
 from .table import DerivedField, FieldTable
 

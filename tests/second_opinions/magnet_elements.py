@@ -20,9 +20,8 @@ import scipy
 from numpy.typing import NDArray
 
 from spinlev.fem.closed_forms.uniform import UniformField, remanent_field
-from spinlev.fem.elements.condensed import OpenBoundary, solve_condensed
 from spinlev.fem.elements.magnetostatics import BOUNDARY_DEGREE, stiffness_of
-from spinlev.fem.elements.spaces import volume_points
+from spinlev.fem.elements.spaces import OpenBoundary, solve_condensed, volume_points
 from spinlev.fem.harmonics.interior import Ball, from_magnetization, interior_coefficients
 from spinlev.fem.harmonics.solid import Coefficients, derivative, outer_sums
 from spinlev.fem.mutual.response import closed_dipoles, direct_rule

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 import ngsolve
 import numpy as np
 
-from spinlev.fem.elements.condensed import solve_condensed
+from spinlev.fem.elements.spaces import solve_condensed
 from spinlev.fem.plate.eddy import EddySpace, Source
 from spinlev.geometry.common import MU_0, Array
 from spinlev.geometry.meshes.plate import MILLIMETRE

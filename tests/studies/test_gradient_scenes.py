@@ -21,7 +21,7 @@ from spinlev.dynamics.motion.equations import parameters
 from spinlev.dynamics.motion.rotor_effects import Mutual, RotorCurrents
 from spinlev.dynamics.motion.state import Scales
 from spinlev.fem.mutual.making import moved_mutual, mutual_table_beside
-from spinlev.fem.rotor.changed import changed_table, magnified
+from spinlev.fem.rotor.choice import changed_table, magnified
 from spinlev.fem.rotor_metal import MovedLosses
 from spinlev.geometry.scene.files import changed
 from spinlev.studies.gradient import Gradient

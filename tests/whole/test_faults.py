@@ -26,7 +26,7 @@ import pytest
 import xarray as xr
 
 from spinlev.fem.cache import cache_folder, read_checked, write_checked
-from spinlev.fem.elements import condensed as memory
+from spinlev.fem.elements import spaces as memory
 from spinlev.fem.maps_of_B.columns import FieldMapError
 from spinlev.fem.maps_of_B.read import read_field_map
 from spinlev.fem.rotor.table import RotorTable

@@ -8,9 +8,9 @@ import pytest
 from second_opinions.elements_alone import direct_table
 
 from spinlev.fem.closed_forms.moments import induced_moments
-from spinlev.fem.elements.condensed import OpenBoundary
 from spinlev.fem.elements.ladder import refinement_of, solve_rotor, trace_moments
 from spinlev.fem.elements.magnetostatics import assemble, solve
+from spinlev.fem.elements.spaces import OpenBoundary
 from spinlev.fem.harmonics.expansion import MultipoleExpansion
 from spinlev.fem.rotor.choice import resolve_model, rotor_table
 from spinlev.fem.rotor.models import Accuracy, fem_table

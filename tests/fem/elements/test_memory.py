@@ -10,10 +10,10 @@ import ngsolve
 import pytest
 from netgen.meshing import NgException
 
-from spinlev.fem.elements import condensed as memory
-from spinlev.fem.elements.condensed import TooLargeError, free_memory, memory_need
+from spinlev.fem.elements import spaces as memory
 from spinlev.fem.elements.ladder import refinement_of
 from spinlev.fem.elements.magnetostatics import assemble
+from spinlev.fem.elements.spaces import TooLargeError, free_memory, memory_need
 from spinlev.fem.plate.eddy import EddySpace, ShiftedSystem
 from spinlev.fem.rotor.choice import rotor_table
 from spinlev.geometry.magnets import horizontal, vertical

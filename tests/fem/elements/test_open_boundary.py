@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from second_opinions.magnet_elements import OpenFactor, lacking
 
-from spinlev.fem.elements.condensed import OpenBoundary, solve_open
-from spinlev.fem.elements.spaces import volume_points
+from spinlev.fem.elements.spaces import OpenBoundary, solve_open, volume_points
 from spinlev.geometry.meshes.magnets import MeshSettings, mesh_magnets
 from spinlev.geometry.scene.files import load_scene
 

@@ -9,8 +9,7 @@ import pytest
 from spinlev.fem.closed_forms.moments import added_by_closed_form, carriers_of
 from spinlev.fem.elements.ladder import Refinement, solve_rotor
 from spinlev.fem.harmonics.expansion import trimmed_expansions, uniform_moments
-from spinlev.fem.rotor.changed import changed_table
-from spinlev.fem.rotor.choice import rotor_table
+from spinlev.fem.rotor.choice import changed_table, rotor_table
 from spinlev.fem.rotor.models import Accuracy, AccuracyWarning, error_points, fem_table
 from spinlev.fem.rotor.table import RotorTable
 from spinlev.geometry.common import InputError
