@@ -106,17 +106,20 @@ class Multipoles:
             found.append((flux, [[weighted(two * row, each[1]) for row in rows] for rows in cartesian(2)]))
         return found
 
-    @cached_property
-    def _compiled(self) -> Callable[..., hy.cfunc_dbl]:
-        @cache
-        def made(*orders: int) -> hy.cfunc_dbl:
-            variables = hy.make_vars("x", "y", "z")
-            parts = zip(*(self.derivatives(variables, order) for order in orders), strict=True)
-            outputs = [entry for several in parts for part in several for entry in part]
-            # Optimised it would be twice as fast at best, and compiled in ten times the time.
-            return compiled(hy.cfunc, outputs, variables, compact_mode=len(outputs) > 2000, opt_level=0, batch_size=1)
+    def _compiled(self, *orders: int) -> hy.cfunc_dbl:
+        variables = hy.make_vars("x", "y", "z")
+        parts = zip(*(self.derivatives(variables, order) for order in orders), strict=True)
+        outputs = [entry for several in parts for part in several for entry in part]
+        # Optimised it would be twice as fast at best, and compiled in ten times the time.
+        return compiled(hy.cfunc, outputs, variables, compact_mode=len(outputs) > 2000, opt_level=0, batch_size=1)
 
-        return made
+    @cached_property
+    def _field_and_slope(self) -> hy.cfunc_dbl:
+        return self._compiled(1, 2)
+
+    @cached_property
+    def _bend(self) -> hy.cfunc_dbl:
+        return self._compiled(3)
 
     def _tensors(self, order: int, values: Array) -> Array:
         """(n, k, 3, …, 3) from derivatives (k, 2 order + 1, n)."""
@@ -125,12 +128,12 @@ class Multipoles:
 
     def evaluate(self, points: Array) -> tuple[Array, Array]:
         """B (n, k, 3) T and ∂B_i/∂x_j (n, k, 3, 3) T/m at points (n, 3) m."""
-        values = self._compiled(1, 2)(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 8, -1)
+        values = self._field_and_slope(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 8, -1)
         return self._tensors(1, values[:, :3]), self._tensors(2, values[:, 3:])
 
     def curvature(self, points: Array) -> Array:
         """∂²B_i/∂x_j∂x_k (n, k, 3, 3, 3) T/m² at points (n, 3) m."""
-        return self._tensors(3, self._compiled(3)(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 7, -1))
+        return self._tensors(3, self._bend(np.ascontiguousarray(points.T)).reshape(len(self.kinds), 7, -1))
 
     def fields(self, points: Array) -> Array:
         """B (n, k, 3) T at points (n, 3) m, without compilation."""

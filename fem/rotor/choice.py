@@ -1,7 +1,7 @@
 """The field models of a rotor, the choice between them, and fields of magnets that differ from those of a table."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -104,23 +104,12 @@ def rotor_table(
         return surface_table(lone, accuracy, watch).posed(rotor)
     if name == "fem":
         return fem_table(lone, accuracy, watch=watch).posed(rotor)
-    return _simple_table(_Requested(ROTOR.key(lone, name, rtol, nearest), lone), name, accuracy).posed(rotor)
+    return MODELS[name](lone, accuracy).posed(rotor)
 
 
 def _bodies(rotor: Rotor, model: str) -> Rotor:
     """The magnets of a model's table: each has a dipole of its own, else those that are one are one."""
     return rotor if model == "dipole" else united(rotor)
-
-
-@dataclass(frozen=True)
-class _Requested:
-    key: str
-    rotor: Rotor = field(compare=False)
-
-
-@lru_cache(maxsize=64)  # sweeps and sliders that move a lone magnet ask for the same again
-def _simple_table(requested: _Requested, model: str, accuracy: Accuracy) -> RotorTable:
-    return MODELS[model](requested.rotor, accuracy)
 
 
 def cached_rotor_table(

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,8 +39,8 @@ class NearElements:
     def __init__(self, magnets: Sequence[Magnet]) -> None:
         self.magnets = tuple(magnets)
         self.carriers = carriers_of(magnets)
-        self._solved: dict[int, RotorSolution] = {}
-        self._outside: dict[float, RotorTable] = {}
+        self._solution = cache(self._solved)
+        self._outside = cache(lambda rtol: fem_table(self.magnets, Accuracy(rtol)))
 
     def reaction(self, points: Array, allowed: float, highest: int) -> tuple[Array, Array, Array, Array, int]:
         """-∇ψ, what the permeability adds to the carriers' μ0 H.
@@ -60,9 +60,7 @@ class NearElements:
         if not inside.all():  # the expansions of a table of the outer field
             largest = largest_remanence(self.magnets)
             rtol = min(allowed / largest, OUTSIDE) if largest else OUTSIDE
-            if rtol not in self._outside:
-                self._outside[rtol] = fem_table(self.magnets, Accuracy(rtol))
-            table, places = self._outside[rtol], points[~inside]
+            table, places = self._outside(rtol), points[~inside]
             for expansion in table.expansions:
                 outer, its_slope = expansion.evaluate(places)
                 field[~inside] += outer
@@ -70,14 +68,12 @@ class NearElements:
             error[~inside], steep[~inside] = table.absolute_error(places)
         return field, slope, error, steep, order
 
-    def _solution(self, order: int) -> RotorSolution:
-        if order not in self._solved:
-            refinement = refinement_of(order, MeshSettings(), strongest(self.magnets))
-            if not any(isinstance(magnet.body, Part) for magnet in self.magnets):
-                layers = max(refinement.mesh.hp_layers, min(order - LOWEST + 1, MOST_LAYERS))
-                refinement = replace(refinement, mesh=replace(refinement.mesh, hp_layers=layers))
-            self._solved[order] = solve_rotor(self.magnets, refinement, "split", 1, carriers=self.carriers)
-        return self._solved[order]
+    def _solved(self, order: int) -> RotorSolution:
+        refinement = refinement_of(order, MeshSettings(), strongest(self.magnets))
+        if not any(isinstance(magnet.body, Part) for magnet in self.magnets):
+            layers = max(refinement.mesh.hp_layers, min(order - LOWEST + 1, MOST_LAYERS))
+            refinement = replace(refinement, mesh=replace(refinement.mesh, hp_layers=layers))
+        return solve_rotor(self.magnets, refinement, "split", 1, carriers=self.carriers)
 
     def _climbed(self, points: Array, allowed: float, highest: int) -> tuple[Array, Array, Array, Array, int]:
         beside, steps, order = self._off_faces(points), np.zeros((2, len(points))), LOWEST
