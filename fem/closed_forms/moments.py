@@ -12,7 +12,7 @@ from ...geometry.magnets import Magnet
 from ...geometry.meshes.solids import part_rule
 from ...geometry.overlap import separation
 from ...geometry.shapes import Box, Sphere
-from ...geometry.solids import Part, Solid, moved, of_one_shape
+from ...geometry.solids import Part, Solid, moved
 from ..harmonics import expansion
 from ..harmonics.expansion import MultipoleExpansion, uniform_moments
 from ..harmonics.solid import Coefficients, gauss_legendre
@@ -112,19 +112,14 @@ def carriers_of(magnets: Sequence[Magnet]) -> tuple[Magnet, ...]:
     A part has no closed form, and all of its remanence is left to the elements.
     """
     found = [Magnet(one.body, np.zeros(3)) if isinstance(one.body, Part) else one for one in magnets]
-    permeable = [number for number, one in enumerate(found) if one.contrast]
-    for alike in of_one_shape([found[number].body for number in permeable]):
-        upright = moved(found[permeable[alike[0]]].body, np.zeros(3), np.eye(3))
+    for k, one in ((k, one) for k, one in enumerate(found) if one.contrast):
+        upright, turn = moved(one.body, np.zeros(3), np.eye(3)), one.body.rotation
         points, weights = volume_rule(upright, (), NODES)
         # mean demagnetising tensor N in body axes, mean H = -N J; its trace is 1
         diagonal = -np.einsum("n,nii->i", weights, demagnetizing_tensor(upright, points))
-        some = [found[permeable[k]] for k in alike]
-        turns = np.array([one.body.rotation for one in some])
-        susceptibilities = np.array([one.permeability_in_rotor for one in some]) - np.eye(3)
-        factors = np.eye(3) + turns.swapaxes(1, 2) @ susceptibilities @ turns * (diagonal / diagonal.sum())
-        uniform = np.linalg.solve(factors, np.array([one.polarization for one in some])[..., None])[..., 0]
-        for k, magnet, polarization in zip(alike, some, uniform, strict=True):
-            found[permeable[k]] = Magnet(magnet.body, polarization)
+        susceptibility = turn.T @ (one.permeability_in_rotor - np.eye(3)) @ turn
+        factors = np.eye(3) + susceptibility * (diagonal / diagonal.sum())
+        found[k] = Magnet(one.body, np.linalg.solve(factors, one.polarization))
     return tuple(found)
 
 

@@ -28,7 +28,7 @@ from scipy.linalg import block_diag
 from ...geometry.common import MU_0, Array, InputError
 from ...geometry.magnets import Magnet
 from ...geometry.shapes import Box, Cylinder, Sphere
-from ...geometry.solids import Part, Solid, moved, of_one_shape
+from ...geometry.solids import Part, Solid, moved
 from ..compiled_code import compiled
 from ..harmonics.expansion import MultipoleExpansion, turned_field, uniform_moments
 from ..harmonics.expressions import FieldExpressions, Vector, differentiated, turned_expressions
@@ -328,17 +328,12 @@ def demagnetizing_tensor(body: Solid, points: Array) -> Array:
 
 def remanent_field(magnets: Sequence[Magnet], points: Array) -> Array:
     """μ0 H (n, 3) T of magnets with μr = 1 at points (n, 3) m, off their edges."""
-    known, found = [magnet for magnet in magnets if magnet.polarization.any()], np.zeros_like(points)
-    bodies = [magnet.body for magnet in known]
-    for numbers in of_one_shape(bodies):
-        home = moved(bodies[numbers[0]], np.zeros(3), np.eye(3))
-        some = max(1, TENSORS // max(len(points), 1))  # of few points there are many bodies at once
-        for first, start in product(range(0, len(numbers), some), range(0, len(points), TENSORS)):
-            few, here = numbers[first : first + some], slice(start, start + TENSORS)
-            seen = np.concatenate([bodies[number].to_body(points[here]) for number in few])
-            tensors = demagnetizing_tensor(home, seen).reshape(len(few), -1, 3, 3)
-            for number, tensor in zip(few, tensors, strict=True):
-                found[here] += tensor @ known[number].polarization @ bodies[number].rotation.T
+    found = np.zeros_like(points)
+    for magnet in (magnet for magnet in magnets if magnet.polarization.any()):
+        home = moved(magnet.body, np.zeros(3), np.eye(3))
+        for here in (slice(start, start + TENSORS) for start in range(0, len(points), TENSORS)):
+            tensor = demagnetizing_tensor(home, magnet.body.to_body(points[here]))
+            found[here] += tensor @ magnet.polarization @ magnet.body.rotation.T
     return found
 
 
