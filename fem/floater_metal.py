@@ -1,17 +1,10 @@
 """Eddy currents of a conducting body of any shape in a slowly changing field: how strong and how late they are.
 
-Such a field is uniform, or has a uniform gradient: eight numbers u. At rates u̇ the body loses the power u̇·K u̇, and has
-the moments -K u̇ + L ü. K is that of the currents without their own field, as of the rotor's metal (`rotor_metal`); L,
-the energy of that field,
-
-    L_ab = (μ0/4π) ∫∫ J_a(r)·J_b(r') / |r - r'|,        J = σE at a unit rate.
-
-Of a ball the uniform field has K = κ = (2π/15) σ R⁵ and L = (2/21) μ0σR² κ; its gradient the (2/21) R² κ, and of that
-(2/45) μ0σR².  By their ratios to these a body is described here.
-
-1/|r - r'| is integrated as that of charges smeared over a length ε, erf(|r - r'|/ε)/|r - r'|, at points that need be no
-denser than ε. What is missing is π ε² J_a·J_b inside, exactly, as J is harmonic; at the surface terms of ε³ and ε⁵
-more, which three lengths ε tell.
+Such a field is uniform, or has a uniform gradient: eight numbers u, with tensors K and L of
+docs/mathematics-currents.md. Of a ball the uniform field has K = κ = (2π/15) σ R⁵ and L = (2/21) μ0σR² κ; its gradient
+the (2/21) R² κ, and of that (2/45) μ0σR².  By their ratios to these a body is described here.  What charges smeared
+over a length ε, at points no denser than ε, miss of L is π ε² J_a·J_b inside, exactly; at the surface terms of ε³ and
+ε⁵, which three lengths tell.
 """
 
 import logging

@@ -1,11 +1,8 @@
 """The rotor's currents as a table: exterior harmonic fields c_k with the power Σ_k (d/dt m·c_k(x))².
 
-The rate is that of a dipole which moves and turns against the rotor.  With generalised velocities q̇ (its velocity in
-the rotor's frame and its turn relative to the rotor) it is C q̇, and the force -D q̇ with D = CᵀC: symmetric and never
-negative, whatever the fields are.  The fields are sums over a few multipoles in the metal, free of divergence and curl.
-
-The currents are too weak to act back on the field.  A vector potential that changes at the rate Ȧ drives E = -(Ȧ + ∇φ),
-free of divergence and with n·E = 0 on the surface:
+With generalised velocities q̇ of a dipole (in the rotor's frame, and its turn relative to the rotor) it is C q̇, and
+the force -D q̇ with D = CᵀC: symmetric and never negative.  The fields are sums over a few multipoles in the metal.
+The currents are those of docs/mathematics-currents.md, too weak to act back on the field: E = -(Ȧ + ∇φ) with
 
     ∫ ∇v·∇φ = -∫ Ȧ·∇v for all v,        ∫ E_a·E_b = ∫ A_a·A_b - ∫ ∇φ_a·∇φ_b.
 

@@ -9,14 +9,12 @@ A cylindrical sheet of radius a with the current K along z has, from its ends at
 [R_D(0, 1-k², 1) - (1-h²) R_J(0, 1-k², 1, 1-h²)]/3h².  A winding is the sum of its sheets by Gauss's rule, on either
 side of the point's own radius, with nodes that crowd there.
 
-Off its winding a coil is as well a few filaments, at the nodes of Gauss's rule in its section, which the equations of
-motion are written with. One of radius a and current I has, by the arithmetic-geometric mean of its largest and
-smallest distance from the point, with q = A_φ/ρ, s = a² + ρ² + ζ² and p = √(s² - 4a²ρ²),
+Off its winding a coil is as well a few filaments, with which the equations of motion are written.  One of radius a and
+current I has, by the arithmetic-geometric mean, with q = A_φ/ρ, s = a² + ρ² + ζ² and p = √(s² - 4a²ρ²),
 
     q = μ0 I/(4M) Σ 2ⁿ⁻¹ (c_n/ρ)²,   c_1² = 2a²ρ²/(s + p),   c_n+1 = c_n²/(4a_n+1),   B = (-x q_ζ, -y q_ζ, 2q + ρ q_ρ),
 
-where a_1 = √((s + p)/2), b_1 = √p, and a_n is the mean of a_n-1 and b_n-1, M the last: a function of ρ², smooth on the
-axis, and without cancellation there.
+where a_1 = √((s + p)/2), b_1 = √p, and a_n is the mean of a_n-1 and b_n-1, M the last: smooth on the axis.
 
 N. Derby, S. Olbert, Am. J. Phys. 78, 229 (2010) (B_z of a sheet); B. C. Carlson, Numer. Algorithms 10, 13 (1995);
 M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, section 17.6.

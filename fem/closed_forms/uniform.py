@@ -5,11 +5,9 @@ r = |(u, v, w)|, a polarisation J gives B = T J with
 
     4π T_xx = Σ ijk atan2(v w, u r)          4π T_xy = Σ_ij ij Λ_z(i, j)
 
-and the other entries by permutation.  Λ_z(i, j) = ∫ dw/r along an edge parallel to z of length L, whose
-ends are at distances r1 and r2, is 2 atanh(L / (r1 + r2)).  This form has no singular point outside
-the edge itself: the lines that extend it need no special case, and far away no digit is lost in it.
-The gradient ∂_k T_ij is symmetric in all its indices and free of trace, so that derivatives of the
-Λ and the sum of ijk/r over the corners give all of it, without any transcendental function.
+and the other entries by permutation.  Λ_z(i, j) = ∫ dw/r along an edge parallel to z of length L, whose ends are at
+distances r1 and r2, is 2 atanh(L / (r1 + r2)), singular on the edge alone.  The gradient ∂_k T_ij is symmetric in all
+its indices and free of trace, so that derivatives of the Λ and the sum of ijk/r over the corners give all of it.
 Inside the cuboid the same formula gives μ0 H = B - J.
 
 Formulas: potential of a uniformly charged segment and rectangle, e.g. O. D. Kellogg, Foundations of

@@ -1,21 +1,18 @@
 """Finite-element spaces: their mirrors and points; systems on them, with their memory; and open boundaries.
 
 A mirror R = diag(±1) takes a polar vector field A to R A(R x).  With the planes of `mirrors` (axes) there are
-2^n mirrors and 2^n parity classes; in class χ, R A(R x) = χ(R) A(x): any field is a sum of parts that are even or odd
-about each plane.  An odd class has no tangential component on its plane: a Dirichlet condition for A there.  An even
-class has the natural condition.
+2^n mirrors and 2^n parity classes; in class χ, R A(R x) = χ(R) A(x).  An odd class has no tangential component on its
+plane: a Dirichlet condition for A there.  An even class has the natural condition.
 
 Element matrices with what static condensation keeps of them take Σ N² numbers, N the unknowns of an element.  The
-factor of nested dissection is mostly that of its last separators, planes across the mesh: with s unknowns on such a
-plane it takes about `SEPARATORS` s² numbers.  n unknowns on f faces of e elements put s = n e^(2/3)/f there.
-Measured peaks were 0.9 to 1.0 of what is predicted here on rotors (orders 3 to 5, up to 1.1 GB), where some symmetry
-leaves plates fewer unknowns 0.65 to 0.8 (orders 2 to 5).
+factor of nested dissection (A. George, SIAM J. Numer. Anal. 10, 345 (1973)) is mostly that of its last separators,
+planes across the mesh: with s unknowns on such a plane it takes about `SEPARATORS` s² numbers.  n unknowns on f faces
+of e elements put s = n e^(2/3)/f there.  Measured peaks were 0.9 to 1.0 of what is predicted here on rotors, on plates
+with mirror planes 0.65 to 0.8.
 
-A. George, SIAM J. Numer. Anal. 10, 345 (1973) (nested dissection).
-
-Open boundary: outside a sphere of radius R a potential of degree l falls as r^-(l+1), so that -∂u/∂r = (l+1)/R u_l. A
-Robin term 2/R is exact for l = 1; what other degrees lack is a matrix of low rank, (l-1)/R on each harmonic up to
-`degree`. On a part of the sphere that mirror planes cut out, only harmonics of the potential's parity take part.
+Outside a sphere of radius R a potential of degree l falls as r^-(l+1), so that -∂u/∂r = (l+1)/R u_l. A Robin term 2/R
+is exact for l = 1; what other degrees lack is a matrix of low rank, (l-1)/R on each harmonic up to `degree`. On a part
+of the sphere that mirror planes cut out, only harmonics of the potential's parity take part.
 """
 
 import contextlib

@@ -1,15 +1,13 @@
 """A permeable magnet by charges on its surface: boundary elements, one graded panel a face; see `surface_charges`.
 
-In a magnet of one recoil permeability μ = 1 + χ nothing but its surface is charged, because ∇·M = 0 there. With
-σ = n·μ0 M and outward normals n the charge solves
+The charge σ = n·μ0 M solves (docs/mathematics.md), with b the field μ0 H of sources elsewhere,
 
-    (1 + χ/2) σ - χ K σ = n·J + χ n·b,        (K σ)(x) = 1/4π ∫ σ(y) n·(x - y)/|x - y|³ dS,
+    (1 + χ/2) σ - χ K σ = n·J + χ n·b,        (K σ)(x) = 1/4π ∫ σ(y) n·(x - y)/|x - y|³ dS.
 
-b the field μ0 H of sources elsewhere. The closed form of uniform carriers is split off, so that a σ of order χ is
-left, with logarithms at the edges. Nodes crowd there as x = sin(π/2 sin(π/2 u)), up to eight of them as x = sin(π/2 u),
-and between nodes σ is a polynomial in u. K from face to face of a body, or of two that are near each other, integrates
-the product of this polynomial and the kernel, with a hyperbolic sine about the place nearest to the target; from afar
-the nodes' own rule does. Errors fall about as n⁻⁷ with the number n of nodes along an edge, of up to eight as n⁻⁴.
+The closed form of uniform carriers is split off, so that a σ of order χ is left, with logarithms at the edges.  K from
+face to face of a body, or of two that are near each other, integrates the product of σ's polynomial and the kernel,
+with a hyperbolic sine about the nearest place; from afar the nodes' own rule does.  Errors fall about as n⁻⁷ with the
+number n of nodes along an edge, of up to eight as n⁻⁴.
 
 O. D. Kellogg, Foundations of Potential Theory (1929), ch. VI; P. R. Johnston and D. Elliott, Int. J. Numer. Meth. Eng.
 62 (2005) 564, for the hyperbolic sine.

@@ -3,19 +3,15 @@
 With the harmonics of `solid`, lengths in radii of the sphere, r̃ = (r - center)/radius, and B = -∇̃ u, the incident
 potential is u = Σ conj a_lm Υ_lm(r̃) and that of the sphere's own sources u = Σ c_lm Θ_lm(r̃). Their energy is
 
-    U = (4π radius³/μ0) Σ_lm a_lm c_lm,        F = -∇U with the sources carried along,
+    U = (4π radius³/μ0) Σ_lm a_lm c_lm,        F = -∇U with the sources carried along.
 
-because 1/|r - s| = Σ conj Υ_lm(r) Θ_lm(s) makes a charge's c_lm = conj Υ_lm its weight in U.
+In a ball a field is also written in the real harmonics R_k of `regular_harmonics`, in the order of `members`. With
+lengths in a unit a, u = Σ A_k R_k(r/a), and a rigid body of dipoles p and charges q at places s has the multipoles
 
-In a ball a field is also written in the real harmonics R_k of `regular_harmonics`, in the order of `members`:
-B = -∇ Σ c_k R_k, lengths in radii.
+    M_k = Σ p·∇R_k(s/a) + Σ q R_k(s/a),        U = Σ A_k M_k.
 
-With lengths in a unit a, u = Σ A_k R_k(r/a), and a rigid body of dipoles p and charges q at places s has the multipoles
-
-    M_k = Σ p·∇R_k(s/a) + Σ q R_k(s/a),        U = Σ A_k M_k,
-
-U = -Σ Q_l · ∇^(l-1) B degree by degree.  A small turn δ makes δM = δ·G M, a change of place δA = δ·Dᵀ A; a field about
-another place is A_k = Σ P_kn R_n(ξ) of its distance ξ.  All matrices are known from polynomials at a few places.
+A small turn δ makes δM = δ·G M, a change of place δA = δ·Dᵀ A; a field about another place is A_k = Σ P_kn R_n(ξ) of
+its distance ξ.  All matrices are known from polynomials at a few places.
 """
 
 from collections.abc import Callable, Sequence

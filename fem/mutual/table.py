@@ -1,15 +1,11 @@
 """Energies of the mutual magnetisation of a rotor and a permeable sphere: sums of one formula over rows of numbers.
 
-Inside a sphere in any field B = μ0 μr H + J with uniform J. Continuity of the potential and of B_n at the surface gives
-for an incident potential of degree l the outer one -t_l (R/r)^(2l+1) times as large,
-
-    t_l = l (μr - 1) / (l (μr + 1) + 1),
-
-and for J the outer field of a dipole of moment (J V/μ0) 3/(μr + 2), with no field of another degree.
-The response to a charge at a (radii from the centre) has at a charge at b the energy Σ t_l P_l (ab)^-(l+1);
-with t_l = t (1 - Σ w β^l), nearly, these are images' 1/√(a²b² - 2β a·b + β²), the degrees 0 and 1 taken off.
-J. D. Jackson, Classical Electrodynamics (3rd ed. 1999), sections 4.4 and 5.11; W. R. Smythe, Static and Dynamic
-Electricity (3rd ed. 1968), section 5.
+Inside a sphere in any field B = μ0 μr H + J with uniform J; an incident potential of degree l comes back -t_l
+(R/r)^(2l+1) times as large, t_l = l (μr - 1) / (l (μr + 1) + 1), and J has the outer field of a dipole (J V/μ0) 3/(μr +
+2) alone. The response to a charge at a (radii from the centre) has at a charge at b the energy Σ t_l P_l (ab)^-(l+1);
+with t_l = t (1 - Σ w β^l), nearly, these are images' 1/√(a²b² - 2β a·b + β²), the degrees 0 and 1 taken off. J. D.
+Jackson, Classical Electrodynamics (3rd ed. 1999), sections 4.4 and 5.11; W. R. Smythe, Static and Dynamic Electricity
+(3rd ed. 1968), section 5.
 """
 
 import math

@@ -1,12 +1,9 @@
-"""A plate's currents as many states, from which the few of a table are taken.
+"""A plate's currents as many states, from which the few of a table are taken; see docs/mathematics-currents.md.
 
 Fields at the quadrature points are rows of numbers whose plain products are ∫ σ e·e' dV over the whole plate.  By
 parity class, there are fields e_i with ∫ σ e_i·e_j dV = δ_ij and the inductance L_ij between their currents.  A source
-with couplings b_i = ∫ σ e_i·A_s dV drives them as (1 + iωL) c = b, and couples with another one by -iω b'·c.
-
-With T, the map of a current to its potential, the field e of a source A_s solves (1 + iωT) e = A_s; the fields are
-solved for at one real shift, and the residual A_s - (1 + iωT) e of any combination is known at every frequency without
-solving again.
+with couplings b_i = ∫ σ e_i·A_s dV drives them as (1 + iωL) c = b, and couples with another one by -iω b'·c.  Fields
+are solved for at one real shift, of which the residual of any combination follows at every frequency.
 
 `solve_currents` does so for dipoles in some boxes, to a wanted accuracy: the expensive part of a plate.
 """

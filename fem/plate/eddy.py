@@ -3,12 +3,9 @@
     curl curl A + iωμ0σ A = -iωμ0σ A_s.
 
 Nédélec elements of the second kind, full order; gradients are kept in the conductors only.  Sources enter by their
-vector potential at the quadrature points of the conductors, so that any function of position will do.  Mirror planes
-are used: one factorisation for each parity class that the sources touch.
-
-S. Zaglmayr, High order finite element methods for electromagnetic field computation, thesis, Linz 2006 (the space).
-
-A `Ladder` solves at rising orders until a tolerance is met.
+vector potential at the quadrature points of the conductors; mirror planes leave one factorisation for each parity
+class. S. Zaglmayr, High order finite element methods for electromagnetic field computation, thesis, Linz 2006 (the
+space).
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -4,10 +4,9 @@ In the span of real fields e_i, whose currents σe_i have the potentials a_i, th
 
     (R + iωL) c = -iω b,    R_ij = ∫ σ e_i·e_j,    L_ij = ∫ σ e_i·a_j,    b_i = ∫ σ e_i·A_s,
 
-and their coupling to another source is b'·c.  R and L are Gram matrices of power and of energy, hence positive: the
-network is passive whatever is left out.  The currents of a source whose own field lies in the span are exact, and the
-error of a coupling is the product of two projection errors.  The basis is reduced first and diagonalised afterwards:
-R w = λ L w with wᵀ L w = 1 (eigenmodes of the plate itself converge far more slowly).
+and their coupling to another source is b'·c, with the product of two projection errors.  R and L are positive: the
+network is passive whatever is left out.  The basis is reduced first and diagonalised afterwards, R w = λ L w with
+wᵀ L w = 1 (eigenmodes of the plate itself converge far more slowly).
 M. Clemens, T. Weiland, IEEE Trans. Magn. 35 (1999) 1163 (discrete eddy-current operators).
 """
 

@@ -1,15 +1,8 @@
 """The rotor as a source of eddy currents in the plate, and its share of their signals along a turn and a descent.
 
-The source is the vector potential of the rotor's field table, so that all moments are there, and what recoil
-permeability and mutual demagnetisation add.
-
-Closed forms have a potential of their own.  A multipole part Ψ_l of degree l, with r from its centre, is homogeneous
-of degree -(l+1), so that curl (r × ∇Ψ_l) = l ∇Ψ_l, and B = -∇Ψ is the curl of
-
-    A = Σ_l r × B_l / l.
-
-The share's series in angle and depth interpolate at equidistant angles and at Chebyshev points: they converge
-geometrically.
+The source is the vector potential of the rotor's field table, of a multipole part of degree l A = Σ_l r × B_l / l
+(docs/mathematics-currents.md).  The share's series in angle and depth interpolate at equidistant angles and at
+Chebyshev points: they converge geometrically.
 """
 
 from collections.abc import Sequence

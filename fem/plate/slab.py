@@ -1,17 +1,12 @@
 """A magnetic dipole over an infinite conducting slab of finite thickness: the exact reaction.
 
-The slab fills -t < z < 0 and the dipole stands at (0, 0, h).  A part of its scalar potential with the
-wave number k, falling as e^{kz} towards the slab, comes back as Γ e^{-kz}, with κ² = k² + iωμ0σ and
+The slab fills -t < z < 0 and the dipole stands at (0, 0, h).  Its potential's reflection Γ and B = G m are those of
+docs/mathematics-currents.md, Γ without cancellations as
 
     Γ = (κ² - k²) E / [4 k κ + (κ - k)² E],     E = 1 - e^{-2κt},     κ² - k² = iωμ0σ.
 
-This is the usual (κ²-k²)E / [(k+κ)² - (k-κ)² e^{-2κt}] without its cancellations.  B = G m with
-
-    G_ij = -(μ0/4π) ∂_i ∂'_j ∫ J0(kρ) e^{-k(z+z')} Γ dk.
-
-The integral is taken over u = ln k by the trapezoidal rule.  The integrand is analytic for |Im u| < π/4
-(the slab's poles lie between the rays arg k = -π/2 and -π/4) so that a step d leaves e^{-π²/2d}: 4e-15
-at d = 0.15.  No scale of the problem (1/h, 1/t, 1/δ, ωμ0σt) needs to be known.
+The integral over u = ln k is analytic for |Im u| < π/4 (the slab's poles lie between the rays arg k = -π/2 and -π/4) so
+that a step d of the trapezoidal rule leaves e^{-π²/2d}: 4e-15 at d = 0.15.  No scale of the problem need be known.
 
 J. R. Reitz, J. Appl. Phys. 41 (1970) 2067; W. R. Smythe, Static and Dynamic Electricity (3rd ed.), ch. X.
 """

@@ -1,10 +1,8 @@
 """Tables of a plate's response: a passive network of currents with harmonic field functions, in the plate's frame.
 
-With currents y_i and the signals s_i that drive them, the energy ½ Σ y_i² changes by Σ y_i dp_i/dt - Σ y_i ds_i/dt: the
-first is minus the loss Σ λ_i y_i², the second minus the work of the currents on whatever makes s_i change.  On the
-floater they do Σ y_i d(b_i·m)/dt, on the rotor Σ y_i ∂r_i/∂φ per radian, a torque that the motor must balance, and
-Σ y_i ∂r_i/∂d per metre of lowering.  Magnetisation is constant, hence no other work.  The static interaction of rotor
-and floater is not in these sums.
+The energy ½ Σ y_i² of currents y_i changes by their loss and their work on whatever makes their signals s_i change: the
+floater, the rotor by Σ y_i ∂r_i/∂φ per radian, and by Σ y_i ∂r_i/∂d per metre of lowering
+(docs/mathematics-currents.md).
 """
 
 import math
