@@ -3,10 +3,9 @@
 A key holds all inputs exactly, the number of the solver that turns them into a table, and the versions of the libraries
 that compute. The numbers stand here, so that `make lint` can hold each against the code of its solver.
 
-Tables are frozen dataclasses, kept as netCDF. Numbers become variables, one for each field of a class, with the unit
-that the field's metadata names and the sentence that stands beside it; all objects of a class share
-them. Which object holds which numbers is said by one text in JSON, the variable `content`. Only classes that the
-fields' types name are made of it: no file can run anything.
+Tables are frozen dataclasses, kept as netCDF: a variable for each field of numbers of a class, for all its objects,
+with the unit and the sentence beside it, and one text in JSON, the variable `content`, of which object holds which
+numbers. Only classes that the fields' types name are made of it: no file can run anything.
 """
 
 import hashlib

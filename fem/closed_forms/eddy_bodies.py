@@ -1,12 +1,12 @@
-"""Eddy currents of a conducting sphere in closed form, the floater's own, and of a tube as a series.
+"""Eddy currents of a conducting sphere in closed form, and of a tube as a series.
 
 In a uniform field B e^{iωt} a non-magnetic sphere takes the moment (W. R. Smythe, Static and Dynamic Electricity,
-3rd ed., section 10.06; L. D. Landau, E. M. Lifshitz, Electrodynamics of Continuous Media, section 59)
+3rd ed., section 10.06)
 
     m = α B,    α = -(2πR³/μ0) [1 - 3 coth(x)/x + 3/x²],    x² = iωμ0σR²,
 
 and where skin depth is large against R: α = -iω (2π/15) σ R⁵.  In a field of size B⊥ that turns at ω across its axis
-it feels the torque -Im α B⊥² along the turn, and loses the power ω times that.
+it feels the torque -Im α B⊥² along the turn.
 """
 
 from collections.abc import Callable

@@ -1,17 +1,15 @@
 """Field of uniformly polarised cylinders, rings and spheres, outside and inside, to round-off.
 
-A cylinder polarised across its axis carries the charge J cos φ on its mantle, one polarised along it is a solenoid with
-the current J/μ0 on the same mantle.  Both are sums over φ of straight segments from z = -L to L, which are elementary.
-With d from the segment across it, D = |d|, and distances a, b from its ends,
+A cylinder polarised across its axis carries the charge J cos φ on its mantle, one polarised along it the current J/μ0:
+sums over φ of straight segments from z = -L to L.  With d from the segment across it, D = |d|, and distances a, b from
+its ends,
 
     ∫ dz'/r³ = P = 2ℓ (a + b) / (a b [(a + b)² - ℓ²]),      ∫ (z - z')/r³ dz' = Q = 1/a - 1/b,
 
 the charge gives (1/4π) Σ R J cos φ (d P, Q), the current (1/4π) Σ R J (e Q, -e·d P), e the direction of φ.  Near the
-mantle the sum has a peak of the width of the distance; with φ - φ0 = δ sinh u Gauss's rule meets it everywhere.
-A ring is a cylinder less its hole, a sphere a dipole with H = -J/3 inside.
-
-J. D. Jackson, Classical Electrodynamics (1999), § 5.9; the substitution is that of P. R. Johnston and D. Elliott,
-Int. J. Numer. Meth. Eng. 62 (2005) 564.
+mantle the sum has a peak of the width δ of the distance, which Gauss's rule meets with φ - φ0 = δ sinh u (P. R.
+Johnston and D. Elliott, Int. J. Numer. Meth. Eng. 62 (2005) 564).  A ring is a cylinder less its hole, a sphere a
+dipole with H = -J/3 inside (J. D. Jackson, Classical Electrodynamics (1999), § 5.9).
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,16 +1,12 @@
 """Currents of a conductor that moves over coils, along their axis or freely, as states in its own frame.
 
 With the network of `network`, p_i is the flux that a perfect conductor would keep, and G_is(z) that of mode i for a
-current of 1 A in source s:
+current of 1 A in source s, a Chebyshev series in z of couplings with the coils' vector potential:
 
     dp_i/dt = -λ_i x_i,    x_i = p_i - Σ_s G_is(z) I_s(t),    F = Σ_is x_i I_s dG_is/dz,
 
-so that motional and transformer EMF are one term, and the force is the exact gradient of the same G: with it the energy
-½ Σ x² changes by -Σ λ x² - Σ x G dI/dt - F dz/dt. G is the couplings of the mode with the coils' vector potential, as
-Chebyshev series in z.
-
-Of one that moves freely G depends on its place x and its rotation R. There a mode's currents are, for any field from
-outside, a few dipoles m_ik at places ξ_k in the conductor:
+so that motional and transformer EMF are one term: the energy ½ Σ x² changes by -Σ λ x² - Σ x G dI/dt - F dz/dt.
+Of a free one, at a place x with a rotation R, a mode's currents are a few dipoles m_ik at places ξ_k in the conductor:
 
     G_is = Σ_k m_ik · Rᵀ B_s(x + R ξ_k),    force Σ_k (∇B)·M_k,  torque Σ_k M_k × B + R ξ_k × force,  M = R Σ_i x_i m_i,
 

@@ -165,14 +165,11 @@ class PlateTable:
 
         dp_i/dt = -λ_i (p_i - s_i),    s_i = b_i(x)·m + other sources,    y_i = p_i - s_i,
 
-    with the currents y_i.  On a dipole m at x act the field B = Σ y_i b_i(x), hence the torque m × B, and the force Σ
-    y_i ∇(m·b_i); the currents hold the energy ½ Σ y_i² and lose the power Σ λ_i y_i².  As the force is the exact
-    gradient of the same b_i, work, stored energy and loss add up to nothing, always.  Phasors e^{+iωt}:
+    with the currents y_i, of the field B = Σ y_i b_i(x), which lose the power Σ λ_i y_i².  Phasors e^{+iωt}:
 
         B = G m,    G(x, ω) = -iω Σ b_i b_iᵀ / (λ_i + iω).
 
-    The network is passive by construction.  There is no quasi-static remainder: added to the states left out, it was
-    found to double their error at the highest frequency.
+    There is no quasi-static remainder, which doubled the error of the states left out at the highest frequency.
     """
 
     size: Array = field(metadata={"units": "m"})  # (3,) edges of the plate

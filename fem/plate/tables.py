@@ -54,17 +54,15 @@ Both = tuple[PlateTable, RotorShare]
 class PlateAround:
     """What the table of a plate about a floater and the rotor's share of its signals, of one network, are made from.
 
-    The finite elements are solved for dipoles in boxes around the region and around the rotor, on a coarse raster, so
-    that neighbours of the scene and other models of the rotor need the same ones.  A rotor that these dipoles do not
-    stand for gets its own.
+    The finite elements are solved for dipoles in boxes around the region and the rotor, on a coarse raster: neighbours
+    and other models of the rotor need the same ones.  A rotor that these dipoles do not stand for gets its own.
     """
 
     plate: Plate  # with its pose at the start and its lowering
     rotor: RotorTable  # whatever its field knows drives the plate
     region: Region  # where the floater may be, in the plate's frame, during all of its way: see `reachable_region`
-    # Lowest and highest, Hz, of currents in the plate.  The field of a rotor has all multiples of its frequency.
-    # Of a cube on the axis all but the first are below 3e-4; of one 2 mm off it, the second is 3 to 6 per cent and the
-    # third below 4e-3: then the highest should be twice the rotor's
+    # Lowest and highest, Hz, of currents in the plate, twice the rotor's at least: of a cube 2 mm off the axis the
+    # second multiple is 3 to 6 per cent of its field, the third below 4e-3
     frequencies: tuple[float, float] = (0.5, 250.0)
     rtol: float = 1e-3  # relative accuracy of reaction tensors in the region, and of the rotor's currents' field there
     slab: bool = False  # whether it is taken without edges; the errors do not tell how far it is from that

@@ -1,11 +1,9 @@
 """What a magnetisation gives to harmonic waves: ∫ M·∇e^{a·x} dV with a·a = 0, exact for every kind of source.
 
-e^{a·x} is harmonic everywhere.  A uniformly polarised cuboid gives a product of three sinh(a_i h_i)/a_i.  A multipole
-expansion gives, with a± = a_x ± i a_y and lengths in units of its radius, from e^{a·r} = Σ ψ_lm Υ_lm(r),
+A uniformly polarised cuboid gives a product of three sinh(a_i h_i)/a_i.  A multipole expansion gives, with a± = a_x ± i
+a_y and lengths in units of its radius, from e^{a·r} = Σ ψ_lm Υ_lm(r), whose derivatives by r_i are a_i times it,
 
-    ψ_lm = a_z^(l-m) (-a₋)^m,    ψ_l(-m) = a_z^(l-m) a₊^m    (m ≥ 0):
-
-the derivatives of Υ_lm, see `harmonics.solid`, make each side a_i times itself.
+    ψ_lm = a_z^(l-m) (-a₋)^m,    ψ_l(-m) = a_z^(l-m) a₊^m    (m ≥ 0).
 
 Turning waves add up to the waves of a cylinder, by DLMF 10.9.2:
 

@@ -1,6 +1,5 @@
 """The sources of a floater's own field: its remanence, and what its permeability makes of it.
 
-To first order in the rotor's field, force and torque are those on what the floater is alone: it pulls itself nowhere.
 A uniform part J is dipoles J dV/μ0 at the points of a rule; multipoles c_lm are charges on a sphere about their centre,
 
     σ(n) = (4π radius²/μ0) Σ c_lm (2l+1)/(4π) (l-m)! (l+m)! Υ_lm(n)    (per unit of solid angle, A m),
