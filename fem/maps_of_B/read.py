@@ -24,26 +24,8 @@ from ...geometry.common import Array, InputError, shown
 from ...geometry.files import file_content, hdf5_fault, is_hdf5, regular_file
 from ...geometry.scene.contents import MapReading
 from ..cache import TableFileError, read_checked
-from .columns import (
-    AXES,
-    COMPONENTS,
-    ERRORS,
-    GHOSTS,
-    HIDDEN,
-    HIDDEN_CELL,
-    MASK,
-    METERS,
-    NEEDED,
-    UNITS,
-    VALID,
-    Column,
-    FieldMap,
-    FieldMapError,
-    chosen,
-    column_of,
-    known_columns,
-    unit_named,
-)
+from . import columns as cols
+from .columns import AXES, COMPONENTS, METERS, NEEDED, Column, FieldMap, FieldMapError
 
 MOST_BYTES = 250_000_000
 HEADER_LINES = 300  # Lines in which the titles must be
@@ -87,18 +69,18 @@ def _text(path: Path, reading: MapReading) -> FieldMap:
     if not tables:
         heads = [COMMENT.sub("", line, count=1) for line in lines[:HEADER_LINES] if line.strip()]
         splits = [_titles(line, separator, []) for line in heads for separator in separators]
-        nearest = max(splits, key=lambda titles: len(known_columns(titles, reading)), default=[])
-        known = [column.name for column in known_columns(nearest, reading).values()]
+        nearest = max(splits, key=lambda titles: len(cols.known_columns(titles, reading)), default=[])
+        known = [column.name for column in cols.known_columns(nearest, reading).values()]
         received = ", ".join(known) or "none that is known"
         if any(title.strip() for title in nearest):
             received += f" of the titles {shown(', '.join(title.strip() for title in nearest), 200)}"
-        raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {received}. {VALID}")
+        raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {received}. {cols.VALID}")
     faults = []
     for table in tables:
         row = next(table.rows(), [])  # units may stand in a line of their own below the titles
-        units = {k: row[k].strip(" ()[]{}<>\"'") for k in known_columns(table.titles, reading) if k < len(row)}
+        units = {k: row[k].strip(" ()[]{}<>\"'") for k in cols.known_columns(table.titles, reading) if k < len(row)}
         below = {k: unit for k, unit in units.items() if unit}
-        if not all(map(unit_named, below.values())):
+        if not all(map(cols.unit_named, below.values())):
             below = {}
         source = _Source(table.titles, below, table.usual, partial(_numbers, table, skipped=1 if below else 0))
         try:
@@ -147,7 +129,7 @@ def _table(lines: list[str], separator: str | None, reading: MapReading) -> _Tab
         if in_comment and (said := LENGTH_UNIT.search(bare)):
             length = said[1]
         titles = _titles(bare, separator, lines[number:])
-        names = {column.name for column in known_columns(titles, reading).values()}
+        names = {column.name for column in cols.known_columns(titles, reading).values()}
         if names.issuperset(AXES) and not names.isdisjoint(COMPONENTS):
             usual = (length or "m", "T") if line.lstrip().startswith("%") else (length, None)
             found = _Table(separator, titles, lines[number:], usual)
@@ -179,10 +161,9 @@ def _maxwell(lines: list[str]) -> _Table | None:
 
 def _grid_unit(table: _Table, corner: Sequence[str]) -> str:
     """The unit in which the first point is the lowest corner of the grid, such as `-20mm`."""
-    split = [re.fullmatch(r"(.*?\d\.?)([^\W\d]+)", entry) for entry in corner]
-    said = [
-        _number(entry[1], False, "grid", 0) * METERS.get(str(unit_named(entry[2])), np.nan) for entry in split if entry
-    ]
+    split = (re.fullmatch(r"(.*?\d\.?)([^\W\d]+)", entry) for entry in corner)
+    pairs = [(_number(entry[1], False, "grid", 0), cols.unit_named(entry[2])) for entry in split if entry]
+    said = [number * METERS.get(str(unit), np.nan) for number, unit in pairs]
     first = [_number(cell, False, axis, 1) for axis, cell in zip(AXES, next(table.rows(), []), strict=False)]
     for unit, scale in METERS.items():
         if len(said) == len(first) == 3 and np.allclose(np.array(first) * scale, said, rtol=1e-6, atol=1e-12):
@@ -285,24 +266,25 @@ def read_field_map(path: str | Path, reading: MapReading | None = None) -> Field
 
 def _field_map(source: _Source, reading: MapReading, vectors: bool = True) -> FieldMap:
     columns = {k: replace(c, unit=source.said.get(k) or c.unit)
-               for k, c in chosen(source.titles, reading, vectors).items()}  # fmt: skip
+               for k, c in cols.chosen(source.titles, reading, vectors).items()}  # fmt: skip
     units = {
         name: column.known_unit(reading, source.usual[0 if name in AXES else 1])
         for column in columns.values()
         for name in column.parts
-        if name not in (MASK, GHOSTS)
+        if name not in (cols.MASK, cols.GHOSTS)
     }
-    found = {name: UNITS.get(units.get(name, ""), 1.0) * part for name, part in source.numbers(columns).items()}
+    found = {name: cols.UNITS.get(units.get(name, ""), 1.0) * part for name, part in source.numbers(columns).items()}
     if not found.keys() >= {*AXES} or found.keys().isdisjoint(COMPONENTS):
         raise FieldMapError(f"Input columns must hold {NEEDED}; instead received {', '.join(units) or 'none of them'}.")
     nothing = np.full(len(found["x"]), np.nan)
-    kinds = (AXES, COMPONENTS, ERRORS)
+    kinds = (AXES, COMPONENTS, cols.ERRORS)
     points, field, errors = (np.stack([found.get(n, nothing) for n in names], axis=-1) for names in kinds)
-    is_known = (found.get(MASK, nothing) != 0) & (np.nan_to_num(found.get(GHOSTS, nothing)).astype(int) & HIDDEN == 0)
+    hidden = np.nan_to_num(found.get(cols.GHOSTS, nothing)).astype(int) & cols.HIDDEN
+    is_known = (found.get(cols.MASK, nothing) != 0) & (hidden == 0)
     if not is_known.any():
         raise FieldMapError(f"Input map must have points with a value; instead all {len(points)} are masked.")
     read_as = units["x"], next(units[name] for name in COMPONENTS if name in units)
-    given = not found.keys().isdisjoint(ERRORS)
+    given = not found.keys().isdisjoint(cols.ERRORS)
     return FieldMap(points[is_known], field[is_known], errors[is_known] if given else None, read_as)
 
 
@@ -344,12 +326,12 @@ def _mesh(path: Path, reading: MapReading) -> _Source:
         reason = " ".join(printed.getvalue().split()) or error
         raise FieldMapError(f"Input map must be a mesh that meshio reads; instead: {reason}.") from None
     data = {name: np.squeeze(np.asarray(values, float)) for name, values in mesh.point_data.items()}
-    known = known_columns(list(data), reading, vectors=True)
+    known = cols.known_columns(list(data), reading, vectors=True)
     # Point data that have the shape that goes with their name: `B` may be a length as well.
     fitting = [name for k, name in enumerate(data) if k in known and known[k].name not in AXES
                and data[name].shape[1:] == ((3,) if len(known[k].parts) == 3 else ())]  # fmt: skip
-    in_cells = [name for name in mesh.cell_data if (c := column_of(name)) and c.is_field]
-    if in_cells and not any(c.is_field for c in known_columns(fitting, reading, vectors=True).values()):
+    in_cells = [name for name in mesh.cell_data if (c := cols.column_of(name)) and c.is_field]
+    if in_cells and not any(c.is_field for c in cols.known_columns(fitting, reading, vectors=True).values()):
         raise FieldMapError(
             f"Input map must have B as point data; instead {in_cells[0]!r} is cell data. Write its values at the "
             "points, as ParaView's filter Cell Data to Point Data does."
@@ -361,7 +343,7 @@ def _mesh(path: Path, reading: MapReading) -> _Source:
         found: dict[str, Array] = {}
         for k, column in columns.items():
             found |= zip(column.parts, np.atleast_2d((places | data)[titles[k]].T), strict=True)
-        found[GHOSTS] = np.maximum(found.get(GHOSTS, 0), np.where(_hidden_by_cells(mesh), HIDDEN, 0))
+        found[cols.GHOSTS] = np.maximum(found.get(cols.GHOSTS, 0), np.where(_hidden_by_cells(mesh), cols.HIDDEN, 0))
         return found
 
     return _Source(titles, {}, ("m", "T"), numbers)
@@ -370,9 +352,9 @@ def _mesh(path: Path, reading: MapReading) -> _Source:
 def _hidden_by_cells(mesh: meshio.Mesh) -> NDArray[np.bool_]:
     """Which points (n,) belong to cells that VTK marks as hidden, and to no other."""
     seen, hidden = (np.zeros(len(mesh.points), bool) for _ in range(2))
-    flags: list[Array] = next((v for name, v in mesh.cell_data.items() if name.casefold() == GHOSTS), [])
+    flags: list[Array] = next((v for name, v in mesh.cell_data.items() if name.casefold() == cols.GHOSTS), [])
     for block, marks in zip(mesh.cells, flags, strict=False):
-        is_hidden = np.ravel(marks).astype(int) & HIDDEN_CELL != 0
+        is_hidden = np.ravel(marks).astype(int) & cols.HIDDEN_CELL != 0
         hidden[np.ravel(block.data[is_hidden])] = True
         seen[np.ravel(block.data[~is_hidden])] = True
     return np.asarray(hidden & ~seen)
