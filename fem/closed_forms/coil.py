@@ -142,10 +142,7 @@ class CoilField:
 
 @dataclass(frozen=True, eq=False)
 class Filaments:
-    """Filaments about axes along z that stand for coils, to 1e-5 of their largest field from a distance on.
-
-    Three times as far off it is 1e-8.
-    """
+    """Filaments about axes along z for coils, to 1e-5 of their largest field, three times as far off to 1e-8."""
 
     centers: Array  # (n, 3) m
     radii: Array  # (n,) m

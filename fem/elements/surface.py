@@ -132,8 +132,8 @@ def _around(angles: Array, count: int) -> Array:
 class Surface:
     """Nodes on a body's surface: `places` (n, 3) m, outward `normals` (n, 3) and `areas` (n,) m², body's axes.
 
-    Nearer than `reach` (m) to it `rows_nearby` does what the nodes' own rule does not; 0: the rule has to do, and the
-    step to more nodes shows how well it does.
+    Nearer than `reach` (m) `rows_nearby` does what the nodes' own rule does not; 0: the step to more nodes shows how
+    well it does.
     """
 
     places: Array

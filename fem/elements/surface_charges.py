@@ -47,14 +47,9 @@ class _View:
 class SurfaceCharges:
     """Charges on the surfaces of permeable magnets that respond to each other.
 
-    `magnets`: each of them `bears_charges`; `count`: n, nodes along an edge of a face.
-
-    Attributes
-    ----------
-    magnets : those that are permeable, on whose surfaces the nodes are
-    places, normals, areas : of the nodes, (n, 3) m, outward (n, 3) and (n,) m²; rotor's frame, magnet by magnet
-    owner : (n,) which of `magnets` a node is of
-    contrast : (n,) χ of the magnet that a node is of
+    `magnets` each `bears_charges`, and the attribute has the permeable ones; `count`: n, nodes along an edge of a face.
+    Of the nodes `places`, `normals`, `areas` are (n, 3) m, outward (n, 3) and (n,) m², rotor's frame, `owner` (n,) the
+    magnet and `contrast` (n,) its χ.
     """
 
     def __init__(self, magnets: Sequence[Magnet], count: int) -> None:

@@ -379,8 +379,8 @@ HELD = 1e-11  # what a squared weight of a fit costs, so that those of pieces be
 class FittedExpansions:
     """Expansions about several places with the field of sources between them, fitted to it all around these.
 
-    `centers` (k, 3) m, `radii` (k,) m and the `degree`, 2 at least, are those of the expansions; errors count by
-    `allowed` (n,) T at `points` (n, 3) m on a surface about the sources.
+    `centers` (k, 3) m, `radii` (k,) m and `degree`, 2 at least, are theirs; errors count by `allowed` (n,) T at
+    `points`.
     """
 
     def __init__(self, centers: Array, radii: Array, degree: int, points: Array, allowed: Array) -> None:

@@ -143,11 +143,10 @@ def _leading(l: int, m: int) -> Array:
 
 
 class CompiledField:
-    """B and its derivatives at points from expressions, compiled when they are first asked for.
+    """B and its derivatives at points by what `build` makes of a position, compiled when they are first asked for.
 
-    The compiler may contract and reorder sums, which is twice as fast and moves closed forms by no more than their own
-    round-off, 5e-14 of B. An integrator compiles the same expressions without that. `build` takes three heyoka
-    expressions (position, m) and returns `FieldExpressions`.
+    The compiler may contract and reorder sums, which moves closed forms by no more than their own round-off, 5e-14 of
+    B.
     """
 
     def __init__(self, build: Callable[[Vector], FieldExpressions]) -> None:

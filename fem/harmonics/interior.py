@@ -83,10 +83,7 @@ def _by_height(degree: int, more: int) -> Array:
 
 
 class Surroundings:
-    """Points around a ball: the field there of sources in it, and in it that of dipoles and charges there.
-
-    All three are sums of Θ_lm at the points, which are computed once.
-    """
+    """Points around a ball: the field there of sources in it, and in it that of dipoles and charges there."""
 
     def __init__(self, points: Array, ball: Ball, degree: int) -> None:
         """Of `points` (n, 3) m outside of a `ball`, for coefficients up to a `degree` about its centre."""

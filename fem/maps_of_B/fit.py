@@ -13,11 +13,9 @@ from ..harmonics.solid import Coefficients, field_sizes, irregular_gradient, irr
 
 @dataclass(frozen=True, eq=False)
 class HarmonicBasis:
-    """Fields -∇Θ_lm about centres (sources inside the map).
+    """Fields -∇Θ_lm about centres (sources inside the map), degree by degree all centres: `count(L)` up to degree L.
 
-    The root mean square of a column on its sphere is 3/(2l+1). Unknowns (T) are fields there then, and of a like size
-    for every degree: in a magnet with corners each part of degree l falls as l^-3/2. Order: degree by degree all
-    centres; the first `count(L)` columns are the basis of degree L.
+    The root mean square of a column on its sphere is 3/(2l+1): unknowns (T) are of a like size for every degree.
     """
 
     centers: Array  # (k, 3) and (k,) m, spheres that hold the sources

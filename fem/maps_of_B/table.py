@@ -172,9 +172,8 @@ COVERAGE = 4.0
 class GriddedTable:
     """Multipole expansions fitted to a map, with the error that the map leaves: a `FieldTable`.
 
-    The field is that of sources inside the spheres of the expansions, so that it is free of divergence and curl by
-    construction. Its error bar has two parts: `COVERAGE` times the spread of fields that fit the map equally well,
-    and the expansions' own uncertainty, which is what degrees beyond the largest may hold.
+    Its error bar is `COVERAGE` times the spread of fields that fit the map equally well, and the expansions' own
+    uncertainty, which is what degrees beyond the largest may hold.
     """
 
     # without closed forms; its provenance gives how the fit was made

@@ -83,13 +83,11 @@ def isotropic(magnet: Magnet, permeability: float) -> Magnet:
 
 
 class ChargeResponse:
-    """A rotor that responds by charges on its magnets' surfaces.
+    """A rotor that responds by charges on its magnets' surfaces, beyond a half-space's response μ0 M = χ/(1 + χ/2) b.
 
-    To a field b every magnet responds first as a half-space would, by μ0 M = c b with c = χ/(1 + χ/2), whose field and
-    energy are integrals over the volume; the charges are what is left, 3e-3 of the response of a cube with μr = 1.05.
-    Of two permeabilities the first part is exact, with a tensor, and the charges are those of their mean. `magnets` are
-    cuboids, cylinders, rings or spheres; `count` and `own` are the nodes along an edge of a face, and of those for the
-    rotor's own field (None: as many).
+    That is integrated over the volume, with a tensor where there are two permeabilities; charges, of their mean, are
+    what is left, 3e-3 of the response of a cube with μr = 1.05. `magnets` are cuboids, cylinders, rings or spheres;
+    `count` and `own` are the nodes along an edge, and of the rotor's own field (None: as many).
     """
 
     def __init__(self, magnets: tuple[Magnet, ...], count: int, own: int | None = None) -> None:

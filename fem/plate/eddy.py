@@ -42,15 +42,10 @@ class Source(Protocol):
 
 
 class EddySpace:
-    """Space, quadrature and gauge on one mesh with one order.
+    """Space, quadrature and gauge on the mesh of `conductors` with an `order`, at least 1.
 
-    `conductors`: mesh and conductivities; `order`: polynomial order, at least 1.
-
-    Attributes
-    ----------
-    points : (n, 3) quadrature points in the conductors, m
-    weights : (n,) σ times quadrature weights, S m²
-    root : (3n,) factors that make ∫ σ e·e' dV over the whole plate, with its mirror images, a plain product of rows
+    Quadrature `points` (n, 3) m are in the conductors, `weights` (n,) σ times theirs, S m²; `root` (3n,) makes ∫ σ e·e'
+    dV over the whole plate, with its mirror images, a plain product of rows.
     """
 
     def __init__(self, conductors: ConductorMesh, order: int) -> None:
@@ -111,10 +106,9 @@ def source_images(parity: spaces.Parity, points: Array, sources: Sequence[Source
 
 
 class ShiftedSystem:
-    """Condensed matrix of curl curl + s μ0 σ, factorised once for each parity class.
+    """Condensed matrix of curl curl + s μ0 σ on a `space`, factorised once for each parity class.
 
-    `space`: finite elements; `shift`: s, rad/s: iω at a frequency; a real one needs half the memory and a quarter of
-    the work.
+    `shift`: s, rad/s, iω at a frequency; a real one needs half the memory and a quarter of the work.
     """
 
     def __init__(self, space: EddySpace, shift: complex) -> None:
@@ -262,11 +256,10 @@ class MeshTooLargeError(AccuracyError):
 class Ladder:
     """Orders of the finite elements on one mesh, one after the other, and the estimated error of each.
 
-    What an order leaves is at most its change of a tensor times the reduction of that change against the order before;
-    the truncation of the air comes on top. Raises MeshTooLargeError: not even order 3 is within `MOST_UNKNOWNS`.
-    `places`: (n, 3) m, of the dipoles whose own tensors are compared, plate's frame; `frequency`: Hz; `rule`,
-    `allowed`: mesh, and relative error; `growing`: compare fields that grow as e^{ωt} instead of phasors: half the
-    memory, a quarter of the work; `watch`: progress callback.
+    What an order leaves is at most its change of a tensor times the reduction of that change, and the truncation of the
+    air. `places` (n, 3) m are of the dipoles compared, in the frame of `plate`, at a `frequency` (Hz), with a mesh by
+    `rule` and an error `allowed`; `growing`: by fields that grow as e^{ωt}: half the memory, a quarter of the work;
+    `watch`: progress. Raises MeshTooLargeError: not even order 3 is within `MOST_UNKNOWNS`.
     """
 
     def __init__(

@@ -92,9 +92,7 @@ class Region:
 class RotorShare:
     """Rotor's signals along the way of a plate: r_i(φ, d) = Σ_h [C_hi(d) cos hφ + S_hi(d) sin hφ].
 
-    The angle is φ = ωt about the laboratory's z axis, and d how far the plate has gone down; the amplitudes are
-    Chebyshev series in d.
-
+    The angle φ = ωt is about the laboratory's z axis, d how far the plate has gone down, in Chebyshev series.
     """
 
     distance: float = field(metadata={"units": "m"})  # how far the plate goes down

@@ -31,10 +31,7 @@ OUTSIDE = 1e-5  # relative accuracy of what lies outside the ball of the element
 
 
 class NearElements:
-    """Finite elements of magnets, of any order that is asked for.
-
-    Closed forms of the `carriers` of the `magnets` are split off.
-    """
+    """Finite elements of `magnets`, of any order that is asked for; closed forms of `carriers` are split off."""
 
     def __init__(self, magnets: Sequence[Magnet]) -> None:
         self.magnets = tuple(magnets)
@@ -198,10 +195,9 @@ def refuse_edges(magnets: Sequence[Magnet], points: Array) -> None:
 class CompleteTable(RotorTable):
     """A table of closed forms or finite elements that knows the field everywhere but on edges; made by `complete`.
 
-    Where the table of the outer field does not reach, `near_field` continues it, also where series of finite elements
-    converge so slowly that they leave more than is asked for. The elements are solved when they are first asked for,
-    and kept. The motion's expressions are those of the outer field. Error of B asked for there is `near_rtol`, relative
-    to the largest remanence.
+    Where the outer field does not reach, or series leave more than `near_rtol` of B by the largest remanence,
+    `near_field` continues it, by elements that are solved when first asked for. The motion's expressions are those of
+    the outer field.
     """
 
     near_rtol: float = NEAR_RTOL

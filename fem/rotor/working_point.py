@@ -51,10 +51,7 @@ class WorkingPoint:
 
 
 class EasyField:
-    """μ0 H along the easy axis of each magnet of a rotor, with a permeable floater beside it or none.
-
-    The `magnets` are the rotor's; `floater` is a magnet in its frame.
-    """
+    """μ0 H along the easy axis of each of a rotor's `magnets`, with a permeable `floater` beside it or none."""
 
     def __init__(self, magnets: Sequence[Magnet], floater: Magnet | None = None) -> None:
         self.magnets, self.floater = tuple(magnets), floater
