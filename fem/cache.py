@@ -356,10 +356,7 @@ def alone(path: Path, report: Report) -> Iterator[None]:
 
 @contextmanager
 def owned(folder: Path) -> Iterator[None]:
-    """Be the only process that computes into a folder while the block lasts, without locks where there are none.
-
-    Raises InputError: another process is at work there; OSError: the folder cannot be made or written.
-    """
+    """Be the only process that computes into a folder in the block. Raises InputError: another is; OSError."""
     is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / OWNER

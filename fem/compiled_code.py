@@ -35,10 +35,7 @@ _functions: OrderedDict[Path, tuple[Any, int]] = OrderedDict()
 
 
 def compiled(compiler: Callable[..., Compiled], *arguments: Any, **options: Any) -> Compiled:
-    """What a `compiler`, `heyoka.cfunc` or `taylor_adaptive`, makes of its arguments, cached.
-
-    Damaged code is thrown away without a word and compiled anew; a cache that cannot be written does no harm.
-    """
+    """What a `compiler`, `heyoka.cfunc` or `taylor_adaptive`, makes of its arguments, cached where that works."""
     return compiled_later(compiler, lambda: arguments, arguments, **options)
 
 

@@ -194,7 +194,7 @@ def round_part(matrix: Array) -> Array:
 
 
 def _modes(strength: Array, delay: Array) -> tuple[Array, Array]:
-    """Delays (n,) and tensors (n, 3, 3) whose sum is `strength` (3, 3) and, each times its delay, `delay` (3, 3).
+    """Delays (n,) and tensors (n, 3, 3) that sum to `strength` and, each times its delay, to `delay` (3, 3).
 
     Both are symmetric and positive: of `delay` v = τ `strength` v the `strength` v make them. Equal delays are one.
     """

@@ -161,10 +161,7 @@ def pattern_fields(
 def current_patterns(
     metals: Sequence[Metal], positions: Array, left_out: float, watch: Watch = unwatched
 ) -> list[Array]:
-    """Patterns w_k σ dV (points, 3, k) that dipoles at `positions` (n, 3) m drive in each of `metals`.
-
-    But for `left_out` of any loss; `watch` is a progress callback.
-    """
+    """Patterns w_k σ dV (points, 3, k) of each of `metals` by `positions`, to `left_out` of a loss; for `watch`."""
     grams, loads, blocks = [], [], range(0, len(positions), TOGETHER)
     for metal in metals:
         parts = [metal.loads(of_places(positions[k : k + TOGETHER])) for k in watched(blocks, watch, "patterns")]
@@ -284,10 +281,7 @@ def ball_losses(pieces: Sequence[tuple[Sequence[Solid], float]], degree: int = B
 
 
 def pieces_of(rotor: Sequence[Magnet], conductors: Sequence[Conductor]) -> Pieces:
-    """The pieces of metal in which currents are modelled: magnets are coated, and unlike metals joined by films.
-
-    Conductors that touch and have the same conductivity are one piece.
-    """
+    """The pieces of metal that currents do not leave: magnets, and conductors that touch and are of one metal."""
     magnets: Pieces = [((magnet.body,), magnet.conductivity) for magnet in rotor if magnet.conductivity]
     groups = separate_pieces(conductors)
     return [*magnets, *((tuple(part.body for part in group), group[0].conductivity) for group in groups)]

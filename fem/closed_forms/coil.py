@@ -85,10 +85,7 @@ def _sheet_axial(a: Array, rho: Array, zeta: Array) -> Array:
 
 
 def _summed(coil: Coil, end: Callable[[Array, Array, Array], Array], rho: Array, z: Array) -> Array:
-    """A sheet's function `end`, at both ends, summed over a winding of 1 A a turn, at (n,) m from its axis and middle.
-
-    Crowding nodes meet the kink of a sheet's field at its own radius; points there are moved off it by round-off.
-    """
+    """A sheet's function `end`, at both ends, summed over a winding of 1 A a turn, at (n,) m from its middle."""
     inner, outer = coil.radius - coil.width / 2, coil.radius + coil.width / 2
     nodes, weights = gauss_legendre(NODES)
     along, weights = ((nodes + 1) / 2) ** CROWD, weights / 2 * CROWD * ((nodes + 1) / 2) ** (CROWD - 1)

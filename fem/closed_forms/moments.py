@@ -58,10 +58,7 @@ def panel_breaks(box: Box, others: Sequence[Solid]) -> list[Array]:
 
 
 def face_rule(box: Box, others: Sequence[Solid], nodes: int) -> tuple[Array, Array]:
-    """Points (n, 3) m on the faces of a `box`, and outward normals times weight (n, 3) m².
-
-    `others` and `nodes` are as of `volume_rule`.
-    """
+    """Points (n, 3) m on a `box`'s faces, outward normals times weight; `others`, `nodes`: as of `volume_rule`."""
     rules = [graded_rule(breaks, nodes) for breaks in panel_breaks(box, others)]
     points, areas = [], []
     for axis in range(3):
@@ -107,10 +104,7 @@ def carrier(magnet: Magnet) -> Magnet:
 
 
 def carriers_of(magnets: Sequence[Magnet]) -> tuple[Magnet, ...]:
-    """The magnets with μr = 1 and their mean polarisations J'; the magnet itself if its permeability is 1.
-
-    A part has no closed form, and all of its remanence is left to the elements.
-    """
+    """The magnets with μr = 1 and mean polarisations J'; a part, left to the elements, has none."""
     found = [Magnet(one.body, np.zeros(3)) if isinstance(one.body, Part) else one for one in magnets]
     for k, one in ((k, one) for k, one in enumerate(found) if one.contrast):
         upright, turn = moved(one.body, np.zeros(3), np.eye(3)), one.body.rotation
@@ -149,7 +143,7 @@ def induced_moments(body: Magnet, sources: Sequence[Magnet], degree: int, nodes:
 def cell_moments(
     body: Magnet, rest: Array, sources: Sequence[Magnet], degree: int, cells: Cells, nodes: int | None = None
 ) -> list[Coefficients]:
-    """`induced_moments`, and those of a uniform `rest` (3,) T in body axes, of each of `cells` of any `body`.
+    """`induced_moments` and those of a uniform `rest` (3,) T, of each of `cells` of any `body`.
 
     By integrals over the volume; `sources`, `degree` and `nodes` are as there.
     """
@@ -234,10 +228,7 @@ def closed_part(
     degree: int,
     cells: Sequence[Cells] | None = None,
 ) -> tuple[list[Coefficients], list[Coefficients]]:
-    """`added_by_closed_form` and its error: round-off, but for oblique bodies in contact the step to finer rules.
-
-    `cut`, `magnets`, `carriers`, `degree` and `cells` are as there.
-    """
+    """`added_by_closed_form` of `cut`, `magnets`, `carriers`, `degree`, `cells`, and its error."""
     if not oblique_contact([magnet.body for magnet in magnets]):
         closed = added_by_closed_form(cut, magnets, carriers, degree, None, cells)
         return closed, [np.zeros_like(c) for c in closed]

@@ -118,10 +118,7 @@ def _mantle(radius: float, half: float, points: Array, slopes: bool) -> tuple[Ar
 def _parts(
     radius: float, half: float, rho: Array, z: Array, rules: Sequence[tuple[float, int]]
 ) -> Iterator[tuple[NDArray[np.intp], Array, int]]:
-    """Numbers (k,) of points that one of the rules does for, and its nodes.
-
-    Between them the widths (k, 1), about the angle over which the segments beside a point do most of its field.
-    """
+    """Numbers (k,) of points that a rule does for, widths (k, 1) of the angle that does most there, and its nodes."""
     apart = np.hypot(rho - radius, np.maximum(np.abs(z) - half, 0.0))
     width = np.clip(apart / np.sqrt(np.maximum(rho, 0.1 * radius) * radius), NARROWEST, WIDEST)
     upper = np.inf
@@ -206,10 +203,7 @@ def outside_derivatives(points: Array, body: Cylinder, polarization: Array, orde
 
 @cache
 def _outside_kernel(order: int) -> Any:
-    """Compiled field of a segment with its derivatives: (k, n).
-
-    For places (3, n), where on a mantle a segment is and its strength (4, n), and a body and its polarisation (5, n).
-    """
+    """Compiled field of a segment and derivatives: (k, n), by place, segment on the mantle, and body (3, 4, 5; n)."""
     variables = hy.make_vars(*(f"v_{k}" for k in range(12)))
     turn, width, u, strength, length, radius, x, y, z = variables[3:]
     angle, strength = turn + width * hy.sinh(u), strength * width * hy.cosh(u)

@@ -50,10 +50,7 @@ class _Corners:
         self.inverse = {corner: 1.0 / r for corner, r in self.distance.items()}
 
     def edge(self, first: int, second: int, i: int, j: int) -> tuple[Expression, Expression]:
-        """L / (r1 + r2) and ∂Λ/∂u over u of the edge along the third axis with signs i and j across the others.
-
-        u is a coordinate across the edge. Both are written with (r1 + r2)² - L² and one reciprocal.
-        """
+        """L / (r1 + r2) and (∂Λ/∂u)/u of the edge along the third axis, with signs i, j across the others."""
         third = 3 - first - second
         ends = [_corner((first, second, third), i, j, k) for k in SIGNS]
         reach, length = self.distance[ends[0]] + self.distance[ends[1]], 2 * self.half_edges[third]
@@ -72,10 +69,7 @@ class _Corners:
         return hy.sum(parts)
 
     def edges(self, first: int, second: int) -> tuple[Expression, Expression, Expression]:
-        """4π T_ab for a ≠ b, Σ_ij ij Λ over the edges parallel to the third axis, and its derivatives along a and b.
-
-        The four Λ become one inverse hyperbolic tangent by its addition theorem.
-        """
+        """4π T_ab for a ≠ b, Σ_ij ij Λ over edges as one artanh, and its derivatives along a and b."""
         edges = {(i, j): self.edge(first, second, i, j) for i, j in product(SIGNS, repeat=2)}
         lower, upper = (_difference((edges[i, 1][0], 1.0), (edges[i, -1][0], 1.0)) for i in SIGNS)
         numerator, denominator = _difference(upper, lower)
@@ -364,10 +358,7 @@ def closed_form_error(magnets: Sequence[Magnet]) -> float:
 
 
 def fields_of_sphere(moment: Array, center: Array, radius: float, points: Array) -> Fields:
-    """H and M of a uniformly magnetised sphere at `points` (n, 3) m; exact.
-
-    Its `moment` is (3,) A m², `center` and `radius` are in m.
-    """
+    """H and M of a sphere of a uniform `moment`, `center` and `radius`, A m² and m, at `points` (n, 3) m."""
     away = points - center
     distance = np.linalg.norm(away, axis=1)[:, None]
     within = distance <= radius

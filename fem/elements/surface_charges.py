@@ -126,10 +126,7 @@ class SurfaceCharges:
         return found
 
     def _applied(self, matrices: Sequence[Iterable[Array]], given: Mapping[tuple[int, int], Array]) -> Array:
-        """(n, c) at all nodes: what `matrices` (k, l) of the views' ways make of what is `given` at what they see.
-
-        That is (l, bodies, c), by distance and shape.
-        """
+        """(n, c) at all nodes: what `matrices` of the views' ways make of what is `given` (l, bodies, c) there."""
         seen, found = dict[tuple[int, int], Array](), np.zeros((len(self.places), next(iter(given.values())).shape[2]))
         for view, ways in zip(self._views, matrices, strict=True):
             shape = (view.places.shape[1], len(self._shapes[view.seer]), found.shape[1])

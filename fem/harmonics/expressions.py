@@ -169,10 +169,7 @@ class CompiledField:
 
 
 def differentiated(known: Mapping[Entry, hy.expression], variables: Vector, last: int) -> list[hy.expression]:
-    """Derivatives of a harmonic function by their `entries`, from those `known` of one degree up to the `last`.
-
-    `variables` are x, y and z.
-    """
+    """Derivatives by `variables` x, y, z, by `entries`, from those `known` of one degree to the `last`."""
     found: list[hy.expression] = []
     for degree in range(len(next(iter(known))) + 1, last + 1):
         slopes = hy.diff_tensors(list(known.values()), diff_args=list(variables), diff_order=1).jacobian

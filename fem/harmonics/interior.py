@@ -95,10 +95,7 @@ class Surroundings:
         return np.moveaxis(self._values.sums(potentials), -2, -1)
 
     def of_magnetization(self, moments: Array) -> Coefficients:
-        """Coefficients a_lm (T) [..., l, m] of dipoles μ0 M dV (..., n, 3) T m³ at the points.
-
-        (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, exact for these dipoles.
-        """
+        """Coefficients a_lm (T) [..., l, m], (4π radius³)⁻¹ Σ μ0 M dV · ∇̃Θ_lm, of dipoles (..., n, 3) T m³."""
         sums = self._values.weighted(np.moveaxis(moments, -1, -2))[..., 1:, :]
         # M·∇Θ_lm by (∂_x ± i ∂_y) Θ_lm = ±Θ_(l+1)(m±1), ∂_z Θ_lm = -Θ_(l+1)m
         minus = np.concatenate([-np.conj(sums[..., 1:2]), sums[..., :-2]], axis=-1)
@@ -398,9 +395,6 @@ def _ways(way: int) -> tuple[Array, list[Array]]:
 def field_coefficients(
     evaluate: Callable[[Array], Array], center: Array, reach: float, degree: int, unit: float
 ) -> Array:
-    """Coefficients A (K,) T m up to a `degree`, lengths in a `unit` (m), of a field `evaluate` of points (n, 3) m.
-
-    It is known in the ball of a `center` (3,) m and a `reach` (m).
-    """
+    """A (K,) T m up to a `degree`, lengths in a `unit`, of B = `evaluate` in a ball of `center` and `reach`, m."""
     found = real_weights(interior_coefficients(evaluate, Ball(center, reach), degree))
     return np.asarray(found * reach * (unit / reach) ** shells(degree))

@@ -379,10 +379,7 @@ def outer_coefficients(amplitudes: Array, keys: Sequence[Member], degree: int) -
 
 
 def rotated_harmonics(coefficients: Coefficients, axes: Array) -> Coefficients:
-    """Coefficients of f(axesᵀ x) of f = Σ c_lm Θ_lm: from a frame with the columns of `axes` as axes to the outer one.
-
-    Exact but for round-off: 1e-14 of the largest term at degree 50, in milliseconds.
-    """
+    """Coefficients of f(axesᵀ x) of f = Σ c_lm Θ_lm, from a frame with `axes` as columns to the outer one."""
     if np.array_equal(axes, np.eye(3)):
         return coefficients
     last = np.arctan2(axes[1, 2], axes[0, 2])  # first about z, then about y, then about z again

@@ -125,10 +125,7 @@ class Column:
         return self.name in (*COMPONENTS, "B")
 
     def known_unit(self, reading: MapReading, usual: str | None = None) -> str:
-        """Its unit, a key of `UNITS`: that which the scene names, else its own, else the `usual` one of such files.
-
-        Raises FieldMapError: none, or one that is none of length or of B.
-        """
+        """Its key of `UNITS`: of the scene, its own or the `usual`. Raises FieldMapError: none of length or of B."""
         kind = "length" if self.name in AXES else "field"
         if (said := getattr(reading, f"{kind}_unit") or self.unit or usual) is None:
             example = f"{self.name}_{'mm' if kind == 'length' else 'mT'}"

@@ -127,10 +127,7 @@ class ChargeResponse:
         return found
 
     def own_field(self, ball: Ball, degree: int) -> Coefficients:
-        """Coefficients a_lm (T) of the rotor's field alone, its permeability included, about the ball's centre.
-
-        Of each magnet those degrees that its own distance asks for, by moments if it is far.
-        """
+        """Coefficients a_lm (T) of the permeable rotor's field alone; of far magnets by moments."""
         found, share = np.zeros((degree + 1, degree + 1), complex), -degree * _decay(self.magnets, ball)
         bodies = [magnet.body for magnet in self.magnets]
         centers, radii = np.array([b.center for b in bodies]), np.array([b.circumradius for b in bodies])
@@ -294,10 +291,7 @@ def two_body(
 def two_body_ladder(
     rotors: Sequence[ChargeResponse], floater: Floater, position: Array, direction: Array
 ) -> tuple[TwoBody, Wrench]:
-    """Both bodies by the finest of `rotors`, of rising degree, and how far the two finest are apart, as `two_body`.
-
-    `floater`, `position` and `direction` are as there.
-    """
+    """`two_body` of `floater`, `position`, `direction` by the last of `rotors`, and how far from the one before."""
     coarse, fine = (two_body(rotor, floater, position, direction) for rotor in rotors[-2:])
     apart, added = fine.total - coarse.total, fine.total - fine.rigid
     pairs = (apart.force, added.force), (apart.torque, added.torque)
@@ -309,10 +303,7 @@ def _wrench(incident: Coefficients, sources: Coefficients, ball: Ball) -> Wrench
 
 
 def places_around(magnets: Sequence[Magnet], radius: float, gaps: Sequence[float], number: int, seed: int) -> Array:
-    """Centres (n, 3) m of floaters of a `radius` (m) beside `magnets`, where they fit.
-
-    At `gaps` in floater radii, in a `number` of random directions for each gap and magnet, by a `seed`.
-    """
+    """Centres (n, 3) m of floaters of a `radius` at `gaps` (radii) off `magnets`, a `number` each, by a `seed`."""
     generator, found = np.random.default_rng(seed), []
     for magnet, gap in product(magnets, gaps):
         directions = generator.normal(size=(number, 3))

@@ -136,10 +136,7 @@ def point_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any]
 
 
 def coupled_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
-    """Two points that respond together: -b·(C b') of the fields b, b' of a `moment` at a `place` (m).
-
-    The moment, A m² times `share`, has it already; `row` is the points (3 + 3, m) and C (9, A m²/T).
-    """
+    """Two points' -b·(C b') of fields b, b' of a `moment` at a `place`; `row`: both, m, and C (9, A m²/T); `share`."""
     one, other = (point_field([x - t for x, t in zip(place, p, strict=True)], moment) for p in (row[:3], row[3:6]))
     return -hy.sum([row[6 + 3 * i + j] * (one[i] * other[j]) for i, j in np.ndindex(3, 3)])
 

@@ -191,10 +191,7 @@ def solve_eddy(
 
 
 def solve_shifted(space: EddySpace, shift: complex, sources: Sequence[Source]) -> EddyResponse:
-    """Eddy currents of `sources` on `space` where iω is `shift`, rad/s: real for growing fields.
-
-    Raises TooLargeError.
-    """
+    """Eddy currents of `sources` on `space` for iω = `shift`, rad/s, real if they grow. Raises TooLargeError."""
     system = ShiftedSystem(space, shift)
     images = space.class_images(sources)
     size = np.sqrt(np.einsum("csqa->cs", images**2 * space.weights[:, None]))

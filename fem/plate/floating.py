@@ -244,7 +244,7 @@ def modes_along(
     order: int,
     degree: int = DEGREE,
 ) -> FloatingModes:
-    """Modes of a conductor of a `mesh` that moves along an axis beside any `sources`, at each height in its frame.
+    """Modes of a conductor of a `mesh` along an axis beside `sources`, at each height in its frame.
 
     `heights`, `frequency`, `rtol`, `order`: as of `floating_modes`; `degree`: of the series of G.
     """

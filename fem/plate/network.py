@@ -259,10 +259,7 @@ def _functions(
 
 
 def candidates(region: Region, body: Solids, degree: int = DEGREE) -> Multipoles:
-    """Multipoles up to a `degree` to choose from, for a `region` beside a plate's `body`, behind each of its surfaces.
-
-    Raises ValueError: the region touches the plate.
-    """
+    """Multipoles up to a `degree` behind each surface of `body` for a `region`. Raises ValueError: it touches."""
     centers = []
     for center, half in body.blocks:
         of_region, of_plate = region.moved(-center).nearest(half)

@@ -144,10 +144,7 @@ def corners(region: Region, frame: SlabFrame) -> Array:
 
 
 def rotor_reach(plate: Plate, rotor: RotorTable, frame: SlabFrame) -> Array:
-    """Corners (n, 3) m of the rotor's magnets at many angles and both ends of the plate's way, in `frame`.
-
-    Of `plate` and `rotor`. Raises InputError: they are not all on the region's side of the slab.
-    """
+    """Corners (n, 3) m of `rotor` in a turn, along `plate`'s way, in `frame`. Raises InputError: not on one side."""
     own = np.concatenate([magnet.box.corners for magnet in rotor.magnets])
     turns = [rotation_matrix((0.0, 0.0, angle)) for angle in np.linspace(0.0, 360.0, ANGLES, endpoint=False)]
     places = np.concatenate([own @ turn.T - depth * DOWN for turn in turns for depth in (0.0, plate.way)])

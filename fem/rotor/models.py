@@ -266,10 +266,7 @@ def warn_beyond(table: RotorTable, accuracy: Accuracy, points: Array, scale: Arr
 
 
 def _guards(magnets: tuple[Magnet, ...], clearance: float) -> tuple[Array, Array]:
-    """Points (n, 3) m nearer to edges and corners than `clearance`, as far from a magnet's centre as its faces' places.
-
-    With the scale (n,) of B (T) there.
-    """
+    """Points (n, 3) m nearer to edges than `clearance`, as far from a centre as faces' places, and B's scale there."""
     directions = np.random.default_rng(2).normal(size=(150, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     points = np.concatenate([m.box.center + (clearance + m.box.half_edges.max()) * directions for m in magnets])
@@ -314,10 +311,7 @@ def enough_degree(pieces: Sequence[Magnet], ratios: Sequence[float], rtol: float
 
 
 def extrapolated_tail(expansions: Sequence[MultipoleExpansion], ratio: float = CONVERGENCE) -> list[MultipoleExpansion]:
-    """What lies beyond the highest degree: the last two, continued as a geometric series.
-
-    `ratio` is the least distance from a centre, in radii; beyond `CONVERGENCE` it counts as that.
-    """
+    """What lies beyond the highest degree, geometrically; `ratio`: least distance from a centre, in radii."""
     found, faster = [], float(np.clip(ratio, LEAST, CONVERGENCE)) ** 2
     for expansion in expansions:
         last = np.array(expansion.coefficients)

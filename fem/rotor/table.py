@@ -153,10 +153,7 @@ class RotorTable:
         return tuple(UniformField(magnet) for magnet in self.uniform)
 
     def derivatives(self, points: Array, order: int) -> Array:
-        """B and its derivatives up to `order` - 1, T, T/m, ..., by their `entries` (n, k), at `points` (n, 3) m.
-
-        Wherever they are: in a magnet, or where an expansion diverges, it is what the formulas say, if a number at all.
-        """
+        """B and its derivatives up to `order` - 1, by `entries` (n, k), at `points` (n, 3) m, anywhere at all."""
         with np.errstate(all="ignore"):
             parts = [part.derivatives(points, order) for part in self._closed_forms]
             parts += [summed_derivatives(self.expansions, points, order)] if self.expansions else []
@@ -226,10 +223,7 @@ class RotorTable:
         return error_b, error_g
 
     def left_out(self, points: ArrayLike) -> Array:
-        """What a simple model leaves out, as far as it is known: (n, 2, 4, 3) at points (n, 3) m.
-
-        For each of `LEFT_OUT` B (T), to first order, and the three rows of its gradient (T/m).
-        """
+        """What a simple model leaves out (n, 2, 4, 3) at points: of each of `LEFT_OUT` B (T) and its slope's rows."""
         points = np.asarray(points, float).reshape(-1, 3)
         found = np.zeros((len(points), len(LEFT_OUT), 4, 3))
         for k, cause in enumerate(LEFT_OUT):
@@ -250,10 +244,7 @@ class RotorTable:
         return self.transformed(canonical(rotor)[0].body, rotor[0])
 
     def transformed(self, before: Solid, after: Magnet, size: float = 1.0, strength: float = 1.0) -> "RotorTable":
-        """The field of a lone magnet from that of one with the body `before`: as it, but for its pose.
-
-        `after` is `size` times as large, and polarised `strength` times as much.
-        """
+        """The field of a magnet from that with the body `before`; `after` is `size` and `strength` times it."""
         body = after.body
         turn = body.rotation @ before.rotation.T
 
@@ -308,10 +299,7 @@ def errors_of_sum(errors: Pair, part: Pair, whole: Pair) -> Pair:
 
 
 def _off_center(doubt: MultipoleExpansion, points: Array) -> Array:
-    """Points (n, 3) m, those near a doubt's centre moved out to `DEEP` of the sphere of its sources.
-
-    In there its series diverges and says no more than that nothing is known: a tenth of the radius says so.
-    """
+    """Points (n, 3) m, near a doubt's centre, where its series diverges, moved out to `DEEP` of its sphere."""
     offset = points - doubt.center
     distance = np.linalg.norm(offset, axis=1)
     deep = distance < DEEP * doubt.nearest

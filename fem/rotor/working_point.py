@@ -87,10 +87,7 @@ class EasyField:
         return values.reshape(steps, steps), u, v, up
 
     def of_floater(self, number: int, points: Array, turn_deg: float) -> Array:
-        """μ0 H · e (n,) T of the floater as a dipole, turned about the rotor's axis by `turn_deg`;
-
-        `number` and `points` are as of `at`.
-        """
+        """μ0 H · e (n,) T, as `at` a `number` and `points`, of the floater alone, turned about z by `turn_deg`."""
         if self.floater is None:
             return np.zeros(len(points))
         there = replace(self.floater, body=with_frame(self.floater.body, rotation_matrix((0.0, 0.0, turn_deg))))
