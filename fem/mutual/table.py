@@ -116,7 +116,7 @@ def point_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any]
 
     With d from the point and ĵ along the remanence the parts are (R/d)^2p (v + w (ĵ·d)²/d²) of u, and (R/d)^2q (s ĵ + t
     (ĵ·d) d/d²) of V. `place` (m) and `moment` (A m² times share) are along the body's axes; `row` is the point (3, m),
-    its 13 `numbers`, ĵ (3) and R (m). By `share` of the units v, w, s and t become those of the energy, J times share².
+    λ (3), v, w, s, t of each power, ĵ (3) and R (m). By `share` units become those of the energy, J times share².
     """
     strengths, axis, radius = row[3:6], row[16:19], row[19]
     v4, w4, v5, w5, v6, w6 = (share * share * v for v in row[6:12])
@@ -198,7 +198,6 @@ class EnergySum:
         """The energy and its first and second derivatives by place (m) and moment (A m²), in this order.
 
         J and its derivatives (m,), (m, 6) and (m, 6, 6) at `places` (m, 3) m of `moments` (m, 3) A m², rotor's frame.
-        With the `order` 1 the second ones are zero.
         """
         free = np.concatenate([(places - self.origin) @ self.axes, moments @ self.axes], axis=1)
         kernel, (count, width) = _kernel(self.formula, self.rows.shape[1]), self.rows.shape
