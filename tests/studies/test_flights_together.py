@@ -22,7 +22,7 @@ TABLE = RotorTable("moments", SCENE.rotor, (), tuple(uniform_moments(m, 13) for 
 
 @pytest.fixture
 def long_table(monkeypatch):
-    monkeypatch.setattr("spinlev.studies.levitation.rotor_table", lambda *given: TABLE)
+    monkeypatch.setattr("spinlev.fem.rotor.choice.rotor_table", lambda *given: TABLE)
 
 
 def asked(**values):

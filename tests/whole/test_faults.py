@@ -265,7 +265,7 @@ PHASES = {
     "table, when it is written": ("spinlev.fem.cache.write_whole", FIELD),
     "equilibria": ("spinlev.studies.levitation.survey", WRITERS["equilibria.json"]),
     "files": ("spinlev.studies.run.write_whole", WRITERS["equilibria.json"]),
-    "sweep": ("spinlev.studies.levitation.rotor_table", SWEEP),
+    "sweep": ("spinlev.fem.rotor.choice.rotor_table", SWEEP),
     "sweep, when a point is kept": ("spinlev.studies.sweep.write_whole", SWEEP),
     "sweep, when all are joined": ("spinlev.studies.catalogue.runner.write_dataset", SWEEP),
     "figures": ("spinlev.studies.catalogue.runner.save_figures", SWEEP),
