@@ -112,8 +112,8 @@ def program_digest(*without: str, root: Path = ROOT) -> str:
 def key_of(name: str, *inputs: Any) -> str:
     """SHA-256 of the inputs of a solver, of its number in `FORMATS`, and of the libraries' versions.
 
-    Counted are types, shapes and every bit of dataclasses, but for fields with `compare=False`, arrays, numbers, texts,
-    tuples and mappings; of a path the file's content. Raises TypeError: another input.
+    Of dataclasses all fields but those with `compare=False`; of a path the file's content. Raises TypeError: another
+    input than these, arrays, numbers, texts, tuples and mappings.
     """
     digest = hashlib.sha256(f"{name} {FORMATS[name]} {libraries()}".encode())
     _count(inputs, digest.update)

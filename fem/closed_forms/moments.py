@@ -184,8 +184,7 @@ def uniform_cells(magnet: Magnet, nearest: float) -> list[MultipoleExpansion]:
 def first_order_moments(body: Magnet, sources: Sequence[Magnet], degree: int) -> Coefficients:
     """What a permeability adds, to a few per cent: `induced_moments` over 1 + χ/3, χ the largest of μ - 1.
 
-    `body`, `sources` and `degree` are as there; a part, without closed form, counts as a cuboid of its box's
-    proportions.
+    A part of a `body`, without closed form, counts as a cuboid of its box's proportions; `sources`, `degree`: as there.
     """
     closed = list(sources)
     for k, (magnet, box) in enumerate((magnet, magnet.box) for magnet in sources):

@@ -131,10 +131,9 @@ def _parts(
 
 @cache
 def _half_kernel(slopes: bool) -> Any:
-    """Compiled: what a segment adds, by place (3, n), angle and strength (3, n) and body (2, n).
+    """Compiled: what a segment adds, by place (3, n), angle and strength (3, n) and body (2, n), where φ = 0.
 
-    On the half plane φ = 0 of the points, where what is odd in φ vanishes: xx, yy, xz, zz of the tensor, and xxx, xyy,
-    xxz, yyz, xzz of its slope.
+    Of the tensor xx, yy, xz, zz, and of its slope xxx, xyy, xxz, yyz, xzz: what is odd in φ vanishes.
     """
     variables = hy.make_vars(*(f"v_{k}" for k in range(8)))
     rho, z, beyond, width, u, strength, radius, half = variables

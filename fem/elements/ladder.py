@@ -72,8 +72,7 @@ def _share(solution: Solution, k: int) -> tuple[Array, Array, Array]:
 def reaction_dipoles(solution: Solution, number: int) -> tuple[Array, Array, Array]:
     """-(μ - 1) ∇ψ of a magnet's share on the meshed side of the planes, and of those that are its images.
 
-    Points (n, 3) m, weights (n,) m³ in the mirrors' frame, and values (n, 3) T; nothing where it has only an image's
-    share.
+    Points (n, 3) m and weights (n,) m³ in the mirrors' frame, and values (n, 3) T; for an image's share alone, nothing.
     """
     mesh = solution.system.mesh
     parts = [(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))]

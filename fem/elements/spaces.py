@@ -176,10 +176,9 @@ def memory_need(space: ng.FESpace, free: ng.BitArray) -> tuple[float, float]:
 
 
 def require_memory(space: ng.FESpace, free: ng.BitArray, way_out: str) -> None:
-    """Refuse a system that the free memory does not hold, before anything of it is made.
+    """Refuse a system with `free` unknowns of `space` that the free memory does not hold, before it is made.
 
-    `space`, `free`: NGSolve space, and its unknowns that are solved for; `way_out`: what the user can do, for the
-    message of the TooLargeError.
+    Raises TooLargeError, whose message has the user's `way_out`.
     """
     need, there = PEAK * sum(memory_need(space, free)), free_memory()
     if need > there:

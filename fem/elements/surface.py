@@ -81,10 +81,9 @@ def _about(place: Array, scale: Array, half: float, count: int) -> tuple[Array, 
 
 
 def face_rows(places: Array, normals: Array, halves: Array, counts: tuple[int, int]) -> Array:
-    """n·h (T) at places off the plane of a rectangle by the charges (T) at its n × m nodes: weights (t, n m).
+    """n·h (T) at places off the plane of a rectangle by charges (T) at its n × m = `counts` nodes: weights (t, n m).
 
-    `places`, `normals`: (t, 3), along its edges and normal, from its middle; `halves`: (2,) half edges; `counts`: n and
-    m.
+    `places`, `normals` (t, 3) are along its edges and normal, from its middle; `halves`: (2,) half edges.
     """
     (first, second), result = counts, np.empty((len(places), *counts))
     step = max(1, ROWS // ((first + FINE) * (second + FINE) * second))
@@ -132,8 +131,7 @@ def _around(angles: Array, count: int) -> Array:
 class Surface:
     """Nodes on a body's surface: `places` (n, 3) m, outward `normals` (n, 3) and `areas` (n,) m², body's axes.
 
-    Nearer than `reach` (m) `rows_nearby` does what the nodes' own rule does not; 0: the step to more nodes shows how
-    well it does.
+    Nearer than `reach` (m) `rows_nearby` does what the nodes' rule does not; 0: more nodes show how well it does.
     """
 
     places: Array

@@ -145,8 +145,7 @@ def _leading(l: int, m: int) -> Array:
 class CompiledField:
     """B and its derivatives at points by what `build` makes of a position, compiled when they are first asked for.
 
-    The compiler may contract and reorder sums, which moves closed forms by no more than their own round-off, 5e-14 of
-    B.
+    Sums may be contracted and reordered, which moves closed forms by their own round-off, 5e-14 of B.
     """
 
     def __init__(self, build: Callable[[Vector], FieldExpressions]) -> None:

@@ -183,10 +183,9 @@ def known_columns(titles: Sequence[str], reading: MapReading, vectors: bool = Fa
 
 
 def chosen(titles: Sequence[str], reading: MapReading, vectors: bool = False) -> dict[int, Column]:
-    """The columns of a map among `titles`: each quantity once, of several those that `reading.columns` gives.
+    """Columns of a map among `titles`, see `known_columns`: each quantity once, of several as `reading.columns` says.
 
-    `vectors`: as of `known_columns`. Raises FieldMapError: two columns for one quantity, or none of what `reading`
-    says.
+    Raises FieldMapError: two for one quantity, or none of what `reading` says. `vectors`: as there.
     """
     known = known_columns(titles, reading, vectors)
     if reading.columns and any(c.is_field for c in known.values()):

@@ -172,8 +172,7 @@ COVERAGE = 4.0
 class GriddedTable:
     """Multipole expansions fitted to a map, with the error that the map leaves: a `FieldTable`.
 
-    Its error bar is `COVERAGE` times the spread of fields that fit the map equally well, and the expansions' own
-    uncertainty, which is what degrees beyond the largest may hold.
+    That is `COVERAGE` times the spread of fits as good, and what degrees beyond the largest may hold.
     """
 
     # without closed forms; its provenance gives how the fit was made
@@ -262,21 +261,14 @@ EDGE_SAFETY = 2.0
 def fit_field_map(
     field_map: FieldMap, centers: ArrayLike, radius: float | None = None, max_degree: int = 30
 ) -> GriddedTable:
-    """Fit multipole expansions to a map of B.
+    """Fit multipole expansions about `centers`, (3,) or (k, 3) m, one for each body of sources, to a map of B.
 
-    Raises FieldMapError: too few observations for a dipole, or points inside a sphere of sources.
-
-    Parameters
-    ----------
-    field_map : what is known of B; without errors they are taken as a common fraction of B at each distance, and the
-        misfit gives which
-    centers : (3,) or (k, 3) m, one for each body of sources, best at its middle
-    radius : of the spheres about the centres that hold all sources, m; the table begins there (None: the distance
-        of the nearest map point)
-    max_degree : the degree is chosen up to this one, and so that every unknown has two observations
-
-    Accuracy: B of a 10 mm cube, or of two that touch, on a 2 mm grid to 3e-6 at 13 mm. 1e5 observations about two
-    centres take 20 s of processor time; it grows as the square of the number of centres.
+    `radius` (m) of the spheres about them that hold all sources, where the table begins; None: the distance of the
+    nearest map point. The degree is chosen up to `max_degree`, and so that every unknown has two observations. A
+    `field_map` without errors has a common fraction of B at each distance, by the misfit. B of a 10 mm cube, or of two
+    that touch, on a 2 mm grid comes to 3e-6 at 13 mm; 1e5 observations about two centres take 20 s of processor time,
+    which grows as the square of the number of centres. Raises FieldMapError: too few observations for a dipole, or
+    points inside a sphere of sources.
     """
     start = time.perf_counter()
     middle = np.asarray(centers, float).reshape(-1, 3)
@@ -320,8 +312,7 @@ def _left_out(
 ) -> tuple[MultipoleExpansion, ...]:
     """What may follow a series that was cut at the basis' end, as fields of the size that is to be doubted.
 
-    It falls as its last eight degrees did, or is level, and is `EDGE_SAFETY` times as large as held-out residuals near
-    the sources.
+    It falls as the last eight degrees did, or is level: `EDGE_SAFETY` times held-out residuals near the sources.
     """
     if fit.degree < basis.degree:
         return ()
@@ -356,10 +347,9 @@ def _region(field_map: FieldMap, centers: Array, radii: Array) -> Array:
 
 
 def map_table(path: Path | None, magnets: Sequence[Magnet], reading: MapReading | None = None) -> GriddedTable:
-    """Table of the map at `path`, read as `reading` says, in the rotor's frame; sources lie in spheres about `magnets`.
+    """Table of the map at `path`, read as `reading` says, in the rotor's frame, outside spheres about `magnets`.
 
-    What the map holds inside these is left out. Raises FieldMapError: no map, a file that is none, one that contradicts
-    the magnets, or too few values outside the spheres.
+    Raises FieldMapError: no map, a file that is none, one that contradicts the magnets, or too few values.
     """
     if path is None:
         raise FieldMapError("Input rotor.field_map must name a file for the model map; instead it is missing.")

@@ -47,8 +47,7 @@ def mutual_errors(
 ) -> tuple[Array, Array]:
     """Gaps (k,) m, and the largest relative errors (k, 2) of force and torque of `table` found at poses there.
 
-    `coarse` and `rotor`, with two numbers of nodes, tell their own error, of the response to the moment of `floater`
-    alone. `watch` is called with the progress.
+    `coarse` and `rotor`, of two numbers of nodes, tell their error of the response to `floater`; `watch` gets progress.
     """
     generator = np.random.default_rng(4)
     apart = max(float(np.ptp(np.linalg.eigvalsh(m.permeability_in_rotor))) for m in rotor.magnets)

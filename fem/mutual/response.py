@@ -336,8 +336,7 @@ def _clear(magnets: Sequence[Magnet], places: Array, distance: float) -> Array:
 def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Array]:
     """(3 p, 3 p) J: twice minus the rotor's energy for unit dipoles at places (p, 3) m, in pairs; symmetric.
 
-    The part of `ChargeResponse.direct`, and that of the charges beyond it; no place may be nearer to the magnets than
-    the floater's centre can be.
+    `ChargeResponse.direct`'s, and the charges' beyond it; places are where the floater's centre can be.
     """
     nearest = min(float(np.min(magnet.body.distance(places))) for magnet in rotor.magnets)
     points, tensors = rotor.direct(nearest)
@@ -359,8 +358,7 @@ def response_products(rotor: ChargeResponse, places: Array) -> tuple[Array, Arra
 def sphere_samples(rotor: ChargeResponse, floater: Floater, places: Array, watch: Watch) -> list[Array]:
     """The response to the own field of `rotor` of a sphere, `floater`, at `places` (n, 3) m of its centre.
 
-    Energy (n,) J and force (n, 3) N of degree 2 and more, and the sizes (n,) of those of the whole; `watch` gets
-    progress.
+    Energy (n,) J, force (n, 3) N of degree 2 and more, and the sizes (n,) of the whole's; `watch` gets progress.
     """
     rows = []
     for place in watched(places, watch, "induced magnetisation of the floater"):

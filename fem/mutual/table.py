@@ -96,8 +96,7 @@ def image_weights(permeability: float) -> Array:
 def response_to_charge(a: Sequence[Any], b: Sequence[Any], weights: Sequence[Any]) -> hy.expression:
     """Energy of a charge in a sphere's response to another: Σ_{l≥2} (t_l/t) P_l(cos) (ab)^-(l+1).
 
-    Places `a` and `b` (three expressions each) are from the centre, in radii; `weights` are of `image_weights`, and t =
-    (μr - 1)/(μr + 1).
+    Places `a`, `b` (3 expressions) from the centre, in radii; `weights`: of `image_weights`; t = (μr - 1)/(μr + 1).
     """
     square = hy.sum([x * x for x in a]) * hy.sum([x * x for x in b])
     along = hy.sum([x * y for x, y in zip(a, b, strict=True)])

@@ -47,10 +47,10 @@ class PlateChoice(NamedTuple):
 def resolve_plate_model(
     scene: Scene, model: str, place: Array | None, rtol: float, report: Report = lambda text: None
 ) -> PlateChoice:
-    """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` is called with what is worked out.
+    """The plate's model in the motion of a `scene` about a `place` (3,) m; `report` gets what is worked out.
 
-    `auto` as `model` is, to `rtol`, none where a perfect conductor's image would not matter, a slab where the edges do
-    not by a bound or a coarse solution, and otherwise the reduced network of the finite elements.
+    `auto` as `model` is, to `rtol`, none where an image would not matter, a slab where by a bound or a coarse solution
+    the edges do not, and else the finite elements' reduced network.
     """
     if (plate := scene.plate) is None:
         return PlateChoice("none", "the scene has no plate")

@@ -215,8 +215,8 @@ def class_basis(
 ) -> ClassBasis:
     """A basis in which no source's residual is larger than `allowed`, relative to what the source drives.
 
-    `sources`: (m, width) without gradients, of unit power; `solve`: fields e and potentials T e for rows, at the shift;
-    `angular_frequencies`: at which residuals are looked at, rad/s.
+    Of rows of `sources` (m, width) without gradients, of unit power, `solve` gives fields e and potentials T e at the
+    shift; residuals are looked at at `angular_frequencies`, rad/s.
     """
     energies, vectors = np.linalg.eigh(sources @ sources.T)
     kept = np.cumsum(np.maximum(energies, 0.0)) > MODE_SHARE * allowed

@@ -172,8 +172,8 @@ def from_elements(
 ) -> Reduction:
     """Networks of `plate` for a `region` and `frequencies` (Hz) within those of a `solution`, and `others`: the rotor.
 
-    `rtol`: relative accuracy of reaction tensors (Frobenius norm) and of the others' fields; `space_error`: what the
-    solution's states miss of these. Raises AccuracyError: (the reduction) all of the states do not suffice.
+    `rtol`: of tensors (Frobenius norm) and the others' fields, of which `space_error` is what the states miss. Raises
+    AccuracyError: (the reduction) all of the states do not suffice.
     """
     space, (low, high) = solution.space, frequencies
     # Classes of the plate's mirrors that do not mirror the region are mixed by every source: they share their states.

@@ -78,10 +78,9 @@ class RotorSource:
 
 
 def rotor_parts(table: RotorTable, plate: Plate, left_out: float = LEFT_OUT) -> list[Source]:
-    """The parts of a rotor's `table` that reach the `plate`, in the rotor's frame.
+    """The parts of a rotor's `table` that reach the `plate`, but for degrees below `left_out` of its field.
 
-    `left_out`: degrees below this share of its field there are dropped. Raises InputError: an expansion does not
-    converge.
+    In the rotor's frame. Raises InputError: an expansion does not converge.
     """
     parts: list[Source] = []
     moments = list(table.expansions)
@@ -165,8 +164,7 @@ def rotor_box(plate: Plate, rotor: RotorTable) -> Region:
 def rotor_share(network: PassiveNetwork, rotor: TurningRotor, tolerance: float, watch: Watch = unwatched) -> RotorShare:
     """Signals of a `rotor` for the pose and the way of its plate, of a `network` of what stands for that.
 
-    Harmonics and depths are added until `tolerance` is met; `watch`: progress callback. Raises AccuracyError: the most
-    do not.
+    Harmonics and depths are added until `tolerance` is met. Raises AccuracyError: the most do not.
     """
     distance, cached = rotor.plate.way, dict[tuple[float, float], Array]()
 
@@ -236,10 +234,9 @@ def _left_out(sizes: Array) -> Array:
 
 
 def without_high_harmonics(share: RotorShare, table: PlateTable, allowed: float) -> RotorShare:
-    """The `share` without its highest harmonics, as many as the floater may miss; `table` is of its network.
+    """The `share`, by a `table`, without its highest harmonics, as many as the floater may miss.
 
-    `allowed`: sum over these of their part of the field of the rotor's currents, or its gradient; the share's error
-    adds it.
+    `allowed` of the rotor's currents' field, or its gradient, summed over these; the share's error adds it.
     """
     # Largest part that each harmonic has in field or gradient, at any place, depth and frequency.
     functions, slopes = table.field_functions(table.region.grid(POINTS))

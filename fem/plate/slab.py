@@ -244,8 +244,7 @@ def edge_error(plate: Plate, place: Array) -> float:
 def measured_edge_error(plate: Plate, places: Array, frequency: float) -> float:
     """Relative error of an infinite slab's reaction at `places` (n, 3) m, for a `plate` with edges.
 
-    Of the first place's tensor at a low frequency and, of a rotor that turns, at `frequency` (Hz), with fields of the
-    others.
+    At a low frequency at the first place, and at a turning rotor's `frequency` (Hz) by fields of the others.
     """
     body = plate.box.to_body(places)
     changes = []

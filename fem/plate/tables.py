@@ -32,13 +32,10 @@ ENDLESS = 1e6  # Edges of a plate without edges, m
 def plate_table(
     plate: Plate, region: Region, frequencies: tuple[float, float] = (0.5, 250.0), rtol: float = 1e-3
 ) -> PlateTable:
-    """Table of `plate` for dipoles in `region` (plate's frame) and frequencies (Hz).
+    """Table of `plate` for dipoles in `region` (plate's frame) and `frequencies` (Hz).
 
-    Raises ValueError: region in the plate, or a parameter out of range; AccuracyError: `rtol` not reached.
-
-    Parameters
-    ----------
-    rtol : relative accuracy asked of reaction tensors G, Frobenius norm
+    `rtol`: of tensors G (Frobenius norm). Raises ValueError: region in the plate, or a parameter out of range;
+    AccuracyError: `rtol` not reached.
     """
     checked_ranges(frequencies, rtol)
     solution = currents.solve_currents(plate, [region], frequencies, rtol)
@@ -54,8 +51,8 @@ Both = tuple[PlateTable, RotorShare]
 class PlateAround:
     """What the table of a plate about a floater and the rotor's share of its signals, of one network, are made from.
 
-    The finite elements are solved for dipoles in boxes around the region and the rotor, on a coarse raster: neighbours
-    and other models of the rotor need the same ones.  A rotor that these dipoles do not stand for gets its own.
+    Dipoles are in boxes around region and rotor, on a coarse raster, for neighbours and other models of the rotor too;
+    one that they do not stand for gets its own.
     """
 
     plate: Plate  # with its pose at the start and its lowering
@@ -122,8 +119,7 @@ class PlateAround:
     def changed_shares(self, known: Both, others: Sequence[tuple[Plate, RotorTable]], report: Report) -> Array:
         """Series (k, 2H+1, states) √J in the angle of k `others`, rotors and poses of a plate that has not gone down.
 
-        Of the network and harmonics `known`, cached; `report` gets messages. Raises ComputationError: the network comes
-        out otherwise.
+        Of the network and harmonics `known`, cached. Raises ComputationError: the network comes out otherwise.
         """
         more = tuple((plate.body, rotor.uniform, rotor.expansions) for plate, rotor in others)
         return CHANGED.cached((self.key, more), lambda: (self._changed(known, others, report), 0.0), report)[0][0]

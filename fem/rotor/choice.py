@@ -75,24 +75,15 @@ def resolve_model(rotor: Rotor, model: str, rtol: float = 3e-6, nearest: float |
 def rotor_table(
     rotor: Rotor, model: str = "auto", rtol: float = 3e-6, nearest: float | None = None, watch: Watch = unwatched
 ) -> RotorTable:
-    """Table of a rotor's field.
+    """Table of the field of a `rotor`, magnets in its own frame, that states its own error.
 
-    Parameters
-    ----------
-    rotor : magnets, m and T in the rotor's frame
-    model : "dipole" (moments J V/μ0 of the remanence, as in the article), "moments" (more of them), "cuboid" (closed
-        form, μr = 1), "surface" and "fem" (with recoil permeability and mutual demagnetisation, by charges on the
-        surfaces or by finite elements), or "auto", see `resolve_model`
-    rtol, nearest : relative accuracy of B asked of "moments", "surface" and "fem", and the distance from the magnets'
-        faces from which on it holds, m (None: 0.8 of the largest magnet's edge, if it were a cube)
-    watch : called with the progress of "surface" and "fem"
-
-    "dipole", "moments" and "cuboid" have the moment J V/μ0 of the remanence alone, as the article does; a cube with
-    μr = 1.05 has 0.984 of it, so that their field is 1.6 % too strong by convention ("fem" has the true one, and the
-    floater's own moment always carries its 3/(μr + 2)).
-    The table states its own error: `RotorTable.relative_error`. That of "dipole" and "cuboid" is their neglected part,
-    shape and permeability, computed to first order in μr - 1. Raises ValueError: unknown model, no magnet, or rtol not
-    between 0 and 1.
+    `model`: "dipole", "moments" (more of them) and "cuboid" (closed form, μr = 1), of the remanence alone as in the
+    article: a cube with μr = 1.05 has 0.984 of its moment, so that their field is 1.6 % too strong by convention;
+    "surface" and "fem", with recoil permeability and mutual demagnetisation, by charges on the surfaces or by finite
+    elements; or "auto", see `resolve_model`. `rtol`: relative accuracy of B asked of "moments", "surface" and "fem"
+    from `nearest` on, m from the magnets' faces (None: 0.8 of the largest magnet's edge, if it were a cube); errors of
+    "dipole" and "cuboid" are computed to first order in μr - 1. `watch` gets the progress. Raises ValueError: unknown
+    model, no magnet, or rtol not between 0 and 1.
     """
     accuracy = Accuracy(rtol, nearest)
     if not rotor:

@@ -125,8 +125,7 @@ NODES, HIGHEST_PERMEABILITY = 10, 2.0
 def polarizability_tensor(floater: Floater) -> Array:
     """(3, 3) A m²/T: the moment that a uniform field induces in a floater, along its own axes.
 
-    Exact for a sphere; of other shapes with μr up to 2 by charges, to 1e-4; else that of the sphere of its magnets'
-    volume.
+    Exact for a sphere; others up to μr = 2 by charges, to 1e-4; else of a sphere of its magnets' volume.
     """
     permeable = [magnet for magnet in floater.magnets if magnet.contrast]
     known = all(map(bears_charges, permeable)) and floater.recoil_permeability <= HIGHEST_PERMEABILITY
@@ -216,8 +215,7 @@ def force_and_torque(sources: FloaterSources, table: FieldTable, position: Array
 def shares(floater: Floater, sources: FloaterSources, highest: int) -> Array:
     """(`highest` + 1,) of each degree of multipoles in the force of a dipole one radius off a `floater`.
 
-    By that of its magnets' moments together, the mean over directions; of degree 1, what the dipole misses of
-    `sources`.
+    By its magnets' moments, the mean over directions; of degree 1, what the dipole misses of `sources`.
     """
     radius, degrees = floater.radius, multipole_degrees(highest + 1)
     own = np.zeros(len(degrees))
