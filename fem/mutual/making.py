@@ -304,7 +304,7 @@ def sphere_fit(
 
     pairs, number = np.triu_indices(len(grids), 1), effort(len(grids)).charges
     sums = [formulas.charge_sum(grids[a], grids[b], images, number) for a, b in np.transpose(pairs).tolist()]
-    derivatives = [one.derivatives(places, np.zeros_like(places)) for one in sums]
+    derivatives = [one.derivatives(places, np.zeros_like(places), 1) for one in sums]
     others = [np.column_stack([value, slope[:, :3]]) for value, slope, _ in derivatives]
     right, sizes = np.column_stack([energy, -force]), np.column_stack([energy_size, *[force_size] * 3])
     found, weights = _fitted(grids, single, formulas.POWERS, places, of_points, others, right, sizes, PENALTY)

@@ -141,10 +141,7 @@ def coupled_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[An
 
 
 def pair_energy(place: Sequence[Any], moment: Sequence[Any], row: Sequence[Any], share: Any) -> hy.expression:
-    """Two magnets' charges by the sphere's response to one of them, at a `place` (m), whatever the `moment`.
-
-    In units by `share`; `row`: places of the charges (3 + 3, m), the factor (J), 1/R (1/m) and the images' weights (3).
-    """
+    """By two charges and the sphere's response; `row`: places (6,) m, factor (J), 1/R (1/m), images' weights (3)."""
     a, b = (_scaled(place, p, row[7]) for p in (row[:3], row[3:6]))
     return share * share * (row[6] * response_to_charge(a, b, row[8:]))
 
@@ -193,14 +190,15 @@ class EnergySum:
         place, pointing = (turned_expressions(self.axes.T, vector) for vector in (away, moment))
         return hy.sum([self.formula(place, pointing, row, share) for row in self.rows.tolist()])
 
-    def derivatives(self, places: Array, moments: Array) -> tuple[Array, Array, Array]:
+    def derivatives(self, places: Array, moments: Array, order: int = 2) -> tuple[Array, Array, Array]:
         """The energy and its first and second derivatives by place (m) and moment (A m²), in this order.
 
-        J and its derivatives (m,), (m, 6) and (m, 6, 6) at `places` (m, 3) m of `moments` (m, 3) A m², rotor's frame.
+        J and its derivatives (m,), (m, 6) and (m, 6, 6), with the `order` 1 none, at `places` (m, 3) m of `moments` (m,
+        3) A m², rotor's frame.
         """
         free = np.concatenate([(places - self.origin) @ self.axes, moments @ self.axes], axis=1)
-        kernel, (count, width) = _kernel(self.formula, self.rows.shape[1]), self.rows.shape
-        sums = np.zeros((7 + len(ENTRIES), len(places)))
+        kernel, (count, width) = _kernel(self.formula, self.rows.shape[1], order), self.rows.shape
+        sums = np.zeros((7 + len(ENTRIES) * (order > 1), len(places)))
         step = max(1, EVALUATIONS // max(count, 1))
         for start in range(0, len(places) if count else 0, step):
             some = free[start : start + step]
@@ -209,18 +207,21 @@ class EnergySum:
             found = kernel(given.reshape(6 + width, -1)).reshape(-1, len(some), count)
             sums[:, start : start + step] = found.sum(axis=2)
         turn = np.kron(np.eye(2), self.axes)
-        return sums[0], sums[1:7].T @ turn.T, turn @ sums[7:].T[..., WHERE] @ turn.T
+        second = turn @ sums[7:].T[..., WHERE] @ turn.T if order > 1 else np.zeros(1)
+        return sums[0], sums[1:7].T @ turn.T, second
 
 
 @cache
-def _kernel(formula: Formula, width: int) -> Any:
-    """Compiled formula with derivatives: (28, n) for places, moments and rows (6 + width, n)."""
+def _kernel(formula: Formula, width: int, order: int) -> Any:
+    """Compiled formula with derivatives: (28, n), or (7, n) of order 1, for places, moments and rows (6 + width, n)."""
     free = hy.make_vars("x", "y", "z", "m_x", "m_y", "m_z")
     row = [hy.expression(f"n_{k}") for k in range(width)]
     energy = formula(free[:3], free[3:], row, 1.0)
     gradient = list(hy.diff_tensors([energy], diff_args=free, diff_order=1).gradient)
-    hessian = np.asarray(hy.diff_tensors(gradient, diff_args=free, diff_order=1).jacobian)
-    outputs = [energy, *gradient, *(hessian[a, b] for a, b in ENTRIES)]
+    outputs = [energy, *gradient]
+    if order > 1:
+        hessian = np.asarray(hy.diff_tensors(gradient, diff_args=free, diff_order=1).jacobian)
+        outputs += [hessian[a, b] for a, b in ENTRIES]
     return compiled(hy.cfunc, outputs, [*free, *row], fast_math=True, opt_level=1)
 
 
