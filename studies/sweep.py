@@ -39,8 +39,8 @@ def swept(study: Study, points: Sequence[Point], engine: Workers, out: Path) -> 
     """Joined result of a `study` at the `points`, each computed once even if the program is stopped between them.
 
     By an `engine`, or this process where times are measured; finished points are kept in NAME.points of `out`, until
-    `forget`. Raises SweepError: all failed; InputError: the scheduler does not answer, or has other versions, or a file
-    was replaced; ComputationError: it is lost; OSError.
+    `forget`. Raises SweepError: all failed; InputError: the scheduler does not answer or has other versions, or a file
+    of the points was replaced; ComputationError: the scheduler is lost; OSError: `out` cannot be written.
     """
     journal = Journal(study, points, out)
     if finished := journal.finished():
