@@ -61,7 +61,7 @@ FULL = f"{MOST_PAGES} pages are open, and more are not served at a time. Close o
 
 
 class LivePage:
-    """Pages that are served by `run`, or in the background from `begin` on, until `stop`; a notebook shows one."""
+    """Pages at an `address` with a token, by `run` or in a thread from `begin` to `stop`; `local`: only from here."""
 
     def __init__(self, address: str, local: bool, gate: "_Gate", listening: socket.socket) -> None:
         self.address, self.local, self.opened = address, local, gate.opened
