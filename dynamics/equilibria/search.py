@@ -457,7 +457,7 @@ def _locked_equilibrium(
     value, slope = (part[0] for part in rates.locked_balance(position[None], quaternion[None], values))
     packed, found, jacobian = locked_modes(rates, values, position, quaternion)
     state, more = scales.unpack(packed), {"kind": LOCKED, **found.in_seconds(scales.time)}
-    error = place_error(np.linalg.pinv(slope), value, values, doubt, axes[:, 2], axes.T) * scales.length
+    error = place_error(np.linalg.pinv(slope), value, values, doubt, state.moment, axes.T) * scales.length
     spin, left = float(state.moment[2]), _left(value, values)
     return Equilibrium(state, spin, left, error, slope=slope, jacobian=jacobian, **more)
 

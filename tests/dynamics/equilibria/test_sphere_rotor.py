@@ -92,11 +92,18 @@ def test_gravity_across_the_axis_ends_levitation_in_the_same_fold_however_it_is_
 @pytest.mark.slow
 def test_an_equilibrium_over_copper_goes_evenly_with_the_distance_of_the_plate(face_mm, distance_mm):
     """3 mm at 650 Hz, where Newton's steps end at 5e-12 to 1e-11 radii; against a solution by other means."""
-    found = sl.equilibria(fast(3.0, 650.0, face_mm), model="dipole", plate_model="slab")
+    missed, stated = zip(*(over_copper(face_mm, distance_mm, rtol) for rtol in (5e-3, 1e-3)), strict=True)
+    assert 5e-3 < stated[0] > missed[0]  # of the plate's table, asked for 5e-3
+    assert missed[1] < 3e-3
+
+
+def over_copper(face_mm, distance_mm, rtol):
+    """How far off (mm) the equilibrium over the plate is, and by how much it says to be at most."""
+    found = sl.equilibria(fast(3.0, 650.0, face_mm), model="dipole", plate_model="slab", plate_rtol=rtol)
     assert found.attrs["left_out"].startswith("in the plate: (")  # the far equilibrium, 33.6 mm below the rotor
     over = found.isel(equilibrium=(-1e3 * found["position"].sel(axis="z") < face_mm).values)
-    assert 1e3 * float(over["position_error"][0]) > 5e-3  # of the plate's table, asked for 5e-3
-    assert -1e3 * over["position"].sel(axis="z").values == pytest.approx([distance_mm], abs=0.01)
+    (below,), (error,) = -1e3 * over["position"].sel(axis="z").values, 1e3 * over["position_error"].values
+    return abs(below - distance_mm), error
 
 
 def nearest_stable(diameter_mm, frequency_hz):
