@@ -23,7 +23,7 @@ from .solid import Entry, Member, entries, members, tensors
 Terms = Mapping[Member, float]  # weights of real harmonics, by `members`
 
 
-Vector = Sequence[hy.expression]  # three
+Vector = Sequence[hy.expression]  # mostly of three
 # B_i (T) and ∂B_i/∂x_j (T/m), the latter symmetric
 FieldExpressions = tuple[list[hy.expression], list[list[hy.expression]]]
 

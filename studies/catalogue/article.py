@@ -36,9 +36,8 @@ FLIGHT = 250.0  # The longest trajectory of the experiment, s
 RTOL = 1e-4  # Relative accuracy of B by finite elements, from contact on: it moves equilibria by less than 1 µm
 MODELS = ("dipole", "fem")
 INTERACTION = 1e-7 * FLOATER.moment * REMANENCE * EDGE**3 / MU_0  # G = μ0 m_f m_r / 4π, N m⁴
-FARTHEST = (
-    0.12  # From contact to here roots of the force are looked for, m; nearer, the side mode's radius has no bound
-)
+# From contact to here roots of the force are looked for, m; nearer, the side mode's radius has no bound
+FARTHEST = 0.12
 
 
 @dataclass(frozen=True)
