@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache, partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import ngsolve
 import numpy as np
@@ -65,18 +66,26 @@ class CurrentSpace:
     order: int  # of the finite elements
     cells: int
 
-    def couplings(self, sources: Sequence[Source]) -> list[Array]:
-        """b (sources, states) of each parity class."""
-        rows = [np.zeros((0, sum(map(len, self.fields))))]
-        for part in source_images(self.parity, self.points, sources):
-            each = zip(part, self.fields, strict=True)
-            parts = [image.reshape(len(image), -1) * self.root @ states.T for image, states in each]
-            rows.append(np.concatenate(parts, axis=1))
-        return np.split(np.concatenate(rows), np.cumsum([len(field) for field in self.fields])[:-1], axis=1)
+    def couplings(self, sources: Sequence[Source], images: Array | None = None) -> list[Array]:
+        """b (sources, states) of each class, remembered; `images` as of `source_images`, where they are known."""
+        if new := [source for source in sources if images is not None or source not in self._known]:
+            weighted, rows = [field * self.root for field in self.fields], list[Array]()
+            for part in source_images(self.parity, self.points, new) if images is None else [images]:
+                each = zip(part, weighted, strict=True)
+                parts = [image.reshape(len(image), -1) @ states.T for image, states in each]
+                rows.append(np.concatenate(parts, axis=1))
+            self._known.update(zip(new, np.concatenate(rows), strict=True))
+        ends = np.cumsum([len(field) for field in self.fields])
+        whole = np.array([self._known[source] for source in sources]).reshape(len(sources), ends[-1])
+        return np.split(whole, ends[:-1], axis=1)
 
     def dipole_couplings(self, places: Array) -> list[Array]:
         """`couplings` of three unit dipoles at each of `places` (n, 3) m; all rotors ask for those of the same."""
         return self._of_dipoles(np.ascontiguousarray(places, float).tobytes())
+
+    @cached_property
+    def _known(self) -> WeakKeyDictionary[Source, Array]:
+        return WeakKeyDictionary()
 
     @cached_property
     def _of_dipoles(self) -> Callable[[bytes], list[Array]]:
@@ -410,7 +419,7 @@ def error_of(solution: PlateSolution, sources: Sequence[Source]) -> float:
     images = np.concatenate(list(source_images(space.parity, space.points, sources)), axis=1)
     amplitudes, rest = _fitted(space, solution.probes[standing], images)
     stands, tested = np.repeat(standing, 3), np.repeat(inside, 3)
-    driving, testing = space.couplings(sources), space.dipole_couplings(solution.probes[inside])
+    driving, testing = space.couplings(sources, images), space.dipole_couplings(solution.probes[inside])
     worst = 0.0
     for omega, residuals in zip(solution.angular_frequencies, solution.residuals, strict=True):
         left = np.sqrt(np.sum(amplitudes @ residuals[np.ix_(stands, stands)].real * amplitudes, axis=1)) + rest
