@@ -240,7 +240,7 @@ def rough_force(
 
     At a `place` (3,) m, for a `direction` of the moment; NaN in a ring's hole, where dipoles stand for no magnet.
     """
-    if any(np.linalg.norm(place - m.box.center) < m.box.half_edges.min() + floater.radius for m in magnets):
+    if any(np.linalg.norm(place - m.box.center) < m.box.half_edges.min() + floater.inner_radius for m in magnets):
         return np.full(3, np.nan)
     step = STEP * floater.radius
     places = place + step * np.concatenate([np.eye(3), -np.eye(3)])

@@ -81,6 +81,10 @@ def test_no_dipole_stands_for_a_ring_about_the_floater():
     inside, below = (rough_force((ring,), floater, table, np.array([0.0, 0.0, -z]), np.eye(3)[2]) for z in (7e-6, 7e-3))
     assert np.isnan(inside).all()
     assert 1e-4 < np.linalg.norm(below) < 1.0
+    # a disc that lies on a cube is nearer to its centre than the sphere about it could be
+    cube, disc = SCENE.rotor, replace(PERMEABLE, radius=7.2e-3, body=Cylinder(6.5e-3, 6e-3))
+    place = cube[0].body.center - np.array([0.0, 0.0, 8.5e-3])
+    assert np.isfinite(rough_force(cube, disc, rotor_table(cube, "cuboid"), place, np.eye(3)[2])).all()
 
 
 def test_growth_by_the_currents_of_the_floater(table, alone):
