@@ -33,7 +33,7 @@ SPINS, STEPS, PORTS = (-1000, 1000), (5, 1001), (0, 65535)  # body spins, points
 
 def refused(name: str, rule: str, value: object, way_out: str = "") -> InputError:
     """The error of an input `name` whose `value` breaks a `rule`, the words behind must; a `way_out` may follow."""
-    return InputError(f"Input {name} must {rule}; instead received {shown(value)}.{way_out}")
+    return wrong(name, rule, f"received {shown(value)}.{way_out}")
 
 
 def wrong(name: str, rule: str, instead: str) -> InputError:
